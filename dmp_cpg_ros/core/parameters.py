@@ -1,0 +1,108 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters as fields of frozen dataclasses: description, unit and range in one place.
+
+A class that derives from :class:`Parameters` validates itself when it is made, and the ROS layer declares its
+node parameters from the same fields.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any, TypeVar
+
+from dmp_cpg_ros.core.errors import ParameterError
+
+P = TypeVar('P', bound='Parameters')
+
+
+def parameter(default: Any, description: str, *, unit: str = '', minimum: float | None = None,
+              maximum: float | None = None, choices: tuple[str, ...] = ()) -> Any:
+    """Describe one parameter.
+
+    Parameters
+    ----------
+    default : bool, int, float, str or tuple of these
+        Default value; its type is the parameter's type.
+    description : str
+        What it does, in one sentence.
+    unit : str
+        SI unit as text, empty for pure numbers and words.
+    minimum, maximum : float, optional
+        Closed range for numbers (for every entry of a tuple).
+    choices : tuple of str
+        The words that are allowed, for strings.
+
+    Returns
+    -------
+    dataclasses.Field
+        For use as a default in a class body.
+    """
+    return dataclasses.field(default=default, metadata={
+        'description': description, 'unit': unit, 'minimum': minimum, 'maximum': maximum,
+        'choices': choices})
+
+
+@dataclasses.dataclass(frozen=True)
+class Parameters:
+    """Base of all parameter sets; checks type, finiteness and range of every field."""
+
+    def __post_init__(self) -> None:
+        """Validate; raises ParameterError that names the field, the value and what is valid."""
+        for field in dataclasses.fields(self):
+            object.__setattr__(self, field.name, _checked(field, getattr(self, field.name)))
+
+    @classmethod
+    def from_mapping(cls: type[P], values: Mapping[str, Any], where: str = 'parameters') -> P:
+        """Build from a mapping such as a YAML section; unknown names are errors.
+
+        Raises
+        ------
+        ParameterError
+            If a name is not a parameter (the valid names are listed) or a value is bad.
+        """
+        names = [field.name for field in dataclasses.fields(cls)]
+        for name in values:
+            if name not in names:
+                raise ParameterError(
+                    f"{where}: there is no parameter '{name}'; valid are {', '.join(names)}")
+        return cls(**values)
+
+
+def _checked(field: dataclasses.Field[Any], value: Any) -> Any:
+    """Return the value converted to the type of its default, or raise ParameterError."""
+    default = field.default
+    if isinstance(default, tuple):
+        if not isinstance(value, (tuple, list)):
+            raise ParameterError(f"parameter '{field.name}' must be a list, not {value!r}")
+        like = default[0] if default else 0.0
+        return tuple(_checked_scalar(field, like, entry) for entry in value)
+    return _checked_scalar(field, default, value)
+
+
+def _checked_scalar(field: dataclasses.Field[Any], like: Any, value: Any) -> Any:
+    name, unit = field.name, field.metadata.get('unit', '')
+    if isinstance(like, bool):
+        if not isinstance(value, bool):
+            raise ParameterError(f"parameter '{name}' must be true or false, not {value!r}")
+        return value
+    if isinstance(like, str):
+        choices = field.metadata.get('choices', ())
+        if not isinstance(value, str) or (choices and value not in choices):
+            valid = f"one of {', '.join(choices)}" if choices else 'text'
+            raise ParameterError(f"parameter '{name}' must be {valid}, not {value!r}")
+        return value
+    if isinstance(like, int) and not (isinstance(value, int) and not isinstance(value, bool)):
+        raise ParameterError(f"parameter '{name}' must be a whole number, not {value!r}")
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ParameterError(f"parameter '{name}' must be a number, not {value!r}")
+    low, high = field.metadata.get('minimum'), field.metadata.get('maximum')
+    if not math.isfinite(value) or (low is not None and value < low) or (
+            high is not None and value > high):
+        low_text = '-inf' if low is None else f'{low:g}'
+        high_text = 'inf' if high is None else f'{high:g}'
+        raise ParameterError(f"parameter '{name}' = {value!r} {unit} is outside its range "
+                             f'[{low_text}, {high_text}] {unit}'.replace('  ', ' ').rstrip())
+    return value if isinstance(like, int) else float(value)

@@ -1,0 +1,88 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the controllers must know of a robot; read from its model, never typed in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class LegGeometry:
+    """Geometry of one leg: abduction about x, then hip and knee about y.
+
+    The foot in the base frame is
+    ``hip_in_base + Rx(s0 q0) (hip_offset + Ry(s1 q1) (thigh + Ry(s2 q2) shank))``.
+
+    Attributes
+    ----------
+    name : str
+        ``fl``, ``fr``, ``rl`` or ``rr``.
+    hip_in_base : ndarray (3,)
+        Anchor of the abduction joint in ``base_link`` [m].
+    hip_offset, thigh, shank : ndarray (3,)
+        Abduction joint → hip joint, hip joint → knee joint, knee joint → centre of the foot's contact
+        sphere, each in the frame of its link with all joints at zero [m].
+    axis_sign : ndarray (3,)
+        +1 or −1: whether each joint turns about +x / +y or −x / −y.
+    knee_sign : int
+        Sign of the rotation about +y that takes the thigh's direction to the shank's in the home pose:
+        −1 for knees that bend backwards (the shank swung forwards), +1 for the other way.
+    position_lower, position_upper : ndarray (3,)
+        Joint limits [rad].
+    torque_limit, velocity_limit : ndarray (3,)
+        [N m], [rad/s].
+    rotor_inertia : ndarray (3,)
+        Reflected rotor inertia at the joint [kg m^2] (the paper's J).
+    foot_radius : float
+        Radius of the contact sphere [m].
+    """
+
+    name: str
+    hip_in_base: NDArray[np.float64]
+    hip_offset: NDArray[np.float64]
+    thigh: NDArray[np.float64]
+    shank: NDArray[np.float64]
+    axis_sign: NDArray[np.float64]
+    knee_sign: int
+    position_lower: NDArray[np.float64]
+    position_upper: NDArray[np.float64]
+    torque_limit: NDArray[np.float64]
+    velocity_limit: NDArray[np.float64]
+    rotor_inertia: NDArray[np.float64]
+    foot_radius: float
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """A quadruped as the controllers see it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the model.
+    legs : tuple of LegGeometry
+        Four legs in the order fl, fr, rl, rr.
+    mass : float
+        Total mass [kg].
+    base_inertia : ndarray (3, 3)
+        Inertia of the whole robot about its centre of mass in the home pose, in ``base_link`` [kg m^2].
+    com_in_base : ndarray (3,)
+        Centre of mass in ``base_link`` in the home pose [m].
+    stance_height : float
+        Height of ``base_link`` over the ground when standing [m].
+    kp, kd : ndarray (3,)
+        Gains of the low-level joint drive, per joint of a leg [N m/rad], [N m s/rad].
+    """
+
+    name: str
+    legs: tuple[LegGeometry, ...]
+    mass: float
+    base_inertia: NDArray[np.float64]
+    com_in_base: NDArray[np.float64]
+    stance_height: float
+    kp: NDArray[np.float64]
+    kd: NDArray[np.float64]

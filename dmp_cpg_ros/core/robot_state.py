@@ -1,0 +1,68 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the robot tells and what it is told, as plain arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+LEGS = ('fl', 'fr', 'rl', 'rr')
+"""Leg names in the order of every array over legs."""
+
+JOINTS_OF_LEG = ('abduction', 'hip', 'knee')
+"""Joints of one leg from the body outwards."""
+
+JOINT_NAMES = tuple(f'{leg}_{joint}' for leg in LEGS for joint in JOINTS_OF_LEG)
+"""The twelve joint names in the order of every array over joints."""
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """State of the robot at one tick.
+
+    Attributes
+    ----------
+    time_ns : int
+        Stamp on the robot's clock [ns].
+    joint_position, joint_velocity, joint_effort : ndarray (12,)
+        Measured [rad], [rad/s], [N m], in the order of ``JOINT_NAMES``.
+    base_position_in_world : ndarray (3,)
+        Origin of ``base_link`` in ``odom`` [m].
+    base_quaternion : ndarray (4,)
+        Orientation of ``base_link`` in ``odom``, x, y, z, w.
+    base_velocity_in_base, base_rate_in_base : ndarray (3,)
+        Linear [m/s] and angular [rad/s] velocity of ``base_link``, seen in ``base_link``.
+    acceleration_in_base : ndarray (3,)
+        Accelerometer reading (specific force) [m/s^2].
+    foot_force : ndarray (4,)
+        Normal contact force of each foot [N].
+    """
+
+    time_ns: int
+    joint_position: NDArray[np.float64]
+    joint_velocity: NDArray[np.float64]
+    joint_effort: NDArray[np.float64]
+    base_position_in_world: NDArray[np.float64]
+    base_quaternion: NDArray[np.float64]
+    base_velocity_in_base: NDArray[np.float64]
+    base_rate_in_base: NDArray[np.float64]
+    acceleration_in_base: NDArray[np.float64]
+    foot_force: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointTargets:
+    """Targets for some joints; what a leg sends to the robot.
+
+    Attributes
+    ----------
+    position, velocity, effort : ndarray (n,)
+        Target angle [rad], angular velocity [rad/s] and feed-forward torque [N m].
+    """
+
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    effort: NDArray[np.float64]
