@@ -1,0 +1,100 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The path of a foot over one cycle, as a function of the oscillator's phase and the reference.
+
+In stance the foot stays where it is in the world while the base moves with (v, γ), so in the base frame it follows
+ṗ = −v − γ ẑ × p exactly, turning included. In swing a cubic Hermite curve carries it back with matching velocities
+at both ends, under a bump of height. The whole path is C¹ in the phase.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FootPath:
+    """Path of one foot for a held reference.
+
+    Attributes
+    ----------
+    foothold_in_base : ndarray (3,)
+        Where the foot is at mid-stance [m].
+    v_x, v_y, gamma : float
+        Reference velocity of the base [m/s], [rad/s].
+    omega : float
+        Angular frequency of the oscillator on its limit cycle [rad/s].
+    duty : float
+        Duty factor β in (0, 1).
+    clearance : float
+        Height of the swing [m].
+    """
+
+    foothold_in_base: Array
+    v_x: float
+    v_y: float
+    gamma: float
+    omega: float
+    duty: float
+    clearance: float
+
+    def at(self, cycle_position: float) -> tuple[Array, Array]:
+        """Foot position and its derivative with respect to the cycle position.
+
+        Parameters
+        ----------
+        cycle_position : float
+            0 at mid-swing, ±1/2 at mid-stance, in [−1/2, 1/2].
+
+        Returns
+        -------
+        position_in_base : ndarray (3,)
+            [m]
+        slope : ndarray (3,)
+            ∂p/∂c [m per cycle]; the velocity is slope · φ̇ / 2π.
+        """
+        period, swing = 6.283185307179586 / self.omega, 1.0 - self.duty
+        if abs(cycle_position) >= 0.5 * swing:
+            from_mid_stance = cycle_position - 0.5 if cycle_position > 0.0 else cycle_position + 0.5
+            x, y, x_dot, y_dot = self._stance(from_mid_stance * period)
+            return (np.array((x, y, self.foothold_in_base[2])),
+                    np.array((x_dot * period, y_dot * period, 0.0)))
+        half_stance = 0.5 * self.duty * period
+        x0, y0, dx0, dy0 = self._stance(half_stance)
+        x1, y1, dx1, dy1 = self._stance(-half_stance)
+        s, scale = cycle_position / swing + 0.5, swing * period
+        x, x_slope = _hermite(s, x0, x1, dx0 * scale, dx1 * scale)
+        y, y_slope = _hermite(s, y0, y1, dy0 * scale, dy1 * scale)
+        rest = 1.0 - s
+        bump = 16.0 * s * s * rest * rest
+        bump_slope = 32.0 * s * rest * (rest - s)
+        return (np.array((x, y, self.foothold_in_base[2] + self.clearance * bump)),
+                np.array((x_slope, y_slope, self.clearance * bump_slope)) / swing)
+
+    def _stance(self, t: float) -> tuple[float, float, float, float]:
+        """Planar position and velocity of a foot that stands, t seconds after mid-stance."""
+        angle = self.gamma * t
+        s, c = sin(angle), cos(angle)
+        if abs(angle) > 1e-6:
+            along, across = s / self.gamma, (1.0 - c) / self.gamma
+        else:
+            along, across = t, 0.5 * angle * t
+        x0, y0 = self.foothold_in_base[0], self.foothold_in_base[1]
+        x = c * x0 + s * y0 - along * self.v_x - across * self.v_y
+        y = c * y0 - s * x0 - along * self.v_y + across * self.v_x
+        return x, y, -self.v_x + self.gamma * y, -self.v_y - self.gamma * x
+
+
+def _hermite(s: float, p0: float, p1: float, m0: float, m1: float) -> tuple[float, float]:
+    """Cubic Hermite curve on [0, 1] and its derivative."""
+    s2, s3 = s * s, s * s * s
+    value = ((2.0 * s3 - 3.0 * s2 + 1.0) * p0 + (s3 - 2.0 * s2 + s) * m0
+             + (3.0 * s2 - 2.0 * s3) * p1 + (s3 - s2) * m1)
+    slope = (6.0 * (s2 - s) * (p0 - p1) + (3.0 * s2 - 4.0 * s + 1.0) * m0 + (3.0 * s2 - 2.0 * s) * m1)
+    return value, slope

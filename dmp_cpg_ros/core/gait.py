@@ -1,0 +1,159 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Gaits as data: which leg follows which, for how long it stands, and how often it steps.
+
+Speeds and cadences are dimensionless (Alexander & Jayes 1983, dynamic similarity), so that one gait serves robots
+of any size: speed û = u / sqrt(g l), cadence f̂ = f sqrt(l / g), with l the standing height of the hip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.phase import wrapped
+from dmp_cpg_ros.core.robot_state import LEGS
+
+Array = NDArray[np.float64]
+
+GRAVITY = 9.81
+"""Standard gravity used to scale speeds and to carry the body [m/s^2]."""
+
+
+@dataclass(frozen=True)
+class BodyScale:
+    """Lengths by which a robot's speeds are made dimensionless.
+
+    Attributes
+    ----------
+    leg_length : float
+        Standing height l of the hips [m].
+    hip_radius : float
+        Horizontal distance from the base's origin to a foot [m]: a turn at γ moves a foot at γ times this.
+    """
+
+    leg_length: float
+    hip_radius: float
+
+    def foot_speed(self, v_x: float, v_y: float, gamma: float) -> float:
+        """Bound on the speed of any stance foot relative to the base [m/s]."""
+        return float((v_x * v_x + v_y * v_y) ** 0.5 + abs(gamma) * self.hip_radius)
+
+
+@dataclass(frozen=True)
+class Gait:
+    """One gait.
+
+    Attributes
+    ----------
+    name : str
+        Name in the YAML.
+    lag : ndarray (4,)
+        Fraction of a cycle by which each leg (fl, fr, rl, rr) follows fl, in [0, 1).
+    speed : ndarray (n,)
+        Increasing dimensionless foot speeds at which the next two are given; held constant outside.
+    cadence : ndarray (n,)
+        Dimensionless stride frequencies.
+    duty_factor : ndarray (n,)
+        Fraction β of the cycle that a foot is planned to stand, in (0, 1).
+    """
+
+    name: str
+    lag: Array
+    speed: Array
+    cadence: Array
+    duty_factor: Array
+    rest: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Validate and find the rest phase."""
+        if self.lag.shape != (len(LEGS),) or not np.all((self.lag >= 0.0) & (self.lag < 1.0)):
+            raise ParameterError(f"gait '{self.name}': lag needs four fractions in [0, 1), not {self.lag}")
+        if not len(self.speed) == len(self.cadence) == len(self.duty_factor) > 0:
+            raise ParameterError(f"gait '{self.name}': speed, cadence and duty_factor must have equal lengths")
+        if np.any(np.diff(self.speed) <= 0.0) or not np.all(np.isfinite(self.speed)):
+            raise ParameterError(f"gait '{self.name}': speed must increase")
+        if not np.all((self.duty_factor > 0.0) & (self.duty_factor < 1.0)):
+            raise ParameterError(f"gait '{self.name}': duty_factor must lie in (0, 1)")
+        if not np.all((self.cadence > 0.0) & np.isfinite(self.cadence)):
+            raise ParameterError(f"gait '{self.name}': cadence must be positive")
+        object.__setattr__(self, 'rest', _rest_phase(self.lag))
+
+    @classmethod
+    def from_mapping(cls, name: str, values: Mapping[str, Any]) -> Gait:
+        """Build from one entry of the gaits YAML.
+
+        Raises
+        ------
+        ParameterError
+            If a key is missing or not known, or a value is impossible.
+        """
+        valid = ('lag', 'speed', 'cadence', 'duty_factor')
+        if not isinstance(values, Mapping) or set(values) != set(valid):
+            raise ParameterError(f"gait '{name}' must have exactly the keys {', '.join(valid)}")
+        lag = values['lag']
+        if not isinstance(lag, Mapping) or set(lag) != set(LEGS):
+            raise ParameterError(f"gait '{name}': lag must name the legs {', '.join(LEGS)}")
+        try:
+            tables = [np.asarray(values[key], dtype=float) for key in valid[1:]]
+            return cls(name, np.array([float(lag[leg]) for leg in LEGS]), *tables)
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"gait '{name}': {error}") from error
+
+    @property
+    def phases(self) -> Array:
+        """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
+        return -2.0 * np.pi * self.lag
+
+    def omega(self, foot_speed: float, scale: BodyScale) -> float:
+        """Angular frequency ω of the oscillators at a foot speed [rad/s].
+
+        Parameters
+        ----------
+        foot_speed : float
+            As from :meth:`BodyScale.foot_speed` [m/s].
+        scale : BodyScale
+            The robot's lengths.
+        """
+        root = (GRAVITY / scale.leg_length) ** 0.5
+        return 2.0 * np.pi * root * _interpolated(
+            foot_speed / (root * scale.leg_length), self.speed, self.cadence)
+
+    def duty(self, foot_speed: float, scale: BodyScale) -> float:
+        """Duty factor β at a foot speed."""
+        return _interpolated(
+            foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self.speed, self.duty_factor)
+
+    def cycle_position(self, phi: Array | float) -> Array:
+        """Where legs are in their cycle: 0 at mid-swing, in [−1/2, 1/2).
+
+        The phase φ = 0 of oscillator fl, where inhibition holds it, is the moment at which all legs are farthest from
+        mid-swing.
+
+        Parameters
+        ----------
+        phi : ndarray (...) or float
+            Oscillator phases [rad].
+        """
+        return wrapped(np.asarray(phi) + 2.0 * np.pi * self.rest) / (2.0 * np.pi)
+
+
+def _interpolated(at: float, xs: Array, ys: Array) -> float:
+    return float(np.interp(at, xs, ys))
+
+
+def _rest_phase(lag: Array) -> float:
+    """Cycle position of fl at which the leg nearest to its mid-swing is as far from it as possible.
+
+    Of several such positions the one at which fl itself is farthest from mid-swing, and of two the earlier one.
+    """
+    mid_swings = np.unique(np.round(lag % 1.0, 9))                # cycle positions of fl
+    gaps = np.diff(np.append(mid_swings, mid_swings[0] + 1.0))
+    middles = (mid_swings + 0.5 * gaps)[gaps > gaps.max() - 1e-6] % 1.0
+    own = np.abs((middles + 0.5) % 1.0 - 0.5)
+    return float(min(middles[own > own.max() - 1e-6]))

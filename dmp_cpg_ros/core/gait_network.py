@@ -1,0 +1,88 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The four coupled oscillators of a gait: what the canonical node runs and what predictions are made with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.gait import BodyScale, Gait
+from dmp_cpg_ros.core.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.hopf import AndronovHopf
+from dmp_cpg_ros.core.inhibition import Inhibition
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.phase import phase, state_at, wrapped
+from dmp_cpg_ros.core.robot_state import LEGS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CanonicalParameters(Parameters):
+    """Parameters of the coupled canonical oscillators."""
+
+    rho: float = parameter(8.0, 'attraction rho to the limit cycle', unit='1/s', minimum=0.1, maximum=1e3)
+    radius: float = parameter(1.0, 'radius r of the limit cycle', minimum=0.01, maximum=100.0)
+    coupling_gain: float = parameter(100.0, 'gain k of every coupling', unit='1/s', minimum=0.0, maximum=1e4)
+    coupling_graph: str = parameter('all_to_all', 'who is coupled with whom',
+                                    choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'))
+
+
+class GaitNetwork:
+    """Canonical system of one gait with its frequency taken from the reference.
+
+    Parameters
+    ----------
+    parameters : CanonicalParameters
+        Oscillators and coupling.
+    gait : Gait
+        Phase offsets and cadence.
+    scale : BodyScale
+        The robot's lengths.
+    """
+
+    def __init__(self, parameters: CanonicalParameters, gait: Gait, scale: BodyScale) -> None:
+        """Build the coupled system; inhibition pulls each leg to its place when fl has phase 0."""
+        self.parameters, self.gait, self.scale = parameters, gait, scale
+        graph = graph_from_edges(len(LEGS), topology(parameters.coupling_graph, len(LEGS)),
+                                 parameters.coupling_gain, gait.phases)
+        self.system = CanonicalSystem(graph, AndronovHopf(parameters.rho, parameters.radius),
+                                      state_at(gait.phases, parameters.radius))
+
+    def omega(self, r: Array) -> float:
+        """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""
+        return self.gait.omega(self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2])), self.scale)
+
+    def step(self, x: Array, r: Array, inhibition: Inhibition, dt: float) -> Array:
+        """Advance the states (4, 2) by dt [s] at reference r under an inhibition that is switched by region."""
+        gains = inhibition.acting_gains(x, self.system.target)
+        return self.system.step(x, self.omega(r), gains, dt)
+
+    def rate(self, x: Array, r: Array, inhibition: Inhibition) -> Array:
+        """Rate of the states, ẋ (4, 2) [1/s]."""
+        gains = inhibition.acting_gains(x, self.system.target)
+        return self.system.field(x, self.omega(r), gains)
+
+    def locked_state(self, phi: float = 0.0) -> Array:
+        """States (4, 2) on the limit cycle with fl at phase φ [rad] and all legs in their places."""
+        return state_at(phi + self.gait.phases, self.parameters.radius)
+
+    def rest_state(self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0) -> Array:
+        """Equilibrium (4, 2) that is reached from the locked state under inhibition at zero reference."""
+        x, r = self.locked_state(), np.zeros(3)
+        for _ in range(round(duration / tick)):
+            following = self.step(x, r, inhibition, tick)
+            if np.array_equal(following, x):
+                break
+            x = following
+        return x
+
+    def phase_errors(self, x: Array) -> Array:
+        """Deviation of each leg's phase from its place, relative to the circular mean, ndarray (4,) [rad]."""
+        relative = phase(x) - self.gait.phases
+        mean = np.arctan2(np.sin(relative).sum(), np.cos(relative).sum())
+        return wrapped(relative - mean)

@@ -1,0 +1,185 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Stopping and starting the gait: requests in, the inhibition of the next tick and its state word out.
+
+    free ──► walking          uninhibited; walking once the legs are in their places and the reference moves
+    waiting                   a stop is requested: the reference slows, then inhibition is armed until x enters C
+    captured                  inhibition holds an oscillator, the others follow
+    at_rest                   the oscillators, the reference and the swings have come to rest
+    releasing                 a start is requested: oscillators run up until they are phase-locked
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.gait_network import GaitNetwork
+from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.phase import phase_rate
+from dmp_cpg_ros.core.swing_activity import activity_step
+
+Array = NDArray[np.float64]
+
+STATE_WORDS = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing')
+"""What ``inhibition_state`` can say."""
+
+REST_ACTIVITY = 0.02
+"""Swing activity below which a leg is at rest: its foot is below 2 % of its clearance."""
+
+REST_SPEED = 0.005
+"""Reference foot speed below which the reference is at rest [m/s]."""
+
+REST_PHASE_RATE = 0.05
+"""Phase rate below which an oscillator is at rest [rad/s]."""
+
+LOCKED_PHASE_ERROR = 0.05
+"""Phase error below which the legs count as being in their places [rad]."""
+
+LOCKED_ACTIVITY = 0.95
+"""Swing activity above which a leg swings at its height."""
+
+
+@dataclass(frozen=True)
+class SupervisorState:
+    """State of the supervisor after a tick.
+
+    Attributes
+    ----------
+    time_ns : int
+        Stamp of the tick [ns].
+    word : str
+        One of ``STATE_WORDS``.
+    requested : bool
+        Whether a stop is requested.
+    automatic : bool
+        Whether the stop was requested by ``auto_inhibit`` (or by starting at rest) and not by a service call.
+    request_ns : int
+        Stamp at which the present stop or start was requested [ns].
+    armed : bool
+        Whether the inhibition's gains are on.
+    activity : ndarray (4,)
+        Swing activity of the legs.
+    measured_s : float
+        Time from the request to rest or to phase lock [s]; NaN until then.
+    idle_ns : int
+        Stamp since which the command has been zero [ns]; −1 while it is not.
+    """
+
+    time_ns: int
+    word: str
+    requested: bool
+    automatic: bool
+    request_ns: int
+    armed: bool
+    activity: Array
+    measured_s: float = float('nan')
+    idle_ns: int = -1
+
+
+class GaitSupervisor:
+    """The state machine; state in, state out.
+
+    Parameters
+    ----------
+    parameters : InhibitionParameters
+        Gains, region, legs, automatic stop.
+    network : GaitNetwork
+        The oscillators that are watched.
+    activity_rate : float
+        Rate of the legs' swing activity [1/s].
+    """
+
+    def __init__(self, parameters: InhibitionParameters, network: GaitNetwork, activity_rate: float) -> None:
+        """Keep the parts."""
+        self.parameters, self.network, self.activity_rate = parameters, network, activity_rate
+
+    def initial_state(self, time_ns: int = 0) -> SupervisorState:
+        """At rest, or free when ``start_inhibited`` is false."""
+        stopped = self.parameters.start_inhibited
+        return SupervisorState(time_ns, 'at_rest' if stopped else 'free', stopped, True, time_ns, stopped,
+                               np.zeros(4) if stopped else np.ones(4))
+
+    def inhibition(self, state: SupervisorState) -> Inhibition:
+        """Inhibition that the canonical system applies at the tick after ``state``."""
+        gains = self.parameters.armed_gains if state.armed else np.zeros(len(state.activity))
+        return Inhibition(state.requested, gains, self.parameters.region_radius)
+
+    def request(self, state: SupervisorState, stop: bool, automatic: bool = False) -> SupervisorState:
+        """Ask for a stop or a start; asking for what is already asked changes nothing but its origin."""
+        if stop == state.requested:
+            return replace(state, automatic=automatic)
+        return replace(state, word='waiting' if stop else 'releasing', requested=stop, automatic=automatic,
+                       request_ns=state.time_ns, armed=False, measured_s=float('nan'), idle_ns=-1)
+
+    def step(self, state: SupervisorState, time_ns: int, x: Array, x_dot: Array, r: Array,
+             command: tuple[float, float, float]) -> SupervisorState:
+        """Advance by one tick.
+
+        Parameters
+        ----------
+        state : SupervisorState
+            State after the last tick, requests included.
+        time_ns : int
+            Stamp of this tick [ns].
+        x, x_dot : ndarray (4, 2)
+            Canonical states and rates of this tick.
+        r : ndarray (3,)
+            Reference of this tick.
+        command : tuple of float
+            External command (v_x, v_y, γ) that acts at this tick.
+
+        Returns
+        -------
+        SupervisorState
+        """
+        dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
+        omega = self.network.omega(r)
+        rates = phase_rate(x, x_dot)
+        activity = activity_step(state.activity, rates, omega, self.activity_rate, dt)
+        state = replace(state, time_ns=time_ns, activity=activity)
+        state = self._automatic(state, command)
+        speed = self.network.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
+        if state.requested:
+            return self._stopping(state, x, rates, speed)
+        return self._running(state, x, speed)
+
+    def _automatic(self, state: SupervisorState, command: tuple[float, float, float]) -> SupervisorState:
+        """Stop after a time of zero command, and start at a command, when ``auto_inhibit`` is on."""
+        if not self.parameters.auto_inhibit:
+            return state
+        if any(command):
+            state = replace(state, idle_ns=-1)
+            return self.request(state, False, True) if state.requested and state.automatic else state
+        if state.idle_ns < 0:
+            state = replace(state, idle_ns=state.time_ns)
+        waited = (state.time_ns - state.idle_ns) * 1e-9
+        if not state.requested and waited >= self.parameters.auto_delay:
+            return self.request(state, True, True)
+        return state
+
+    def _stopping(self, state: SupervisorState, x: Array, rates: Array, speed: float) -> SupervisorState:
+        armed = state.armed or speed <= self.parameters.capture_speed
+        inhibition = self.inhibition(replace(state, armed=armed))
+        if not np.any(inhibition.acting_gains(x, self.network.system.target)):
+            return replace(state, armed=armed, word='waiting')
+        if (np.abs(rates).max() > REST_PHASE_RATE or speed > REST_SPEED
+                or state.activity.max() > REST_ACTIVITY):
+            return replace(state, armed=armed, word='captured')
+        return replace(state, armed=armed, word='at_rest', measured_s=self._measured(state))
+
+    def _running(self, state: SupervisorState, x: Array, speed: float) -> SupervisorState:
+        locked = np.abs(self.network.phase_errors(x)).max() <= LOCKED_PHASE_ERROR
+        if state.word == 'releasing' and not (locked and state.activity.min() >= LOCKED_ACTIVITY):
+            return state
+        word = 'walking' if locked and speed > REST_SPEED else 'free'
+        return replace(state, word=word, measured_s=self._measured(state))
+
+    @staticmethod
+    def _measured(state: SupervisorState) -> float:
+        """Time from the request to now, kept once it has been set [s]."""
+        if np.isfinite(state.measured_s):
+            return state.measured_s
+        return (state.time_ns - state.request_ns) * 1e-9

@@ -1,0 +1,198 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One leg's rhythmic primitive: oscillator state and reference in, joint targets out.
+
+The goals g_θ(x_i, r), g_θ̇(x_i, r) are the foot path through the leg's inverse kinematics and Jacobian.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.foot_path import FootPath
+from dmp_cpg_ros.core.gait import BodyScale, Gait
+from dmp_cpg_ros.core.leg_kinematics import LegKinematics
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.phase import phase, phase_rate
+from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_state import LEGS, JointTargets
+from dmp_cpg_ros.core.swing_activity import activity_step
+from dmp_cpg_ros.core.transformation import TransformationState, TransformationSystem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LegParameters(Parameters):
+    """Parameters of a leg's transformation systems."""
+
+    stiffness: float = parameter(6400.0, 'stiffness k of the transformation system', unit='1/s^2',
+                                 minimum=1.0, maximum=1e6)
+    damping: float = parameter(160.0, 'damping b of the transformation system', unit='1/s', minimum=0.1,
+                               maximum=1e4)
+    reading: str = parameter('kinematic', 'whether the joint follows the primitive or receives its torque',
+                             choices=('kinematic', 'torque'))
+    clearance: float = parameter(0.2, 'height of the swing as a fraction of the standing height',
+                                 minimum=0.0, maximum=0.6)
+    activity_rate: float = parameter(12.0, 'rate at which the swing height follows the phase speed',
+                                     unit='1/s', minimum=0.1, maximum=1e3)
+    placement_rate: float = parameter(25.0, 'rate at which a swinging foot follows its placement shift',
+                                      unit='1/s', minimum=0.1, maximum=1e3)
+
+
+@dataclass(frozen=True)
+class LegState:
+    """State of one leg's primitive.
+
+    Attributes
+    ----------
+    joints : TransformationState
+        θ, θ̇ of the kinematic reading, (3,) each.
+    activity : float
+        Swing activity a in [0, 1].
+    shift_in_base : ndarray (2,)
+        Foot placement shift that acts now [m].
+    """
+
+    joints: TransformationState
+    activity: float
+    shift_in_base: Array
+
+
+class LegPrimitive:
+    """Transformation systems of one leg.
+
+    Parameters
+    ----------
+    leg : str
+        ``fl``, ``fr``, ``rl`` or ``rr``.
+    description : RobotDescription
+        The robot.
+    gait : Gait
+        The gait.
+    parameters : LegParameters
+        Gains and swing.
+    """
+
+    def __init__(self, leg: str, description: RobotDescription, gait: Gait,
+                 parameters: LegParameters) -> None:
+        """Derive foothold and scale from the description."""
+        self.parameters, self.gait = parameters, gait
+        geometry = description.legs[LEGS.index(leg)]
+        self.kinematics = LegKinematics(geometry)
+        self.scale = body_scale(description)
+        self.foothold_in_base = nominal_foothold(description, leg)
+        self.clearance = parameters.clearance * description.stance_height
+        self.transformation = TransformationSystem(parameters.stiffness, parameters.damping,
+                                                   np.asarray(geometry.rotor_inertia, dtype=float))
+
+    def initial_state(self) -> LegState:
+        """State of a leg that stands at its foothold."""
+        q = self.kinematics.inverse(self.foothold_in_base)
+        return LegState(TransformationState(q, np.zeros(3)), 0.0, np.zeros(2))
+
+    def step(self, state: LegState, x: Array, x_dot: Array, r: Array, shift_in_base: Array,
+             dt: float) -> tuple[LegState, Array, Array]:
+        """Advance the leg to the time at which the inputs hold.
+
+        Parameters
+        ----------
+        state : LegState
+            State one tick before.
+        x, x_dot : ndarray (2,)
+            The leg's oscillator state and its derivative [1/s].
+        r : ndarray (3,)
+            Reference v_x, v_y [m/s], γ [rad/s].
+        shift_in_base : ndarray (2,)
+            Wanted foot placement shift [m].
+        dt : float
+            Time since the last tick [s].
+
+        Returns
+        -------
+        state : LegState
+        goal, goal_velocity : ndarray (3,)
+            g_θ [rad] and g_θ̇ [rad/s].
+        """
+        p, gait = self.parameters, self.gait
+        v_x, v_y, gamma = float(r[0]), float(r[1]), float(r[2])
+        speed = self.scale.foot_speed(v_x, v_y, gamma)
+        omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
+        rate = float(phase_rate(x, x_dot))
+        position = float(gait.cycle_position(phase(x)))
+        activity = float(activity_step(state.activity, rate, omega, p.activity_rate, dt))
+        swinging = abs(position) < 0.5 * (1.0 - duty)
+        share = 1.0 - np.exp(-p.placement_rate * activity * dt) if swinging else 0.0
+        shift_rate = (shift_in_base - state.shift_in_base) * (share / dt if dt > 0.0 else 0.0)
+        shift = state.shift_in_base + shift_rate * dt
+        path = FootPath(self.foothold_in_base, v_x, v_y, gamma, omega, duty, activity * self.clearance)
+        foot, slope = path.at(position)
+        velocity = slope * (rate / (2.0 * np.pi))
+        foot[:2] += shift
+        velocity[:2] += shift_rate
+        goal = self.kinematics.inverse(foot)
+        goal_velocity = _joint_velocity(self.kinematics.jacobian_in_base(goal), velocity)
+        joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
+        return LegState(joints, activity, shift), goal, goal_velocity
+
+    def targets(self, state: LegState, goal: Array, goal_velocity: Array, feedback: Array,
+                measured: TransformationState | None = None) -> JointTargets:
+        """Joint targets of the parameters' reading.
+
+        Parameters
+        ----------
+        state : LegState
+            State after :meth:`step`.
+        goal, goal_velocity : ndarray (3,)
+            Goals from :meth:`step`.
+        feedback : ndarray (3,)
+            τ_fb [N m].
+        measured : TransformationState, optional
+            Measured angles and velocities, needed for the torque reading.
+
+        Returns
+        -------
+        JointTargets
+        """
+        joints = state.joints if measured is None else measured
+        acceleration = self.transformation.acceleration(joints.position, joints.velocity, goal, goal_velocity)
+        return JointTargets(joints.position, joints.velocity,
+                            self.transformation.torque(acceleration, feedback))
+
+
+def body_scale(description: RobotDescription) -> BodyScale:
+    """Lengths that make the robot's speeds dimensionless."""
+    foothold = nominal_foothold(description, LEGS[0])
+    hip_height = description.stance_height + float(description.legs[0].hip_in_base[2])
+    return BodyScale(hip_height, float(np.hypot(foothold[0], foothold[1])))
+
+
+def nominal_foothold(description: RobotDescription, leg: str) -> Array:
+    """Foot centre at mid-stance: under the hip, shifted so that the feet are around the centre of mass.
+
+    Returns
+    -------
+    ndarray (3,)
+        In ``base_link`` [m].
+    """
+    geometry = description.legs[LEGS.index(leg)]
+    kinematics = LegKinematics(geometry)
+    x = geometry.hip_in_base[0] + geometry.hip_offset[0] + description.com_in_base[0]
+    y = geometry.hip_in_base[1] + kinematics.lateral_offset
+    return np.array((x, y, geometry.foot_radius - description.stance_height))
+
+
+def _joint_velocity(J: Array, velocity: Array) -> Array:
+    """Solve J q̇ = v by Cramer's rule; damped near singular postures."""
+    (a, b, c), (d, e, f), (g, h, i) = J.tolist()
+    x, y, z = velocity.tolist()
+    minor_0, minor_1, minor_2 = e * i - f * h, f * g - d * i, d * h - e * g
+    determinant = a * minor_0 + b * minor_1 + c * minor_2
+    inverse = determinant / (determinant * determinant + 1e-12)
+    return np.array((
+        (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
+        (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
+        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse))

@@ -1,0 +1,189 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Virtual model control of the body: feedback torques and foot placement.
+
+Virtual springs and dampers hold the base at its height, level, and at the reference velocity (Pratt et al. 2001;
+Ajallooeian et al. 2013, as the paper's experiment). Their wrench is shared by the stance feet
+(:mod:`~dmp_cpg_ros.core.force_distribution`) and becomes joint torques τ_fb = −Jᵀ f. Swinging feet are placed further
+along a velocity that exceeds the reference (Raibert 1986).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.force_distribution import distribute
+from dmp_cpg_ros.core.gait import GRAVITY, Gait
+from dmp_cpg_ros.core.leg_kinematics import LegKinematics
+from dmp_cpg_ros.core.leg_primitive import body_scale
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.phase import phase, phase_rate
+from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.swing_activity import activity_step
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PostureParameters(Parameters):
+    """Gains of the virtual model, per unit of mass or inertia: squares and products of rates."""
+
+    height_stiffness: float = parameter(80.0, 'virtual spring of the height, per mass', unit='1/s^2',
+                                        minimum=0.0, maximum=1e4)
+    height_damping: float = parameter(12.0, 'virtual damper of the height, per mass', unit='1/s',
+                                      minimum=0.0, maximum=1e3)
+    attitude_stiffness: float = parameter(150.0, 'virtual spring of roll and pitch, per inertia',
+                                          unit='1/s^2', minimum=0.0, maximum=1e4)
+    attitude_damping: float = parameter(15.0, 'virtual damper of roll and pitch, per inertia', unit='1/s',
+                                        minimum=0.0, maximum=1e3)
+    velocity_gain: float = parameter(4.0, 'force per mass and error of horizontal velocity', unit='1/s',
+                                     minimum=0.0, maximum=1e3)
+    yaw_rate_gain: float = parameter(8.0, 'moment per inertia and error of the turn rate', unit='1/s',
+                                     minimum=0.0, maximum=1e3)
+    friction: float = parameter(0.6, 'friction coefficient that the forces respect', minimum=0.05,
+                                maximum=2.0)
+    load_transfer: float = parameter(0.08, 'fraction of the cycle over which a foot takes and gives load',
+                                     minimum=0.001, maximum=0.3)
+    placement_gain: float = parameter(0.12, 'foot placement per error of horizontal velocity', unit='s',
+                                      minimum=0.0, maximum=1.0)
+    placement_limit: float = parameter(0.12, 'largest foot placement shift', unit='m', minimum=0.0,
+                                       maximum=0.5)
+    activity_rate: float = parameter(12.0, 'rate at which planned swings fade when the phase stops',
+                                     unit='1/s', minimum=0.1, maximum=1e3)
+
+
+@dataclass(frozen=True)
+class PostureFeedback:
+    """What the posture controller sends to the legs.
+
+    Attributes
+    ----------
+    torque : ndarray (12,)
+        τ_fb in the order of the joint names [N m].
+    shift_in_base : ndarray (4, 2)
+        Foot placement shifts [m].
+    """
+
+    torque: Array
+    shift_in_base: Array
+
+
+class PostureController:
+    """Virtual model of one robot in one gait; its own state is the legs' swing activity.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        The robot.
+    gait : Gait
+        The gait.
+    parameters : PostureParameters
+        Gains.
+    """
+
+    def __init__(self, description: RobotDescription, gait: Gait, parameters: PostureParameters) -> None:
+        """Scale the virtual model by the robot's mass and inertia."""
+        self.description, self.gait, self.parameters = description, gait, parameters
+        self.kinematics = [LegKinematics(leg) for leg in description.legs]
+        self.scale = body_scale(description)
+        self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
+        self.torque_limit = np.array([leg.torque_limit for leg in description.legs])
+        self.inertia = np.diag(description.base_inertia).copy()
+
+    def step(self, activity: Array, state: RobotState, x: Array, x_dot: Array, r: Array,
+             dt: float) -> tuple[Array, PostureFeedback]:
+        """Compute the feedback of one tick.
+
+        Parameters
+        ----------
+        activity : ndarray (4,)
+            Swing activity of the legs one tick before.
+        state : RobotState
+            Measured state.
+        x, x_dot : ndarray (4, 2)
+            Canonical states and rates.
+        r : ndarray (3,)
+            Reference v_x, v_y [m/s], γ [rad/s].
+        dt : float
+            Time since the last tick [s].
+
+        Returns
+        -------
+        activity : ndarray (4,)
+        feedback : PostureFeedback
+        """
+        p = self.parameters
+        speed = self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
+        omega, duty = self.gait.omega(speed, self.scale), self.gait.duty(speed, self.scale)
+        activity = activity_step(activity, phase_rate(x, x_dot), omega, p.activity_rate, dt)
+        load = self._load(self.gait.cycle_position(phase(x)), duty, activity)
+        R_level_base = level_from_base(state.base_quaternion)
+        q = state.joint_position.reshape(4, 3)
+        feet_in_base = np.array([leg.foot_in_base(angles) for leg, angles in zip(
+            self.kinematics, q.tolist(), strict=True)])
+        feet = (feet_in_base - self.description.com_in_base) @ R_level_base.T      # from the COM, levelled
+        velocity = R_level_base @ state.base_velocity_in_base
+        rate = R_level_base @ state.base_rate_in_base
+        wrench = self._wrench(R_level_base, velocity, rate, feet, load, r)
+        forces = distribute(wrench, feet, load, p.friction, 2.0 * self.description.mass * GRAVITY)
+        forces_in_base = forces @ R_level_base
+        J = np.array([leg.jacobian_in_base(angles) for leg, angles in zip(
+            self.kinematics, q.tolist(), strict=True)])
+        torque = -np.einsum('lij,li->lj', J, forces_in_base)
+        torque = np.clip(torque, -self.torque_limit, self.torque_limit).ravel()
+        shift = p.placement_gain * np.array((velocity[0] - r[0], velocity[1] - r[1]))
+        length = float(np.hypot(shift[0], shift[1]))
+        if length > p.placement_limit:
+            shift *= p.placement_limit / length
+        return activity, PostureFeedback(torque, np.tile(shift, (4, 1)))
+
+    def _load(self, cycle_position: Array, duty: float, activity: Array) -> Array:
+        """Share of the load that each foot may take, in [0, 1]: a trapezoid over the planned stance."""
+        into_stance = np.abs(cycle_position) - 0.5 * (1.0 - duty)
+        planned = np.clip(into_stance / self.parameters.load_transfer, 0.0, 1.0)
+        return np.maximum(planned, 1.0 - activity)
+
+    def _wrench(self, R_level_base: Array, velocity: Array, rate: Array, feet: Array, load: Array,
+                r: Array) -> Array:
+        """Force and moment about the centre of mass in the levelled base frame, ndarray (6,)."""
+        p, m = self.parameters, self.description.mass
+        total = load.sum()
+        ground = float(load @ feet[:, 2]) / total if total > 1e-6 else float(feet[:, 2].min())
+        height = self.foot_radius - ground
+        wanted = self.description.stance_height + float(self.description.com_in_base[2])
+        roll, pitch = R_level_base[2, 1], -R_level_base[2, 0]      # small-angle axes of the tilt
+        moment_x = self.inertia[0] * (-p.attitude_stiffness * roll - p.attitude_damping * rate[0])
+        moment_y = self.inertia[1] * (-p.attitude_stiffness * pitch - p.attitude_damping * rate[1])
+        return np.array((
+            m * p.velocity_gain * (r[0] - velocity[0]),
+            m * p.velocity_gain * (r[1] - velocity[1]),
+            m * (GRAVITY + p.height_stiffness * (wanted - height) - p.height_damping * velocity[2]),
+            moment_x, moment_y,
+            self.inertia[2] * p.yaw_rate_gain * (r[2] - rate[2])))
+
+
+def level_from_base(quaternion: Array) -> Array:
+    """Rotation from ``base_link`` to a frame of the same heading with z up.
+
+    Parameters
+    ----------
+    quaternion : ndarray (4,)
+        Orientation of ``base_link`` in ``odom``, x, y, z, w.
+
+    Returns
+    -------
+    ndarray (3, 3)
+        R_level_base.
+    """
+    x, y, z, w = quaternion.tolist()
+    z_world = np.array((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))
+    forward = np.array((1.0, 0.0, 0.0)) - z_world[0] * z_world
+    forward /= np.sqrt(forward @ forward) + 1e-12
+    left = np.array((z_world[1] * forward[2] - z_world[2] * forward[1],
+                     z_world[2] * forward[0] - z_world[0] * forward[2],
+                     z_world[0] * forward[1] - z_world[1] * forward[0]))
+    return np.stack((forward, left, z_world))

@@ -1,0 +1,40 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How much a leg swings: a filtered measure of its phase speed.
+
+When inhibition stops a phase inside the swing, the foot must come down; when the phase moves again it must lift.
+The clearance of the swing is therefore scaled by an activity that follows the phase speed (notes on the paper: for duty
+factors below 3/4 no phase has all four feet down), through a first-order filter as the paper uses for amplitudes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def activity_step(activity: Array | float, phase_rate: Array | float, omega: float, rate: float,
+                  dt: float) -> Array:
+    """Advance ȧ = rate · (sat(φ̇/ω) − a) exactly for a held phase rate.
+
+    Parameters
+    ----------
+    activity : ndarray (...) or float
+        a in [0, 1].
+    phase_rate : ndarray (...) or float
+        φ̇ [rad/s].
+    omega : float
+        Free-running ω > 0 [rad/s].
+    rate : float
+        Rate of the filter [1/s].
+    dt : float
+        [s]
+
+    Returns
+    -------
+    ndarray (...)
+    """
+    wanted = np.clip(np.asarray(phase_rate) / omega, 0.0, 1.0)
+    return wanted + (activity - wanted) * np.exp(-rate * dt)

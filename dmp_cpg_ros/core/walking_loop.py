@@ -1,0 +1,154 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The suite without ROS: the same objects in the order of the nodes, tick by tick.
+
+For tuning, tests and studies. In lock-step the nodes publish the same numbers, bit for bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.gait import Gait
+from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition import InhibitionParameters, no_inhibition
+from dmp_cpg_ros.core.leg_primitive import LegParameters, LegPrimitive, LegState, body_scale
+from dmp_cpg_ros.core.posture import PostureController, PostureFeedback, PostureParameters
+from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.transformation import TransformationState
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SuiteParameters:
+    """Parameters of all parts of the suite."""
+
+    reference: ReferenceParameters = field(default_factory=ReferenceParameters)
+    canonical: CanonicalParameters = field(default_factory=CanonicalParameters)
+    inhibition: InhibitionParameters = field(default_factory=InhibitionParameters)
+    leg: LegParameters = field(default_factory=LegParameters)
+    posture: PostureParameters = field(default_factory=PostureParameters)
+
+
+@dataclass(frozen=True)
+class Tick:
+    """Everything that one tick produced.
+
+    Attributes
+    ----------
+    time_ns : int
+        Stamp [ns].
+    r : ndarray (3,)
+        Reference.
+    x, x_dot : ndarray (4, 2)
+        Canonical states and rates.
+    supervisor : SupervisorState
+        State of the stop and start.
+    feedback : PostureFeedback
+        Torques and placement shifts.
+    targets : JointTargets
+        Of all twelve joints.
+    """
+
+    time_ns: int
+    r: Array
+    x: Array
+    x_dot: Array
+    supervisor: SupervisorState
+    feedback: PostureFeedback
+    targets: JointTargets
+
+
+class WalkingLoop:
+    """All parts of the suite in one object.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        The robot.
+    gait : Gait
+        The gait.
+    parameters : SuiteParameters
+        Parameters of all parts.
+    """
+
+    def __init__(self, description: RobotDescription, gait: Gait,
+                 parameters: SuiteParameters | None = None) -> None:
+        """Build the parts at rest (or free, with ``start_inhibited`` false)."""
+        self.parameters = p = parameters or SuiteParameters()
+        self.network = GaitNetwork(p.canonical, gait, body_scale(description))
+        self.gate, self.reference = CommandGate(p.reference), ReferenceSystem(p.reference)
+        self.supervisor = GaitSupervisor(p.inhibition, self.network, p.leg.activity_rate)
+        self.posture = PostureController(description, gait, p.posture)
+        self.legs = [LegPrimitive(leg, description, gait, p.leg) for leg in LEGS]
+        self.stop = self.supervisor.initial_state()
+        self.inhibition = self.supervisor.inhibition(self.stop)
+        self.r = np.zeros(3)
+        self.x = initial_canonical_state(self.network, p.inhibition)
+        self.activity = self.stop.activity
+        self.leg_states: list[LegState] = [leg.initial_state() for leg in self.legs]
+        self._time_ns: int | None = None
+
+    def command(self, v_x: float, v_y: float = 0.0, gamma: float = 0.0) -> None:
+        """Command a velocity; acts from the next tick on. Raises DataError for values that are not finite."""
+        self.gate.accept(v_x, v_y, gamma)
+
+    def request(self, stop: bool) -> float:
+        """Request a stop or a start, as the service does; returns the predicted time to it [s]."""
+        self.stop = self.supervisor.request(self.stop, stop)
+        command = self.gate.at(self.stop.time_ns)
+        return predict(self.supervisor, self.reference, self.stop, self.x, self.r, command, self._dt)
+
+    def tick(self, state: RobotState) -> Tick:
+        """Run all parts on the robot's state of one tick.
+
+        Parameters
+        ----------
+        state : RobotState
+            Measured state with its stamp.
+
+        Returns
+        -------
+        Tick
+        """
+        dt = 0.0 if self._time_ns is None else (state.time_ns - self._time_ns) * 1e-9
+        self._time_ns, self._dt = state.time_ns, dt or 0.004
+        command = self.gate.at(state.time_ns)
+        inhibition = self.inhibition
+        r_ext = np.zeros(3) if inhibition.requested else np.array(command)
+        self.r = self.reference.step(self.r, r_ext, dt)
+        self.x = self.network.step(self.x, self.r, inhibition, dt) if dt > 0.0 else self.x
+        x_dot = self.network.rate(self.x, self.r, inhibition)
+        self.stop = self.supervisor.step(self.stop, state.time_ns, self.x, x_dot, self.r, command)
+        self.inhibition = self.supervisor.inhibition(self.stop)
+        self.activity, feedback = self.posture.step(self.activity, state, self.x, x_dot, self.r, dt)
+        targets = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
+        return Tick(state.time_ns, self.r, self.x, x_dot, self.stop, feedback, JointTargets(
+            *(np.concatenate([getattr(target, name) for target in targets])
+              for name in ('position', 'velocity', 'effort'))))
+
+    def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
+             dt: float) -> JointTargets:
+        leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
+        self.leg_states[i], goal, goal_velocity = leg.step(
+            self.leg_states[i], self.x[i], x_dot[i], self.r, feedback.shift_in_base[i], dt)
+        measured = None
+        if leg.parameters.reading == 'torque':
+            measured = TransformationState(state.joint_position[joints], state.joint_velocity[joints])
+        return leg.targets(self.leg_states[i], goal, goal_velocity, feedback.torque[joints], measured)
+
+
+def initial_canonical_state(network: GaitNetwork, parameters: InhibitionParameters) -> Array:
+    """States (4, 2) at which the oscillators start: at rest under inhibition, or in their places."""
+    if not parameters.start_inhibited:
+        return network.locked_state()
+    full = no_inhibition()
+    return network.rest_state(type(full)(True, parameters.armed_gains, parameters.region_radius))
