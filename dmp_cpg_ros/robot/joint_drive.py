@@ -1,0 +1,122 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The low-level joint drive that runs at every physics step."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JointTargets
+
+Vector = NDArray[np.float64]
+
+ROLL_OFF_FROM = 0.7
+"""Share of the speed limit above which the torque that drives a joint on falls, linearly to zero."""
+
+
+class JointDrive:
+    """τ = kp (q_d − q) + kd (q̇_d − q̇) + τ_ff for twelve joints, within torque and speed limits.
+
+    Between two arrivals of targets q_d moves on with q̇_d, for one tick at most; then it stands still. A joint
+    whose targets are the same numbers as before has received nothing new.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        Gains and limits.
+    steps : int
+        Physics steps per control tick.
+    step_s : float
+        Physics step [s].
+    """
+
+    def __init__(self, description: RobotDescription, steps: int, step_s: float) -> None:
+        self._kp = np.tile(description.kp, 4)
+        self._kd = np.tile(description.kd, 4)
+        self._limit = np.concatenate([leg.torque_limit for leg in description.legs])
+        speed = np.concatenate([leg.velocity_limit for leg in description.legs])
+        self._slope = self._limit / (speed * (1.0 - ROLL_OFF_FROM))  # [N m s/rad]
+        self._stall = self._limit / (1.0 - ROLL_OFF_FROM)  # the falling line at zero speed
+        self._steps, self._step_s = steps, step_s
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all targets."""
+        self._last = np.full((3, 12), np.nan)
+        self._age = np.zeros(12)  # physics steps since arrival
+        self._command = np.zeros((self._steps, 12))
+
+    def accept(self, targets: JointTargets) -> None:
+        """Take the targets for the coming tick.
+
+        Parameters
+        ----------
+        targets : JointTargets
+            Arrays of shape (12,) in the order of ``JOINT_NAMES``.
+
+        Raises
+        ------
+        DataError
+            If an array has another shape or holds a value that is not finite.
+        """
+        new = checked_targets(targets)
+        arrived = (new != self._last).any(axis=0)
+        self._age = np.where(arrived, 0.0, self._age + self._steps)
+        self._last = new
+        position, velocity, effort = new
+        age = self._age + np.arange(self._steps)[:, None]  # (steps, 12)
+        moving = velocity * (age < self._steps)
+        reference = position + velocity * (np.minimum(age, self._steps) * self._step_s)
+        self._command = self._kp * reference + self._kd * moving + effort
+
+    def torque(self, step: int, position: Vector, velocity: Vector) -> Vector:
+        """Return the joint torques of one physics step.
+
+        Parameters
+        ----------
+        step : int
+            Number of the physics step within the tick, from 0.
+        position, velocity : ndarray (12,)
+            Measured [rad], [rad/s].
+
+        Returns
+        -------
+        ndarray (12,)
+            [N m].
+        """
+        wanted = self._command[step] - self._kp * position - self._kd * velocity
+        return self.limited(wanted, velocity)
+
+    def limited(self, torque: Vector, velocity: Vector) -> Vector:
+        """Clip torques (12,) to what the actuators can give at these speeds.
+
+        Torque along the motion is limited to τ_max up to 0.7 of the speed limit and falls linearly to zero at
+        the speed limit; torque against the motion is limited to τ_max only.
+        """
+        lost = self._slope * velocity
+        upper = np.minimum(self._limit, np.maximum(self._stall - lost, 0.0))
+        lower = np.minimum(self._limit, np.maximum(self._stall + lost, 0.0))
+        return np.minimum(upper, np.maximum(-lower, torque))
+
+
+def checked_targets(targets: JointTargets) -> NDArray[np.float64]:
+    """Return position, velocity and effort as one array (3, 12).
+
+    Raises
+    ------
+    DataError
+        If an array has another shape or holds a value that is not finite.
+    """
+    shape = (len(JOINT_NAMES),)
+    for name, value in (('position', targets.position), ('velocity', targets.velocity),
+                        ('effort', targets.effort)):
+        if np.shape(value) != shape:
+            raise DataError(f'joint targets: {name} has shape {np.shape(value)}, it must be {shape}')
+    stacked = np.array((targets.position, targets.velocity, targets.effort), dtype=float)
+    if not np.isfinite(stacked).all():
+        bad = [JOINT_NAMES[i] for i in np.flatnonzero(~np.isfinite(stacked).all(axis=0))]
+        raise DataError(f"joint targets: the values for {', '.join(bad)} are not finite")
+    return stacked

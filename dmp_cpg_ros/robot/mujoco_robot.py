@@ -1,0 +1,185 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot in MuJoCo: joint drive at the physics rate, sensors, clock, pushes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_state import JointTargets, RobotState
+from dmp_cpg_ros.robot.contact_reader import ContactReader
+from dmp_cpg_ros.robot.home_pose import home_joint_position
+from dmp_cpg_ros.robot.joint_actuators import JointActuators
+from dmp_cpg_ros.robot.joint_drive import JointDrive
+from dmp_cpg_ros.robot.model_loader import load_model
+from dmp_cpg_ros.robot.model_reader import find_ids, read_description
+from dmp_cpg_ros.robot.port import RobotError, steps_per_tick
+from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
+from dmp_cpg_ros.robot.standing_torque import standing_torque
+
+Vector = NDArray[np.float64]
+
+FALLEN_HEIGHT_SHARE = 0.5  # of the stance height
+FALLEN_TILT = np.deg2rad(60.0)
+INITIAL_PENETRATION = 1e-5  # [m] without any there would be no contact at the first stamp
+
+
+class MujocoRobot:
+    """A quadruped in MuJoCo behind the port ``Robot``.
+
+    Two runs from ``reset`` with the same targets are identical bit for bit. Contact forces, efforts and the
+    accelerometer are those of the last physics step before the stamp.
+
+    Parameters
+    ----------
+    robot_file : RobotFile, Path, str or None
+        The robot; None is the package's own.
+    tick_ns : int
+        Control tick [ns]; a whole multiple of the model's physics step.
+    seed : int
+        Seed of the initial spread.
+    initial_spread : float
+        The joints start at the home pose plus a uniform draw from ± this [rad].
+    initial_height : float, optional
+        Height of the base at the start [m]; by default its feet touch the ground.
+
+    Raises
+    ------
+    MissingFileError, ParameterError
+        If files, model or numbers cannot be used.
+    """
+
+    def __init__(self, robot_file: RobotFile | Path | str | None = None, tick_ns: int = 4_000_000,
+                 seed: int = 0, initial_spread: float = 0.0, initial_height: float | None = None) -> None:
+        if not isinstance(robot_file, RobotFile):
+            robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
+        self.model = model = load_model(robot_file.model)
+        self.description: RobotDescription = read_description(model, robot_file)
+        self.tick_ns = tick_ns
+        self._step_ns = round(model.opt.timestep * 1e9)
+        self._steps = steps_per_tick(tick_ns, self._step_ns)
+        # A silent restart of the simulation on bad numbers would look like a jump of the robot.
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        self._ids = find_ids(model, robot_file)
+        self._qpos = model.jnt_qposadr[self._ids.joints]
+        self._dof = model.jnt_dofadr[self._ids.joints]
+        self._base_qpos = int(model.jnt_qposadr[self._ids.free_joint])
+        self._base_dof = int(model.jnt_dofadr[self._ids.free_joint])
+        self._actuators = JointActuators(model, self._ids.joints)
+        self._drive = JointDrive(self.description, self._steps, model.opt.timestep)
+        self._contacts = ContactReader(model, self._ids)
+        self._home = home_joint_position(self.description)
+        if not (np.isfinite(initial_spread) and initial_spread >= 0.0):
+            raise ParameterError(f'initial_spread = {initial_spread!r} must be at least 0 rad')
+        self._seed, self._spread = seed, initial_spread
+        self._initial_height = initial_height
+        self.data = mujoco.MjData(model)
+        self._tick = 0
+        self._push: tuple[Vector, int] = (np.zeros(3), 0)
+        self.reset()
+
+    def reset(self) -> RobotState:
+        """Stand in the home pose at time 0, held by the torques that standing takes."""
+        data, model = self.data, self.model
+        mujoco.mj_resetData(model, data)
+        self._drive.reset()
+        self._tick, self._push = 0, (np.zeros(3), 0)
+        spread = np.random.default_rng(self._seed).uniform(-1.0, 1.0, 12) * self._spread
+        height = (self.description.stance_height - INITIAL_PENETRATION if self._initial_height is None
+                  else self._initial_height)
+        b = self._base_qpos
+        data.qpos[b:b + 7] = (0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0)
+        data.qpos[self._qpos] = self._home + spread
+        mujoco.mj_forward(model, data)
+        self._effort = self._drive.limited(standing_torque(model, data, self._ids, self._dof), np.zeros(12))
+        self._actuators.apply(data, self._effort)
+        mujoco.mj_forward(model, data)
+        d = self._base_dof
+        self._acceleration_in_world = data.qacc[d:d + 3].copy()
+        return self._state()
+
+    def step(self, targets: JointTargets) -> RobotState:
+        """Advance by one control tick.
+
+        Raises
+        ------
+        DataError
+            If the targets have another shape than (12,) or are not finite.
+        RobotError
+            If the simulation leaves the finite numbers.
+        """
+        self._drive.accept(targets)
+        model, data, drive = self.model, self.data, self._drive
+        qpos, qvel, step = data.qpos, data.qvel, mujoco.mj_step
+        d = self._base_dof
+        for i in range(self._steps):
+            self._effort = drive.torque(i, qpos[self._qpos], qvel[self._dof])
+            self._actuators.apply(data, self._effort)
+            self._push_on()
+            before = qvel[d:d + 3].copy()
+            step(model, data)
+        self._tick += 1
+        if not (np.isfinite(qpos).all() and np.isfinite(qvel).all()):
+            raise RobotError(f'the simulation became unstable in the tick that ends at '
+                             f'{self._tick * self.tick_ns * 1e-9:.3f} s; lower the gains kp and kd or the step')
+        self._acceleration_in_world = (qvel[d:d + 3] - before) / model.opt.timestep
+        return self._state()
+
+    def apply_push(self, force_in_world: Vector, duration_ns: int) -> None:
+        """Push the base's centre of mass with a force [N] from now on, for whole physics steps.
+
+        Raises
+        ------
+        ParameterError
+            If the force is not three finite numbers or the duration is not a multiple of the physics step.
+        """
+        force = np.array(force_in_world, dtype=float)
+        if force.shape != (3,) or not np.isfinite(force).all():
+            raise ParameterError(f'a push must be three finite numbers [N], not {force_in_world!r}')
+        self._push = (force, steps_per_tick(duration_ns, self._step_ns))
+
+    def _push_on(self) -> None:
+        force, left = self._push
+        if left:
+            self.data.xfrc_applied[self._ids.base, :3] = force
+            self._push = (force, left - 1)
+        elif force.any():
+            self.data.xfrc_applied[self._ids.base, :3] = 0.0
+            self._push = (np.zeros(3), 0)
+
+    @property
+    def fallen(self) -> bool:
+        """Whether the base is below half the stance height, tilted by more than 60°, or on the ground."""
+        data, b = self.data, self._base_qpos
+        x, y = data.qpos[b + 4], data.qpos[b + 5]
+        upright = 1.0 - 2.0 * (x * x + y * y)  # cosine between the base's z and the world's
+        return bool(data.qpos[b + 2] < FALLEN_HEIGHT_SHARE * self.description.stance_height
+                    or upright < np.cos(FALLEN_TILT) or self._contacts.base_touches(data))
+
+    def close(self) -> None:
+        """Nothing to release; here because a robot has it."""
+
+    def _state(self) -> RobotState:
+        data, b, d = self.data, self._base_qpos, self._base_dof
+        w, x, y, z = data.qpos[b + 3:b + 7].tolist()
+        R_world_base = np.array((
+            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))))
+        return RobotState(
+            time_ns=self._tick * self.tick_ns,
+            joint_position=data.qpos[self._qpos],
+            joint_velocity=data.qvel[self._dof],
+            joint_effort=self._effort.copy(),
+            base_position_in_world=data.qpos[b:b + 3].copy(),
+            base_quaternion=np.array((x, y, z, w)),
+            base_velocity_in_base=data.qvel[d:d + 3] @ R_world_base,
+            base_rate_in_base=data.qvel[d + 3:d + 6].copy(),
+            acceleration_in_base=(self._acceleration_in_world - self.model.opt.gravity) @ R_world_base,
+            foot_force=self._contacts.foot_force(data))

@@ -1,0 +1,66 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The port behind which every robot sits: simulated, imagined or real."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_state import JointTargets, RobotState
+
+
+class RobotError(DmpCpgError):
+    """The robot (or its simulation) cannot go on."""
+
+
+class Robot(Protocol):
+    """A robot that advances by one control tick at a time.
+
+    Attributes
+    ----------
+    description : RobotDescription
+        What the controllers may know of it.
+    tick_ns : int
+        Length of a control tick [ns].
+    """
+
+    @property
+    def description(self) -> RobotDescription:
+        """What the controllers may know of the robot."""
+
+    @property
+    def tick_ns(self) -> int:
+        """Length of a control tick [ns]."""
+
+    def reset(self) -> RobotState:
+        """Stand in the home pose at time 0 and return that state."""
+
+    def step(self, targets: JointTargets) -> RobotState:
+        """Advance by one tick under targets (12,) and return the state at its end.
+
+        Raises
+        ------
+        DataError
+            If the targets have another shape or are not finite.
+        RobotError
+            If the robot cannot go on.
+        """
+
+    def close(self) -> None:
+        """Release what the robot holds; it cannot be used afterwards."""
+
+
+def steps_per_tick(tick_ns: int, step_ns: int) -> int:
+    """Return how many physics steps make one control tick.
+
+    Raises
+    ------
+    ParameterError
+        If the tick is not a positive whole multiple of the step: times would drift apart.
+    """
+    if tick_ns <= 0 or step_ns <= 0 or tick_ns % step_ns:
+        raise ParameterError(f'the control tick of {tick_ns} ns is not a positive whole multiple of the '
+                             f'physics step of {step_ns} ns')
+    return tick_ns // step_ns
