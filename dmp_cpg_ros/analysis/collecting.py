@@ -1,0 +1,183 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages in, data model out: which topic goes into which array."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis.named_values import NamedValues
+from dmp_cpg_ros.analysis.recording import (
+    CanonicalSeries, FootForceSeries, ImuSeries, JointSeries, OdometrySeries, PostureSeries, Recording,
+    StatusEvent, VelocitySeries)
+from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS
+
+Array = NDArray[np.float64]
+Handler = Callable[[int, Any], None]
+Rows = tuple[list[int], list[list[float]]]
+
+JOINT_TOPICS = ('joint_states', 'joint_targets', 'canonical_state', 'foot_contacts', 'posture_feedback')
+
+
+class Collector:
+    """Takes messages by topic; rows are stacked once, at the end."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._named = {topic: NamedValues() for topic in JOINT_TOPICS}
+        self._rows: dict[str, Rows] = {topic: ([], []) for topic in ('reference', 'cmd_vel', 'odom', 'imu')}
+        self._unstamped_commands: Rows = ([], [])
+        self._clock: tuple[list[int], list[int]] = ([], [])      # bag time, robot's clock [ns]
+        self._ticks: tuple[list[int], list[int]] = ([], [])
+        self._inhibition: list[StatusEvent] = []
+        self._diagnostics: dict[str, StatusEvent] = {}
+        self._handlers: dict[tuple[str, str], Handler] = {
+            ('joint_states', 'sensor_msgs/msg/JointState'): self._take_joint_states,
+            **{(name, 'sensor_msgs/msg/JointState'): self._taker_of_named(name) for name in JOINT_TOPICS[1:]},
+            ('reference', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('reference'),
+            ('cmd_vel', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('cmd_vel'),
+            ('cmd_vel', 'geometry_msgs/msg/Twist'): self._take_unstamped_twist,
+            ('odom', 'nav_msgs/msg/Odometry'): self._take_odometry,
+            ('imu', 'sensor_msgs/msg/Imu'): self._take_imu,
+            ('clock', 'rosgraph_msgs/msg/Clock'): self._take_clock,
+            ('inhibition_state', 'diagnostic_msgs/msg/DiagnosticArray'): self._take_inhibition,
+            ('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray'): self._take_diagnostics,
+        }
+
+    def handler(self, topic: str, msgtype: str) -> Handler | None:
+        """Function that takes bag time [ns] and message of a topic; None when the topic is not used.
+
+        Parameters
+        ----------
+        topic : str
+            Name without namespace.
+        msgtype : str
+            Such as ``sensor_msgs/msg/JointState``.
+        """
+        return self._handlers.get((topic, msgtype))
+
+    def recording(self, counts: dict[str, int]) -> Recording:
+        """Stack everything that was taken."""
+        time, canonical = self._named['canonical_state'].table([f'{leg}_x{k}' for leg in LEGS for k in (1, 2)])
+        x, x_dot = (canonical[name].reshape(-1, len(LEGS), 2) for name in ('position', 'velocity'))
+        odometry = _stacked(self._rows['odom'], 13)
+        imu = _stacked(self._rows['imu'], 10)
+        return Recording(
+            joints=self._joints('joint_states'), targets=self._joints('joint_targets'),
+            canonical=CanonicalSeries(time, x, x_dot),
+            reference=VelocitySeries(*_stacked(self._rows['reference'], 3)), commands=self._commands(),
+            odometry=OdometrySeries(odometry[0], *np.split(odometry[1], (3, 7, 10), axis=1)),
+            imu=ImuSeries(imu[0], *np.split(imu[1], (4, 7), axis=1)),
+            feet=self._feet(), posture=self._posture(), inhibition=tuple(self._inhibition),
+            diagnostics=self._diagnostics, counts=counts)
+
+    def _joints(self, topic: str) -> JointSeries:
+        time, values = self._named[topic].table(JOINT_NAMES)
+        return JointSeries(time, values['position'], values['velocity'], values['effort'])
+
+    def _feet(self) -> FootForceSeries:
+        time, values = self._named['foot_contacts'].table(LEGS)
+        if not time.size:
+            time, values = self._named['foot_contacts'].table([f'{leg}_foot' for leg in LEGS])
+        return FootForceSeries(time, values['effort'])
+
+    def _posture(self) -> PostureSeries:
+        time, torques = self._named['posture_feedback'].table(JOINT_NAMES)
+        _, shifts = self._named['posture_feedback'].table([f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xy'])
+        return PostureSeries(time, torques['effort'], shifts['position'].reshape(-1, len(LEGS), 2))
+
+    def _commands(self) -> VelocitySeries:
+        stamps, rows = self._rows['cmd_vel']
+        bag_ns, unstamped = self._unstamped_commands
+        stamped = [*stamps, *_robot_clock(bag_ns, self._clock if self._clock[0] else self._ticks)]
+        return VelocitySeries(*_stacked((stamped, rows + unstamped), 3))
+
+    def _take_joint_states(self, bag_ns: int, message: Any) -> None:
+        stamp = _stamp_ns(message.header.stamp)
+        self._ticks[0].append(bag_ns)
+        self._ticks[1].append(stamp)
+        self._named['joint_states'].add(stamp, message)
+
+    def _taker_of_named(self, topic: str) -> Callable[[int, Any], None]:
+        named = self._named[topic]
+        return lambda _, message: named.add(_stamp_ns(message.header.stamp), message)
+
+    def _taker_of_twists(self, topic: str) -> Callable[[int, Any], None]:
+        def handle(_: int, message: Any) -> None:
+            self._row(topic, message, _twist(message.twist))
+        return handle
+
+    def _take_unstamped_twist(self, bag_ns: int, message: Any) -> None:
+        self._unstamped_commands[0].append(bag_ns)
+        self._unstamped_commands[1].append(_twist(message))
+
+    def _take_odometry(self, _: int, message: Any) -> None:
+        pose, twist = message.pose.pose, message.twist.twist
+        self._row('odom', message, [*_xyz(pose.position), *_xyz(pose.orientation), pose.orientation.w,
+                                    *_xyz(twist.linear), *_xyz(twist.angular)])
+
+    def _take_imu(self, _: int, message: Any) -> None:
+        self._row('imu', message, [*_xyz(message.orientation), message.orientation.w,
+                                   *_xyz(message.angular_velocity), *_xyz(message.linear_acceleration)])
+
+    def _row(self, topic: str, message: Any, row: list[float]) -> None:
+        stamps, rows = self._rows[topic]
+        stamps.append(_stamp_ns(message.header.stamp))
+        rows.append(row)
+
+    def _take_clock(self, bag_ns: int, message: Any) -> None:
+        self._clock[0].append(bag_ns)
+        self._clock[1].append(_stamp_ns(message.clock))
+
+    def _take_inhibition(self, _: int, message: Any) -> None:
+        for event in _events(message).values():
+            last = self._inhibition[-1] if self._inhibition else None
+            if last is None or (last.message, last.values) != (event.message, event.values):
+                self._inhibition.append(event)
+
+    def _take_diagnostics(self, _: int, message: Any) -> None:
+        self._diagnostics.update(_events(message))
+
+
+def _stamp_ns(stamp: Any) -> int:
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def _xyz(vector: Any) -> tuple[float, float, float]:
+    return vector.x, vector.y, vector.z
+
+
+def _twist(twist: Any) -> list[float]:
+    return [twist.linear.x, twist.linear.y, twist.angular.z]
+
+
+def _events(message: Any) -> dict[str, StatusEvent]:
+    time = _stamp_ns(message.header.stamp) / 1e9
+    return {status.name: StatusEvent(time, int(status.level), status.message,
+                                     {pair.key: pair.value for pair in status.values})
+            for status in message.status}
+
+
+def _stacked(rows: tuple[list[int], list[list[float]]], width: int) -> tuple[Array, Array]:
+    """Rows in the order of their stamps; of rows with one stamp the last counts."""
+    stamps = np.array(rows[0], dtype=np.int64)
+    values = np.array(rows[1], dtype=float).reshape(-1, width)
+    _, last = np.unique(stamps[::-1], return_index=True)
+    keep = len(stamps) - 1 - last
+    return stamps[keep] / 1e9, values[keep]
+
+
+def _robot_clock(bag_ns: list[int], clock: tuple[list[int], list[int]]) -> list[int]:
+    """Stamps on the robot's clock for messages without one.
+
+    The bag's record time may be wall time: each message gets the stamp of the tick that was recorded last before
+    it. A bag without ticks keeps its own time.
+    """
+    if not bag_ns or not clock[0]:
+        return bag_ns
+    before = np.searchsorted(np.array(clock[0]), np.array(bag_ns), side='right') - 1
+    return [clock[1][max(index, 0)] for index in before]

@@ -1,0 +1,236 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The data model: one run as plain arrays, whatever it was recorded with.
+
+Times are seconds on the robot's clock, taken from message stamps. A topic that was not recorded is an array with
+no rows, so that every query works on every recording.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS
+
+Array = NDArray[np.float64]
+
+N_JOINTS, N_LEGS = len(JOINT_NAMES), len(LEGS)
+
+
+def no_rows(*shape: int) -> Array:
+    """Array without rows, ndarray (0, *shape)."""
+    return np.empty((0, *shape))
+
+
+@dataclass(frozen=True)
+class JointSeries:
+    """Joint states or joint targets.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    position, velocity, effort : ndarray (n, 12)
+        [rad], [rad/s], [N m] in the order of ``JOINT_NAMES``; NaN where a message held no value.
+    """
+
+    time: Array = field(default_factory=no_rows)
+    position: Array = field(default_factory=lambda: no_rows(N_JOINTS))
+    velocity: Array = field(default_factory=lambda: no_rows(N_JOINTS))
+    effort: Array = field(default_factory=lambda: no_rows(N_JOINTS))
+
+
+@dataclass(frozen=True)
+class CanonicalSeries:
+    """Canonical states.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    x, x_dot : ndarray (n, 4, 2)
+        States and their time derivatives [1/s].
+    """
+
+    time: Array = field(default_factory=no_rows)
+    x: Array = field(default_factory=lambda: no_rows(N_LEGS, 2))
+    x_dot: Array = field(default_factory=lambda: no_rows(N_LEGS, 2))
+
+
+@dataclass(frozen=True)
+class VelocitySeries:
+    """Commands or the reference.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    value : ndarray (n, 3)
+        v_x, v_y [m/s], γ [rad/s].
+    """
+
+    time: Array = field(default_factory=no_rows)
+    value: Array = field(default_factory=lambda: no_rows(3))
+
+
+@dataclass(frozen=True)
+class OdometrySeries:
+    """Motion of ``base_link`` in ``odom``.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    position_in_world : ndarray (n, 3)
+        [m]
+    quaternion : ndarray (n, 4)
+        Orientation of the base in the world, x, y, z, w.
+    velocity_in_base, rate_in_base : ndarray (n, 3)
+        [m/s], [rad/s]
+    """
+
+    time: Array = field(default_factory=no_rows)
+    position_in_world: Array = field(default_factory=lambda: no_rows(3))
+    quaternion: Array = field(default_factory=lambda: no_rows(4))
+    velocity_in_base: Array = field(default_factory=lambda: no_rows(3))
+    rate_in_base: Array = field(default_factory=lambda: no_rows(3))
+
+
+@dataclass(frozen=True)
+class ImuSeries:
+    """Inertial measurements.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    quaternion : ndarray (n, 4)
+        x, y, z, w.
+    rate_in_base, acceleration_in_base : ndarray (n, 3)
+        [rad/s], [m/s^2]
+    """
+
+    time: Array = field(default_factory=no_rows)
+    quaternion: Array = field(default_factory=lambda: no_rows(4))
+    rate_in_base: Array = field(default_factory=lambda: no_rows(3))
+    acceleration_in_base: Array = field(default_factory=lambda: no_rows(3))
+
+
+@dataclass(frozen=True)
+class FootForceSeries:
+    """Normal contact forces.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    force : ndarray (n, 4)
+        [N], in the order of ``LEGS``.
+    """
+
+    time: Array = field(default_factory=no_rows)
+    force: Array = field(default_factory=lambda: no_rows(N_LEGS))
+
+
+@dataclass(frozen=True)
+class PostureSeries:
+    """What the posture controller asked of the legs.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    torque : ndarray (n, 12)
+        Feedback torques τ_fb [N m].
+    foot_shift_in_base : ndarray (n, 4, 2)
+        Shift of the foot placement in x and y [m].
+    """
+
+    time: Array = field(default_factory=no_rows)
+    torque: Array = field(default_factory=lambda: no_rows(N_JOINTS))
+    foot_shift_in_base: Array = field(default_factory=lambda: no_rows(N_LEGS, 2))
+
+
+@dataclass(frozen=True)
+class StatusEvent:
+    """One status of a node: from ``inhibition_state`` or ``/diagnostics``.
+
+    Attributes
+    ----------
+    time : float
+        Stamp [s].
+    level : int
+        0 ok, 1 warning, 2 error, 3 stale.
+    message : str
+        The node's words; for the inhibition its state.
+    values : mapping of str to str
+        Keys and values as the node wrote them.
+    """
+
+    time: float
+    level: int
+    message: str
+    values: Mapping[str, str]
+
+    def number(self, key: str) -> float | None:
+        """Value of a key as a finite number, None where there is none."""
+        try:
+            value = float(self.values[key])
+        except (KeyError, ValueError):
+            return None
+        return value if np.isfinite(value) else None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One run.
+
+    Attributes
+    ----------
+    joints, targets : JointSeries
+        Measured joint states, and the four legs' targets merged by stamp.
+    canonical : CanonicalSeries
+        Oscillators.
+    reference, commands : VelocitySeries
+        The filtered reference and the commands as sent.
+    odometry : OdometrySeries
+        Body motion.
+    imu : ImuSeries
+        Inertial measurements.
+    feet : FootForceSeries
+        Contact forces.
+    posture : PostureSeries
+        Balance feedback.
+    inhibition : tuple of StatusEvent
+        ``inhibition_state`` where it changed.
+    diagnostics : mapping of str to StatusEvent
+        The last status of every name.
+    counts : mapping of str to int
+        Messages per recorded topic.
+    """
+
+    joints: JointSeries = field(default_factory=JointSeries)
+    targets: JointSeries = field(default_factory=JointSeries)
+    canonical: CanonicalSeries = field(default_factory=CanonicalSeries)
+    reference: VelocitySeries = field(default_factory=VelocitySeries)
+    commands: VelocitySeries = field(default_factory=VelocitySeries)
+    odometry: OdometrySeries = field(default_factory=OdometrySeries)
+    imu: ImuSeries = field(default_factory=ImuSeries)
+    feet: FootForceSeries = field(default_factory=FootForceSeries)
+    posture: PostureSeries = field(default_factory=PostureSeries)
+    inhibition: tuple[StatusEvent, ...] = ()
+    diagnostics: Mapping[str, StatusEvent] = field(default_factory=dict)
+    counts: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last stamp of the recorded series [s]; (0, 0) when nothing was recorded."""
+        axes = [series.time for series in (self.joints, self.canonical, self.odometry, self.reference,
+                                           self.feet, self.targets) if series.time.size]
+        if not axes:
+            return 0.0, 0.0
+        return min(float(axis[0]) for axis in axes), max(float(axis[-1]) for axis in axes)
