@@ -1,0 +1,115 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+#
+# Everything runs from .venv, which is made on first use. With ROS 2 Jazzy sourced, .venv sees the
+# system's packages and uses its rclpy; without, the ros-jazzy wheels are installed into it.
+
+VENV := $(CURDIR)/.venv
+BIN := $(VENV)/bin
+
+# Arguments to pass on, e.g. make test PYTEST_ARGS='-k certificate -x'
+WALK_ARGS ?=
+PYTEST_ARGS ?=
+BENCH_ARGS ?=
+
+# The interpreter to make .venv from: the first that fits, and never one that is itself in a venv.
+PYTHON ?= $(if $(ROS_DISTRO),/usr/bin/python3) python3 python3.12 python3.13 python3.11 python3.10
+PROBE := import ensurepip, platform, sys, venv; from importlib.util import find_spec; \
+  (3, 10) <= sys.version_info < (3, 14) or sys.exit(1); \
+  print(getattr(sys, "_base_executable", sys.executable), "python%d.%d" % sys.version_info[:2], \
+  "sourced" if find_spec("rclpy") and sys.prefix == sys.base_prefix else "wheels", platform.machine())
+FOUND := $(shell for candidate in $(PYTHON); do $$candidate -c '$(PROBE)' 2>/dev/null && break; done)
+INTERPRETER := $(word 1,$(FOUND))
+SITE := $(VENV)/lib/$(word 2,$(FOUND))/site-packages
+# A sourced ROS 2 whose rclpy this interpreter does not find is an error, not a reason for wheels.
+ROS := $(if $(ROS_DISTRO),sourced,$(word 3,$(FOUND)))
+MACHINE := $(word 4,$(FOUND))
+
+# Exists when .venv has the dependencies, of this kind; the other kind starts .venv afresh.
+READY := $(VENV)/.dependencies-$(ROS)
+# Exists when .venv has the package as it is now: a copy, so that nothing half-edited runs.
+INSTALLED := $(VENV)/.installed
+SOURCES := $(shell find dmp_cpg_ros config launch resource -not -name '*.pyc' -not -name __pycache__) \
+  setup.py setup.cfg package.xml
+
+ifeq ($(ROS),sourced)
+  VENV_FLAGS := --system-site-packages
+  ROS_WHEELS :=
+  # The venv's own packages come before those of the sourced workspaces.
+  export PYTHONPATH := $(SITE)$(if $(PYTHONPATH),:$(PYTHONPATH))
+  # Plugins of the sourced ROS 2 were written for another pytest.
+  export PYTEST_DISABLE_PLUGIN_AUTOLOAD := 1
+else
+  VENV_FLAGS :=
+  ROS_WHEELS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
+  unexport PYTHONPATH
+endif
+
+# pip builds in .venv, not in the sources, where a stale build folder would be packed again.
+BUILD := $(VENV)/build
+export DIST_EXTRA_CONFIG := $(BUILD)/setup.cfg
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check \
+  --no-build-isolation --use-pep517 --constraint $(VENV)/constraints.txt
+
+# The runs see only this machine, on a domain that nobody else has by default.
+export AMENT_PREFIX_PATH := $(VENV)$(if $(AMENT_PREFIX_PATH),:$(AMENT_PREFIX_PATH))
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+export ROS_DOMAIN_ID ?= 87
+# Without a screen: pictures offscreen, figures to files.
+ifeq ($(DISPLAY)$(WAYLAND_DISPLAY),)
+  export MUJOCO_GL ?= egl
+  export MPLBACKEND ?= Agg
+endif
+
+.PHONY: help demo test bench lint install clean
+.DELETE_ON_ERROR:
+
+help: ## list these targets
+	@echo 'make TARGET, with Python 3.10-3.13, its venv module and make; ROS 2 Jazzy is used if sourced'
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 10
+
+demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ (WALK_ARGS=...)
+	$(BIN)/walk $(WALK_ARGS)
+
+test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
+	$(BIN)/pytest $(PYTEST_ARGS)
+
+bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
+	$(BIN)/python -m dmp_cpg_ros.commands.bench $(BENCH_ARGS)
+
+lint: $(INSTALLED) ## ruff, mypy and the rules for package.xml
+	$(BIN)/ruff check
+	$(BIN)/mypy
+	$(BIN)/pytest --quiet test/test_packaging.py -k package_xml
+
+install: $(INSTALLED) ## make .venv and install the package into it
+
+clean: ## remove .venv and everything built; runs/ stays
+	rm -rf .venv build install log dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find dmp_cpg_ros config launch test -name __pycache__ -prune -exec rm -rf {} +
+
+$(INSTALLED): $(READY) $(SOURCES)
+	@echo 'Installing dmp_cpg_ros into .venv ...'
+	@rm -rf $(BUILD) && mkdir -p $(BUILD)
+	@printf '[build]\nbuild_base=%s\n[egg_info]\negg_base=%s\n' $(BUILD) $(BUILD) > $(DIST_EXTRA_CONFIG)
+	@$(PIP_INSTALL) --no-deps --force-reinstall .
+	@touch $@
+
+$(READY): setup.py constraints.txt
+	@$(if $(INTERPRETER),,echo 'Needs Python 3.10-3.13 with its venv module (on Debian and Ubuntu: apt install python3-venv).' >&2; \
+	  echo 'Tried: $(PYTHON). Name another with: make PYTHON=/path/to/python3.12' >&2; exit 1)
+	@$(if $(filter wheels-x86_64 sourced-%,$(ROS)-$(MACHINE)),,echo 'The ROS 2 wheels exist for x86-64 only; on $(MACHINE), source ROS 2 Jazzy first.' >&2; exit 1)
+	@echo 'Making .venv with $(INTERPRETER), ROS 2: $(ROS) (first use, about a minute) ...'
+	@rm -rf $(VENV)
+	@$(INTERPRETER) -m venv $(VENV_FLAGS) $(VENV)
+	@$(if $(VENV_FLAGS),$(BIN)/python -m pip list --format=freeze,:) > $(VENV)/present.txt
+	@awk -F'==' 'FILENAME ~ /present/ { present[tolower($$1)] = 1; next } \
+	  !(tolower($$1) in present) { print }' $(VENV)/present.txt constraints.txt > $(VENV)/constraints.txt
+	@grep '^numpy==' $(VENV)/present.txt >> $(VENV)/constraints.txt || true
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	  --constraint $(VENV)/constraints.txt 'setuptools>=68'
+	@mkdir -p $(BUILD)
+	@printf '[build]\nbuild_base=%s\n[egg_info]\negg_base=%s\n' $(BUILD) $(BUILD) > $(DIST_EXTRA_CONFIG)
+	@$(PIP_INSTALL) '.[test]' $(ROS_WHEELS)
+	@$(BIN)/python -c 'import rclpy' || { echo 'ROS 2 ($(ROS_DISTRO)) is sourced, but $(INTERPRETER) cannot import its rclpy. Name its Python with: make PYTHON=/usr/bin/python3' >&2; exit 1; }
+	@touch $@

