@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.robot.model_reader import ModelIds
+from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 _OUTSIDE, _BASE, _OTHER = 5, 4, -1  # owners of geoms beside the feet 0..3
 

@@ -8,14 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG
+
+TOLERANCE = 1e-6  # [m] of the foot's place
 
 
 def home_joint_position(description: RobotDescription) -> NDArray[np.float64]:
     """Return the standing pose.
 
-    Abduction is zero; hip and knee put the centre of the foot straight below the hip joint (in the plane
-    of the leg) at the stance height.
+    Abduction is zero; hip and knee put the centre of the foot straight below the hip joint (in the
+    plane of the leg) so that it touches the ground at the stance height.
 
     Returns
     -------
@@ -31,33 +35,21 @@ def home_joint_position(description: RobotDescription) -> NDArray[np.float64]:
 
 
 def _leg(leg: LegGeometry, height: float) -> NDArray[np.float64]:
-    """Solve the planar two-link leg; rotations about +y take z to x."""
-    down = height - leg.foot_radius + leg.hip_in_base[2] + leg.hip_offset[2]
-    thigh, shank = np.hypot(leg.thigh[0], leg.thigh[2]), np.hypot(leg.shank[0], leg.shank[2])
-    if not abs(thigh - shank) < down < thigh + shank:
+    kinematics = LegKinematics(leg)
+    foot_in_base = leg.hip_in_base + leg.hip_offset
+    foot_in_base[1] = leg.hip_in_base[1] + kinematics.lateral_offset
+    foot_in_base[2] = leg.foot_radius - height
+    angles = kinematics.inverse(foot_in_base)
+    if np.linalg.norm(kinematics.foot_in_base(angles) - foot_in_base) > TOLERANCE:
+        reach = kinematics.thigh_length + kinematics.shank_length
+        down = leg.hip_in_base[2] + leg.hip_offset[2] - foot_in_base[2]
         raise ParameterError(
-            f'leg {leg.name} cannot stand at a base height of {height:g} m: its hip joint would be {down:.3f} m '
-            f'over the foot, possible are {abs(thigh - shank):.3f} to {thigh + shank:.3f} m')
-    bend = leg.knee_sign * np.arccos(
-        (down**2 - thigh**2 - shank**2) / (2 * thigh * shank))
-    # Angles about +y from straight down to the thigh and to the shank.
-    thigh_angle = -np.arctan2(shank * np.sin(bend), thigh + shank * np.cos(bend))
-    zero_thigh, zero_shank = _angle_from_down(leg.thigh), _angle_from_down(leg.shank)
-    hip = leg.axis_sign[1] * _wrapped(thigh_angle - zero_thigh)
-    knee = leg.axis_sign[2] * _wrapped(bend - (zero_shank - zero_thigh))
-    angles = np.array([0.0, hip, knee])
+            f'leg {leg.name} cannot stand at a base height of {height:g} m: its hip joint would be '
+            f'{down:.3f} m over the foot, the leg is {reach:.3f} m long')
     for angle, low, high, joint in zip(angles, leg.position_lower, leg.position_upper,
-                                       ('abduction', 'hip', 'knee')):
+                                       JOINTS_OF_LEG):
         if not low <= angle <= high:
-            raise ParameterError(f'leg {leg.name}: standing at {height:g} m needs {angle:.3f} rad at the {joint}, '
-                                 f'its limits are {low:.3f} to {high:.3f} rad')
+            raise ParameterError(
+                f'leg {leg.name}: standing at {height:g} m needs {angle:.3f} rad at the {joint}, '
+                f'its limits are {low:.3f} to {high:.3f} rad')
     return angles
-
-
-def _angle_from_down(vector: NDArray[np.float64]) -> float:
-    """Return the rotation about +y that takes straight down to a vector's direction."""
-    return float(np.arctan2(-vector[0], -vector[2]))
-
-
-def _wrapped(angle: float) -> float:
-    return float((angle + np.pi) % (2 * np.pi) - np.pi)

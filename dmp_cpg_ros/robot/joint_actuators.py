@@ -4,11 +4,11 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.robot.leg_reader import actuator_of, is_motor, motor_ratio
+from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 
 class JointActuators:

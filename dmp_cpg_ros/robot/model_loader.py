@@ -6,9 +6,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mujoco
-
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
+from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 LONGEST_PHYSICS_STEP = 0.001  # [s] the joint drive runs at 1 kHz or faster
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +17,7 @@ from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.leg_reader import (
     Foot, check_leg, find, find_foot, foot_position, torque_limit)
 from dmp_cpg_ros.robot.model_loader import load_model
+from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
 
 Vector = NDArray[np.float64]

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,6 +18,7 @@ from dmp_cpg_ros.robot.joint_actuators import JointActuators
 from dmp_cpg_ros.robot.joint_drive import JointDrive
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import find_ids, read_description
+from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.port import RobotError, steps_per_tick
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
 from dmp_cpg_ros.robot.standing_torque import standing_torque

@@ -4,12 +4,12 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.robot.leg_reader import foot_position
 from dmp_cpg_ros.robot.model_reader import ModelIds
+from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 
 def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,

@@ -1,0 +1,180 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of the robot without a screen, and a window where there is one."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dmp_cpg_ros.robot.model_loader import load_model
+from dmp_cpg_ros.robot.model_reader import find_ids, read_description
+from dmp_cpg_ros.robot.mujoco_import import has_screen, mujoco
+from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
+
+Picture = NDArray[np.uint8]
+
+AZIMUTH, ELEVATION = 140.0, -16.0  # [deg] from behind the robot's right shoulder onto its left side
+DISTANCE_OVER_HEIGHT = 3.6  # distance of the camera over the robot's stance height
+
+_log = logging.getLogger(__name__)
+
+
+class Camera:
+    """Draws a robot in given poses; where OpenGL is missing it says so once and draws nothing.
+
+    Parameters
+    ----------
+    robot_file : RobotFile, Path, str or None
+        The robot; None is the package's own.
+    width, height : int
+        Size of the pictures [pixels].
+
+    Attributes
+    ----------
+    reason : str or None
+        Why there are no pictures; None when there are.
+
+    Raises
+    ------
+    MissingFileError, ParameterError
+        If the robot's files cannot be used.
+    """
+
+    def __init__(self, robot_file: RobotFile | Path | str | None = None, width: int = 1280,
+                 height: int = 720) -> None:
+        if not isinstance(robot_file, RobotFile):
+            robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
+        self._model = load_model(robot_file.model)
+        self._ids = find_ids(self._model, robot_file)
+        self._distance = DISTANCE_OVER_HEIGHT * read_description(self._model, robot_file).stance_height
+        self._data = mujoco.MjData(self._model)
+        self._renderer, self.reason = _renderer(self._model, width, height)
+
+    def picture(self, base_position_in_world: ArrayLike, base_quaternion: ArrayLike,
+                joint_position: ArrayLike, azimuth: float = AZIMUTH, elevation: float = ELEVATION,
+                distance: float | None = None) -> Picture | None:
+        """Draw one pose.
+
+        Parameters
+        ----------
+        base_position_in_world : array_like (3,)
+            [m]
+        base_quaternion : array_like (4,)
+            x, y, z, w.
+        joint_position : array_like (12,)
+            [rad], in the order of ``JOINT_NAMES``.
+        azimuth, elevation : float
+            Direction in which the camera looks [deg].
+        distance : float, optional
+            From the camera to the robot [m]; by default the robot fills the picture well.
+
+        Returns
+        -------
+        ndarray (height, width, 3) of uint8 or None
+            None where pictures cannot be drawn (see ``reason``).
+        """
+        if self._renderer is None:
+            return None
+        model, data = self._model, self._data
+        start = int(model.jnt_qposadr[self._ids.free_joint])
+        place = np.asarray(base_position_in_world, dtype=float)
+        data.qpos[start:start + 3] = place
+        data.qpos[start + 3:start + 7] = np.roll(np.asarray(base_quaternion, dtype=float), 1)
+        data.qpos[model.jnt_qposadr[self._ids.joints]] = joint_position
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_camlight(model, data)
+        view = mujoco.MjvCamera()
+        view.type = mujoco.mjtCamera.mjCAMERA_FREE
+        view.lookat[:] = (place[0], place[1], 0.62 * place[2])
+        view.azimuth, view.elevation = azimuth, elevation
+        view.distance = self._distance if distance is None else distance
+        self._renderer.update_scene(data, view)
+        return np.array(self._renderer.render(), dtype=np.uint8)
+
+    def close(self) -> None:
+        """Release the OpenGL context."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer, self.reason = None, 'the camera is closed'
+
+    def __enter__(self) -> Camera:
+        """Return the camera."""
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        """Close the camera."""
+        self.close()
+
+
+def pose_pictures(robot_file: RobotFile | Path | str | None, base_positions_in_world: ArrayLike,
+                  base_quaternions: ArrayLike, joint_positions: ArrayLike, width: int = 1280,
+                  height: int = 720, **view: float) -> list[Picture]:
+    """Draw recorded poses, without simulating them again.
+
+    Parameters
+    ----------
+    robot_file : RobotFile, Path, str or None
+        The robot; None is the package's own.
+    base_positions_in_world : array_like (n, 3)
+        [m]
+    base_quaternions : array_like (n, 4)
+        x, y, z, w.
+    joint_positions : array_like (n, 12)
+        [rad]
+    width, height : int
+        [pixels]
+    **view
+        ``azimuth``, ``elevation`` [deg], ``distance`` [m] as in :meth:`Camera.picture`.
+
+    Returns
+    -------
+    list of ndarray (height, width, 3) of uint8
+        Empty where pictures cannot be drawn; the reason is logged.
+    """
+    with Camera(robot_file, width, height) as camera:
+        poses: Sequence[Any] = tuple(zip(np.asarray(base_positions_in_world), np.asarray(base_quaternions),
+                                         np.asarray(joint_positions), strict=True))
+        pictures = [camera.picture(*pose, **view) for pose in poses]
+    return [picture for picture in pictures if picture is not None]
+
+
+def open_viewer(model: mujoco.MjModel, data: mujoco.MjData) -> Any | None:
+    """Open MuJoCo's window on a running simulation.
+
+    Returns
+    -------
+    handle or None
+        MuJoCo's passive viewer: call ``sync()`` after each tick, ``close()`` at the end, and stop syncing when
+        ``is_running()`` turns false. None without a screen or where the window cannot be opened; the reason
+        is logged.
+    """
+    if not has_screen():
+        _log.warning('no window: there is no screen (DISPLAY and WAYLAND_DISPLAY are unset)')
+        return None
+    try:
+        import mujoco.viewer as viewer
+        return viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
+    except Exception as error:  # what a missing or broken OpenGL raises depends on the backend
+        _log.warning('no window: %s', error)
+        return None
+
+
+def _renderer(model: mujoco.MjModel, width: int, height: int) -> tuple[Any | None, str | None]:
+    """Return a renderer, or None and the reason."""
+    model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
+    model.vis.global_.offheight = max(model.vis.global_.offheight, height)
+    try:
+        return mujoco.Renderer(model, height, width), None
+    except Exception as error:  # what a missing or broken OpenGL raises depends on the backend
+        reason = f'no pictures: OpenGL cannot draw offscreen here ({error})'
+        _log.warning('%s', reason)
+        return None, reason
