@@ -3,7 +3,8 @@
 """The path of a foot over one cycle, as a function of the oscillator's phase and the reference.
 
 In stance the foot stays where it is in the world while the base moves with (v, γ), so in the base frame it follows
-ṗ = −v − γ ẑ × p exactly, turning included. In swing a cubic Hermite curve carries it back with matching velocities
+ṗ = −v − γ ẑ × p exactly, turning included. A round foot rolls while it stands: its centre needs only the share
+``rolling`` of the way that the contact point makes (:func:`rolling_share`). In swing a cubic Hermite curve carries it back with matching velocities
 at both ends, under a bump of height. The whole path is C¹ in the phase.
 """
 
@@ -14,6 +15,8 @@ from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 
 Array = NDArray[np.float64]
 
@@ -34,6 +37,8 @@ class FootPath:
         Duty factor β in (0, 1).
     clearance : float
         Height of the swing [m].
+    rolling : tuple of float
+        Share of the stance displacement, along x and y, that the foot's centre makes.
     """
 
     foothold_in_base: Array
@@ -43,6 +48,7 @@ class FootPath:
     omega: float
     duty: float
     clearance: float
+    rolling: tuple[float, float] = (1.0, 1.0)
 
     def at(self, cycle_position: float) -> tuple[Array, Array]:
         """Foot position and its derivative with respect to the cycle position.
@@ -88,7 +94,36 @@ class FootPath:
         x0, y0 = self.foothold_in_base[0], self.foothold_in_base[1]
         x = c * x0 + s * y0 - along * self.v_x - across * self.v_y
         y = c * y0 - s * x0 - along * self.v_y + across * self.v_x
-        return x, y, -self.v_x + self.gamma * y, -self.v_y - self.gamma * x
+        share_x, share_y = self.rolling
+        return (x0 + share_x * (x - x0), y0 + share_y * (y - y0),
+                share_x * (-self.v_x + self.gamma * y), share_y * (-self.v_y - self.gamma * x))
+
+
+def rolling_share(kinematics: LegKinematics, foothold_in_base: Array) -> tuple[float, float]:
+    """Share of the stance displacement that the centre of a rolling foot makes, along x and y.
+
+    A foot of radius ρ on a shank that turns by θ rolls ρ θ on the ground, so with the base's velocity v the centre moves at
+    ẋ = −v / (1 − ρ ∂θ/∂x) in the base; to first order at the foothold, with θ the pitch of the shank for x and its
+    roll (with the opposite sign) for y.
+
+    Parameters
+    ----------
+    kinematics : LegKinematics
+        The leg.
+    foothold_in_base : ndarray (3,)
+        Where to take the derivatives [m].
+
+    Returns
+    -------
+    tuple of float
+    """
+    geometry = kinematics.geometry
+    inverse = np.linalg.inv(kinematics.jacobian_in_base(kinematics.inverse(foothold_in_base)))
+    turning = geometry.axis_sign[:, None] * inverse                         # (3, 3) axis angles per metre
+    pitch_per_x = turning[1, 0] + turning[2, 0]
+    roll_per_y = turning[0, 1]
+    return (float(1.0 / (1.0 - geometry.foot_radius * pitch_per_x)),
+            float(1.0 / (1.0 + geometry.foot_radius * roll_per_y)))
 
 
 def _hermite(s: float, p0: float, p1: float, m0: float, m1: float) -> tuple[float, float]:

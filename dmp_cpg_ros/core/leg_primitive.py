@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.foot_path import FootPath
+from dmp_cpg_ros.core.foot_path import FootPath, rolling_share
 from dmp_cpg_ros.core.gait import BodyScale, Gait
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.parameters import Parameters, parameter
@@ -85,6 +85,7 @@ class LegPrimitive:
         self.kinematics = LegKinematics(geometry)
         self.scale = body_scale(description)
         self.foothold_in_base = nominal_foothold(description, leg)
+        self.rolling = rolling_share(self.kinematics, self.foothold_in_base)
         self.clearance = parameters.clearance * description.stance_height
         self.transformation = TransformationSystem(parameters.stiffness, parameters.damping,
                                                    np.asarray(geometry.rotor_inertia, dtype=float))
@@ -95,7 +96,7 @@ class LegPrimitive:
         return LegState(TransformationState(q, np.zeros(3)), 0.0, np.zeros(2))
 
     def step(self, state: LegState, x: Array, x_dot: Array, r: Array, shift_in_base: Array,
-             dt: float) -> tuple[LegState, Array, Array]:
+             correction: Array, dt: float) -> tuple[LegState, Array, Array]:
         """Advance the leg to the time at which the inputs hold.
 
         Parameters
@@ -108,6 +109,8 @@ class LegPrimitive:
             Reference v_x, v_y [m/s], γ [rad/s].
         shift_in_base : ndarray (2,)
             Wanted foot placement shift [m].
+        correction : ndarray (3,)
+            Added to the reference for the stance velocity, not for the cadence.
         dt : float
             Time since the last tick [s].
 
@@ -128,7 +131,8 @@ class LegPrimitive:
         share = 1.0 - np.exp(-p.placement_rate * activity * dt) if swinging else 0.0
         shift_rate = (shift_in_base - state.shift_in_base) * (share / dt if dt > 0.0 else 0.0)
         shift = state.shift_in_base + shift_rate * dt
-        path = FootPath(self.foothold_in_base, v_x, v_y, gamma, omega, duty, activity * self.clearance)
+        path = FootPath(self.foothold_in_base, v_x + float(correction[0]), v_y + float(correction[1]),
+                        gamma + float(correction[2]), omega, duty, activity * self.clearance, self.rolling)
         foot, slope = path.at(position)
         velocity = slope * (rate / (2.0 * np.pi))
         foot[:2] += shift

@@ -5,12 +5,14 @@
 Virtual springs and dampers hold the base at its height, level, and at the reference velocity (Pratt et al. 2001;
 Ajallooeian et al. 2013, as the paper's experiment). Their wrench is shared by the stance feet
 (:mod:`~dmp_cpg_ros.core.force_distribution`) and becomes joint torques τ_fb = −Jᵀ f. Swinging feet are placed further
-along a velocity that exceeds the reference (Raibert 1986).
+along a velocity that exceeds the reference (Raibert 1986), and a slow loop corrects the velocity with which the
+stance feet move, so that speed and heading are kept without a steady error.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import atan2, isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +22,7 @@ from dmp_cpg_ros.core.gait import GRAVITY, Gait
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.leg_primitive import body_scale
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.core.phase import phase, phase_rate
+from dmp_cpg_ros.core.phase import phase, phase_rate, wrapped
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.swing_activity import activity_step
@@ -52,6 +54,14 @@ class PostureParameters(Parameters):
                                       minimum=0.0, maximum=1.0)
     placement_limit: float = parameter(0.12, 'largest foot placement shift', unit='m', minimum=0.0,
                                        maximum=0.5)
+    speed_integral: float = parameter(0.8, 'rate at which the stance velocity is corrected by the velocity error',
+                                      unit='1/s', minimum=0.0, maximum=10.0)
+    speed_correction_limit: float = parameter(0.2, 'largest correction of the stance velocity, as a fraction of '
+                                              'the speed, at least of 0.5 m/s', minimum=0.0, maximum=1.0)
+    heading_gain: float = parameter(1.5, 'turn rate per error of heading', unit='1/s', minimum=0.0,
+                                    maximum=20.0)
+    heading_limit: float = parameter(0.3, 'largest error of heading that is remembered', unit='rad',
+                                     minimum=0.0, maximum=1.5)
     activity_rate: float = parameter(12.0, 'rate at which planned swings fade when the phase stops',
                                      unit='1/s', minimum=0.1, maximum=1e3)
 
@@ -66,14 +76,39 @@ class PostureFeedback:
         τ_fb in the order of the joint names [N m].
     shift_in_base : ndarray (4, 2)
         Foot placement shifts [m].
+    correction : ndarray (3,)
+        What the legs add to the reference velocity of the stance feet: v_x, v_y [m/s], γ [rad/s].
     """
 
     torque: Array
     shift_in_base: Array
+    correction: Array
+
+
+@dataclass(frozen=True)
+class PostureState:
+    """The controller's own state.
+
+    Attributes
+    ----------
+    activity : ndarray (4,)
+        Swing activity of the legs.
+    correction : ndarray (2,)
+        Correction of the stance velocity [m/s].
+    heading_error : float
+        Commanded minus measured heading [rad].
+    yaw : float
+        Heading at the last tick [rad].
+    """
+
+    activity: Array
+    correction: Array
+    heading_error: float
+    yaw: float
 
 
 class PostureController:
-    """Virtual model of one robot in one gait; its own state is the legs' swing activity.
+    """Virtual model of one robot in one gait; state in, state out.
 
     Parameters
     ----------
@@ -94,14 +129,18 @@ class PostureController:
         self.torque_limit = np.array([leg.torque_limit for leg in description.legs])
         self.inertia = np.diag(description.base_inertia).copy()
 
-    def step(self, activity: Array, state: RobotState, x: Array, x_dot: Array, r: Array,
-             dt: float) -> tuple[Array, PostureFeedback]:
+    def initial_state(self, activity: Array) -> PostureState:
+        """State of a robot that is put down, with the legs' swing activity (4,)."""
+        return PostureState(activity, np.zeros(2), 0.0, float('nan'))
+
+    def step(self, memory: PostureState, state: RobotState, x: Array, x_dot: Array, r: Array,
+             dt: float) -> tuple[PostureState, PostureFeedback]:
         """Compute the feedback of one tick.
 
         Parameters
         ----------
-        activity : ndarray (4,)
-            Swing activity of the legs one tick before.
+        memory : PostureState
+            The controller's state one tick before.
         state : RobotState
             Measured state.
         x, x_dot : ndarray (4, 2)
@@ -113,33 +152,50 @@ class PostureController:
 
         Returns
         -------
-        activity : ndarray (4,)
+        memory : PostureState
         feedback : PostureFeedback
         """
         p = self.parameters
         speed = self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
         omega, duty = self.gait.omega(speed, self.scale), self.gait.duty(speed, self.scale)
-        activity = activity_step(activity, phase_rate(x, x_dot), omega, p.activity_rate, dt)
+        activity = activity_step(memory.activity, phase_rate(x, x_dot), omega, p.activity_rate, dt)
         load = self._load(self.gait.cycle_position(phase(x)), duty, activity)
         R_level_base = level_from_base(state.base_quaternion)
-        q = state.joint_position.reshape(4, 3)
-        feet_in_base = np.array([leg.foot_in_base(angles) for leg, angles in zip(
-            self.kinematics, q.tolist(), strict=True)])
-        feet = (feet_in_base - self.description.com_in_base) @ R_level_base.T      # from the COM, levelled
         velocity = R_level_base @ state.base_velocity_in_base
+        memory = self._corrected(memory, activity, state, velocity, r, dt)
         rate = R_level_base @ state.base_rate_in_base
+        q = state.joint_position.reshape(4, 3).tolist()
+        feet_in_base = np.array([leg.foot_in_base(angles) for leg, angles in zip(
+            self.kinematics, q, strict=True)])
+        feet = (feet_in_base - self.description.com_in_base) @ R_level_base.T      # from the COM, levelled
         wrench = self._wrench(R_level_base, velocity, rate, feet, load, r)
         forces = distribute(wrench, feet, load, p.friction, 2.0 * self.description.mass * GRAVITY)
-        forces_in_base = forces @ R_level_base
-        J = np.array([leg.jacobian_in_base(angles) for leg, angles in zip(
-            self.kinematics, q.tolist(), strict=True)])
-        torque = -np.einsum('lij,li->lj', J, forces_in_base)
+        J = np.array([leg.jacobian_in_base(angles) for leg, angles in zip(self.kinematics, q, strict=True)])
+        torque = -np.einsum('lij,li->lj', J, forces @ R_level_base)
         torque = np.clip(torque, -self.torque_limit, self.torque_limit).ravel()
         shift = p.placement_gain * np.array((velocity[0] - r[0], velocity[1] - r[1]))
         length = float(np.hypot(shift[0], shift[1]))
         if length > p.placement_limit:
             shift *= p.placement_limit / length
-        return activity, PostureFeedback(torque, np.tile(shift, (4, 1)))
+        moving = float(activity.mean())
+        correction = np.array((moving * memory.correction[0], moving * memory.correction[1],
+                               moving * p.heading_gain * memory.heading_error))
+        return memory, PostureFeedback(torque, np.tile(shift, (4, 1)), correction)
+
+    def _corrected(self, memory: PostureState, activity: Array, state: RobotState, velocity: Array, r: Array,
+                   dt: float) -> PostureState:
+        """Integrate the errors of speed and heading while the legs move; forget them at rest."""
+        p = self.parameters
+        x, y, z, w = state.base_quaternion.tolist()
+        yaw = atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+        moving = float(activity.mean())
+        limit = p.speed_correction_limit * max(float(np.hypot(r[0], r[1])), 0.5)
+        wanted = memory.correction + (p.speed_integral * moving * dt) * (r[:2] - velocity[:2])
+        correction = np.clip(wanted, -limit, limit) * np.exp(-(1.0 - moving) * p.activity_rate * dt)
+        turned = 0.0 if isnan(memory.yaw) else float(wrapped(yaw - memory.yaw))
+        heading_error = (memory.heading_error + float(r[2]) * dt - turned) * moving
+        heading_error = min(max(heading_error, -p.heading_limit), p.heading_limit)
+        return PostureState(activity, correction, heading_error, yaw)
 
     def _load(self, cycle_position: Array, duty: float, activity: Array) -> Array:
         """Share of the load that each foot may take, in [0, 1]: a trapezoid over the planned stance."""

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition import Inhibition
 from dmp_cpg_ros.core.reference import ReferenceSystem
 
 Array = NDArray[np.float64]
 
 
-def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, state: SupervisorState, x: Array, r: Array,
-            command: tuple[float, float, float], dt: float, horizon: float = 10.0) -> float:
+def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, state: SupervisorState, published: Inhibition,
+            x: Array, r: Array, command: tuple[float, float, float], dt: float, horizon: float = 10.0) -> float:
     """Time from now to rest (of a requested stop) or to phase lock (of a start).
 
     Parameters
@@ -29,6 +30,8 @@ def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, state: Super
         The systems as they run.
     state : SupervisorState
         Present state, the request included.
+    published : Inhibition
+        The inhibition that was published before the request; it still acts at the next tick.
     x : ndarray (4, 2)
         Present canonical state.
     r : ndarray (3,)
@@ -46,13 +49,13 @@ def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, state: Super
         [s]; infinite when it does not happen within the horizon.
     """
     network, tick_ns = supervisor.network, round(dt * 1e9)
-    start_ns = state.time_ns
+    start_ns, inhibition = state.time_ns, published
     for k in range(1, math.ceil(horizon / dt) + 1):
-        inhibition = supervisor.inhibition(state)
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
         r = reference.step(r, r_ext, dt)
         x = network.step(x, r, inhibition, dt)
         state = supervisor.step(state, start_ns + k * tick_ns, x, network.rate(x, r, inhibition), r, command)
+        inhibition = supervisor.inhibition(state)
         if state.word in ('at_rest', 'walking', 'free'):
             return k * dt
     return math.inf

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
-from dmp_cpg_ros.core.inhibition import InhibitionParameters, no_inhibition
+from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters, LegPrimitive, LegState, body_scale
 from dmp_cpg_ros.core.posture import PostureController, PostureFeedback, PostureParameters
 from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
@@ -93,9 +93,10 @@ class WalkingLoop:
         self.inhibition = self.supervisor.inhibition(self.stop)
         self.r = np.zeros(3)
         self.x = initial_canonical_state(self.network, p.inhibition)
-        self.activity = self.stop.activity
+        self.posture_state = self.posture.initial_state(self.stop.activity)
         self.leg_states: list[LegState] = [leg.initial_state() for leg in self.legs]
         self._time_ns: int | None = None
+        self._dt = 0.004
 
     def command(self, v_x: float, v_y: float = 0.0, gamma: float = 0.0) -> None:
         """Command a velocity; acts from the next tick on. Raises DataError for values that are not finite."""
@@ -105,7 +106,8 @@ class WalkingLoop:
         """Request a stop or a start, as the service does; returns the predicted time to it [s]."""
         self.stop = self.supervisor.request(self.stop, stop)
         command = self.gate.at(self.stop.time_ns)
-        return predict(self.supervisor, self.reference, self.stop, self.x, self.r, command, self._dt)
+        return predict(self.supervisor, self.reference, self.stop, self.inhibition, self.x, self.r, command,
+                       self._dt)
 
     def tick(self, state: RobotState) -> Tick:
         """Run all parts on the robot's state of one tick.
@@ -120,7 +122,7 @@ class WalkingLoop:
         Tick
         """
         dt = 0.0 if self._time_ns is None else (state.time_ns - self._time_ns) * 1e-9
-        self._time_ns, self._dt = state.time_ns, dt or 0.004
+        self._time_ns, self._dt = state.time_ns, dt or self._dt
         command = self.gate.at(state.time_ns)
         inhibition = self.inhibition
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
@@ -129,7 +131,7 @@ class WalkingLoop:
         x_dot = self.network.rate(self.x, self.r, inhibition)
         self.stop = self.supervisor.step(self.stop, state.time_ns, self.x, x_dot, self.r, command)
         self.inhibition = self.supervisor.inhibition(self.stop)
-        self.activity, feedback = self.posture.step(self.activity, state, self.x, x_dot, self.r, dt)
+        self.posture_state, feedback = self.posture.step(self.posture_state, state, self.x, x_dot, self.r, dt)
         targets = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
         return Tick(state.time_ns, self.r, self.x, x_dot, self.stop, feedback, JointTargets(
             *(np.concatenate([getattr(target, name) for target in targets])
@@ -139,7 +141,8 @@ class WalkingLoop:
              dt: float) -> JointTargets:
         leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
         self.leg_states[i], goal, goal_velocity = leg.step(
-            self.leg_states[i], self.x[i], x_dot[i], self.r, feedback.shift_in_base[i], dt)
+            self.leg_states[i], self.x[i], x_dot[i], self.r, feedback.shift_in_base[i],
+            feedback.correction, dt)
         measured = None
         if leg.parameters.reading == 'torque':
             measured = TransformationState(state.joint_position[joints], state.joint_velocity[joints])
@@ -150,5 +153,4 @@ def initial_canonical_state(network: GaitNetwork, parameters: InhibitionParamete
     """States (4, 2) at which the oscillators start: at rest under inhibition, or in their places."""
     if not parameters.start_inhibited:
         return network.locked_state()
-    full = no_inhibition()
-    return network.rest_state(type(full)(True, parameters.armed_gains, parameters.region_radius))
+    return network.rest_state(Inhibition(True, parameters.armed_gains, parameters.region_radius))

@@ -1,0 +1,77 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""First-order reference filters (paper eq. p2p_filter): the goal, the centre, the amplitude and τ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dmp_cpg_ros.core.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FirstOrderFilter:
+    """ṙ = α (r_ext − r), the reference system of a primitive, contracting with rate α.
+
+    The step is the exact solution for a command that is held during the step; it has no stability limit.
+    The filter runs in real time, not in scaled time, as the paper prints it (Ijspeert et al. 2013 slow it
+    with τ).
+
+    Attributes
+    ----------
+    rate : float
+        α > 0 [1/s].
+
+    Raises
+    ------
+    ParameterError
+        If the rate is not a positive finite number: a filter that follows at once would make velocities jump.
+    """
+
+    rate: float
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        if not (np.isfinite(self.rate) and self.rate > 0.0):
+            raise ParameterError(f'filter rate = {self.rate!r} 1/s must be a positive finite number')
+
+    def at(self, value: ArrayLike, command: ArrayLike, elapsed: ArrayLike) -> Array:
+        """Filtered value some time after the start of a step.
+
+        Parameters
+        ----------
+        value, command : array_like (...)
+            State r at the start of the step and command r_ext during it, in the same unit.
+        elapsed : array_like (m,) or ()
+            Time since the start of the step [s].
+
+        Returns
+        -------
+        ndarray (m, ...) or (...)
+            r(elapsed).
+        """
+        value, command = np.asarray(value, dtype=float), np.asarray(command, dtype=float)
+        elapsed = np.asarray(elapsed, dtype=float)
+        decay = np.exp(-self.rate * elapsed).reshape(elapsed.shape + (1,) * max(value.ndim, command.ndim))
+        return command + (value - command) * decay
+
+    def step(self, value: ArrayLike, command: ArrayLike, dt: float) -> Array:
+        """State one step later.
+
+        Parameters
+        ----------
+        value, command : array_like (...)
+            State r and command r_ext, in the same unit.
+        dt : float
+            Length of the step [s].
+
+        Returns
+        -------
+        ndarray (...)
+        """
+        return self.at(value, command, dt)

@@ -1,0 +1,203 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Temporal scaling τ(t): scaled time s with ds/dt = 1/τ(t) (paper eq. differ, left-hand side).
+
+Everything that runs on a canonical system runs in s. When τ follows a first-order filter, s(t) has a closed
+form, so a change of speed costs no accuracy and makes no velocity jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.primitives.goal_filter import FirstOrderFilter
+
+Array = NDArray[np.float64]
+Form = Literal['scaled', 'printed']
+
+_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
+
+
+@dataclass(frozen=True, eq=False)
+class StepGrid:
+    """Nodes inside one time step, evenly spaced in the variable in which the step is taken.
+
+    Attributes
+    ----------
+    elapsed : ndarray (m,)
+        Real time since the start of the step [s].
+    scaled : ndarray (m,)
+        Scaled time since the start of the step [s].
+    tau : ndarray (m,)
+        τ at the nodes.
+    length : float
+        Length of the step in the variable in which the nodes are evenly spaced [s].
+    density : ndarray (m,)
+        Derivative of scaled time by that variable at the nodes.
+    """
+
+    elapsed: Array
+    scaled: Array
+    tau: Array
+    length: float
+    density: Array
+
+
+@dataclass(frozen=True)
+class TimeScaling:
+    """τ as a filtered reference: τ̇ = α_τ (τ_ext − τ), with scaled time in closed form.
+
+    Attributes
+    ----------
+    rate : float
+        α_τ > 0 [1/s].
+
+    Raises
+    ------
+    ParameterError
+        If the rate is not a positive finite number.
+    """
+
+    rate: float
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        FirstOrderFilter(self.rate)
+
+    def tau_at(self, tau: float, command: float, elapsed: ArrayLike) -> Array:
+        """τ some time after the start of a step with the command held.
+
+        Parameters
+        ----------
+        tau, command : float
+            τ at the start and τ_ext, both positive.
+        elapsed : array_like (...)
+            Time since the start of the step [s].
+
+        Returns
+        -------
+        ndarray (...)
+        """
+        return FirstOrderFilter(self.rate).at(tau, command, elapsed)
+
+    def scaled_time(self, tau: float, command: float, elapsed: ArrayLike) -> Array:
+        """Scaled time s = ∫ dt/τ(t) since the start of the step.
+
+        Closed form s = t/τ_ext + ln(τ(t)/τ(0))/(α τ_ext), with τ(t) from :meth:`tau_at`.
+
+        Parameters
+        ----------
+        tau, command : float
+            τ at the start and τ_ext, both positive.
+        elapsed : array_like (...)
+            Time since the start of the step [s].
+
+        Returns
+        -------
+        ndarray (...)
+            [s]
+        """
+        elapsed = np.asarray(elapsed, dtype=float)
+        change = (command - tau) / tau * -np.expm1(-self.rate * elapsed)             # τ(t)/τ(0) − 1
+        return (elapsed + np.log1p(change) / self.rate) / command
+
+    def real_time(self, tau: float, command: float, scaled: ArrayLike) -> Array:
+        """Real time after which a scaled time has passed, the inverse of :meth:`scaled_time`.
+
+        Parameters
+        ----------
+        tau, command : float
+            τ at the start and τ_ext, both positive.
+        scaled : array_like (...)
+            Scaled time since the start of the step [s].
+
+        Returns
+        -------
+        ndarray (...)
+            [s]
+        """
+        scaled = np.asarray(scaled, dtype=float)
+        return np.log1p(tau / command * np.expm1(self.rate * command * scaled)) / self.rate
+
+    def grid(self, tau: float, command: float, dt: float, count: int, form: Form) -> StepGrid:
+        """Nodes of one step.
+
+        Parameters
+        ----------
+        tau, command : float
+            τ at the start of the step and τ_ext, held during it.
+        dt : float
+            Length of the step in real time [s].
+        count : int
+            Number of nodes, both ends included.
+        form : {'scaled', 'printed'}
+            Evenly spaced in scaled time or in real time.
+
+        Returns
+        -------
+        StepGrid
+
+        Raises
+        ------
+        ParameterError
+            If τ, τ_ext or dt is not a positive finite number.
+        """
+        for name, value in (('tau', tau), ('commanded tau', command), ('dt', dt)):
+            if not (np.isfinite(value) and value > 0.0):
+                raise ParameterError(f'{name} = {value!r} must be a positive finite number')
+        fraction = np.linspace(0.0, 1.0, count)
+        if tau == command:
+            elapsed, taus = fraction * dt, np.full(count, tau)
+            scaled = elapsed / tau
+        elif form == 'scaled':
+            scaled = fraction * float(self.scaled_time(tau, command, dt))
+            elapsed = self.real_time(tau, command, scaled)
+            taus = self.tau_at(tau, command, elapsed)
+        else:
+            elapsed = fraction * dt
+            scaled, taus = self.scaled_time(tau, command, elapsed), self.tau_at(tau, command, elapsed)
+        if form == 'scaled':
+            return StepGrid(elapsed, scaled, taus, float(scaled[-1]), np.ones(count))
+        return StepGrid(elapsed, scaled, taus, dt, 1.0 / taus)
+
+
+def scaled_times(times: ArrayLike, tau: Callable[[float], float]) -> Array:
+    """Scaled time along a given profile τ(t), by 5-point Gauss quadrature between the samples.
+
+    A primitive in scaled form follows the same path for every τ(t): its position at time t is the position of
+    the unscaled one at ``scaled_times(...)``, its velocity is divided by τ(t).
+
+    Parameters
+    ----------
+    times : array_like (m,)
+        Increasing sample times [s].
+    tau : callable
+        τ(t) > 0 for a time [s].
+
+    Returns
+    -------
+    ndarray (m,)
+        s at the sample times, 0 at the first [s]; the error falls with the 10th power of the spacing.
+
+    Raises
+    ------
+    ParameterError
+        If times do not increase or τ is not positive somewhere.
+    """
+    times = np.asarray(times, dtype=float)
+    steps = np.diff(times)
+    if times.ndim != 1 or not np.all(steps > 0.0):
+        raise ParameterError('times must be one increasing sequence')
+    middles = 0.5 * (times[1:] + times[:-1])
+    nodes = middles[:, None] + 0.5 * steps[:, None] * _GAUSS_NODES                    # (m - 1, 5)
+    values = np.array([tau(float(t)) for t in nodes.ravel()], dtype=float).reshape(nodes.shape)
+    if not np.all(np.isfinite(values)) or not np.all(values > 0.0):
+        raise ParameterError('tau(t) must be positive and finite at all times')
+    pieces = 0.5 * steps * ((1.0 / values) @ _GAUSS_WEIGHTS)
+    return np.concatenate([[0.0], np.cumsum(pieces)])

@@ -1,0 +1,260 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The transformation system: a spring-damper towards the goal, driven by the forcing function (eq. p2p_trans).
+
+Two readings of the paper's τ are kept apart by ``form``:
+
+``'scaled'`` (the default): the state is (y, z), τẏ = z, τż = k(g − y) − b z + f. This is the paper's own rule of
+scaling in time (eq. differ) applied to the first-order form, and eq. 2.1 of Ijspeert et al. (2013). In second
+order it reads τ²ÿ = k(g − y) − bτẏ + f for constant τ: the path stays the same, only the speed changes.
+
+``'printed'``: τÿ = k(g − y) − bẏ + f, word for word. For constant τ that is the scaled form with stiffness τk and
+force τf, so τ acts as an inertia: the natural frequency is √(k/τ), the damping ratio b/(2√(kτ)) moves with τ, and
+a movement replayed at τ ≠ 1 takes another path. At τ = 1 the two forms are one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.primitives.time_scaling import Form, StepGrid
+
+Array = NDArray[np.float64]
+
+FORMS: tuple[Form, ...] = ('scaled', 'printed')
+"""The readings of τ that are valid."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpringDamper:
+    """One spring and damper per degree of freedom.
+
+    Attributes
+    ----------
+    stiffness, damping : ndarray (n,)
+        k > 0 [1/s²] and b > 0 [1/s].
+    form : {'scaled', 'printed'}
+        Reading of τ, see the module's text.
+
+    Raises
+    ------
+    ParameterError
+        If an entry is not positive and finite, the lengths differ or the form is unknown.
+    """
+
+    stiffness: Array
+    damping: Array
+    form: Form = 'scaled'
+    _propagators: dict[float, Array] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        for name in ('stiffness', 'damping'):
+            values = np.atleast_1d(np.array(getattr(self, name), dtype=float))
+            if values.ndim != 1 or not np.all(np.isfinite(values)) or not np.all(values > 0.0):
+                raise ParameterError(f'{name} must be positive finite numbers, not {values.tolist()}')
+            object.__setattr__(self, name, values)
+        if self.stiffness.shape != self.damping.shape:
+            raise ParameterError(f'{len(self.stiffness)} stiffnesses do not match {len(self.damping)} dampings')
+        if self.form not in FORMS:
+            raise ParameterError(f"form must be one of {', '.join(FORMS)}, not {self.form!r}")
+
+    def acceleration(self, position: Array, velocity: Array, goal: Array, force: Array,
+                     tau: ArrayLike = 1.0, tau_rate: ArrayLike = 0.0) -> Array:
+        """Acceleration ÿ of the continuous system.
+
+        Parameters
+        ----------
+        position, velocity, goal, force : ndarray (..., n)
+            y, ẏ, g and f.
+        tau, tau_rate : array_like (...)
+            τ and τ̇ [1/s].
+
+        Returns
+        -------
+        ndarray (..., n)
+        """
+        tau, tau_rate = np.asarray(tau, dtype=float)[..., None], np.asarray(tau_rate, dtype=float)[..., None]
+        spring = self.stiffness * (goal - position) + force
+        if self.form == 'printed':
+            return (spring - self.damping * velocity) / tau
+        return spring / tau**2 - (self.damping + tau_rate) * velocity / tau
+
+    def required_force(self, position: Array, velocity: Array, acceleration: Array, goal: Array,
+                       tau: ArrayLike = 1.0) -> Array:
+        """Force f that makes the system follow a movement at constant τ, the target of the regression.
+
+        Parameters
+        ----------
+        position, velocity, acceleration, goal : ndarray (..., n)
+            y, ẏ, ÿ and g.
+        tau : array_like (...)
+            τ, constant in time.
+
+        Returns
+        -------
+        ndarray (..., n)
+        """
+        tau = np.asarray(tau, dtype=float)[..., None]
+        spring = self.stiffness * (goal - position)
+        if self.form == 'printed':
+            return tau * acceleration + self.damping * velocity - spring
+        return tau**2 * acceleration + tau * self.damping * velocity - spring
+
+    def step(self, position: Array, velocity: Array, goals: Array, forces: Array,
+             grid: StepGrid) -> tuple[Array, Array]:
+        """Advance by one step; fourth order in both forms.
+
+        The scaled form is solved exactly for the quadratic through the drive k g + f at the nodes, so it has no
+        stability limit and keeps an equilibrium exactly. The printed form has no constant matrix when τ varies;
+        it takes one Runge-Kutta step, stable for √(k/τ) dt and (b/τ) dt up to about 2.7.
+
+        Parameters
+        ----------
+        position, velocity : ndarray (n,)
+            y and ẏ at the start of the step.
+        goals, forces : ndarray (3, n)
+            g and f at the three nodes of the grid.
+        grid : StepGrid
+            Made with three nodes and this system's form.
+
+        Returns
+        -------
+        position, velocity : ndarray (n,)
+            y and ẏ at the end.
+        """
+        drives = self.stiffness * goals + forces
+        if self.form == 'printed':
+            return self._runge_kutta(position, velocity, drives, grid)
+        y, z = self.advance_scaled(position, grid.tau[0] * velocity, drives, grid.length)
+        return y, z / grid.tau[-1]
+
+    def advance_scaled(self, y: Array, z: Array, drives: Array, length: float) -> tuple[Array, Array]:
+        """Solve y' = z, z' = u(s) − k y − b z for the quadratic u through three evenly spaced values.
+
+        Parameters
+        ----------
+        y, z : ndarray (n,)
+            State at s = 0.
+        drives : ndarray (3, n)
+            u at 0, length/2 and length.
+        length : float
+            Length of the step in s [s].
+
+        Returns
+        -------
+        y, z : ndarray (n,)
+        """
+        k, b = self.stiffness, self.damping
+        return quadratic_drive_step(k, b, self.propagator(length), y, z, drives, length)
+
+    def propagator(self, length: float) -> Array:
+        """exp(A s) of A = [[0, 1], [−k, −b]], in closed form for every damping ratio.
+
+        Parameters
+        ----------
+        length : float
+            s [s].
+
+        Returns
+        -------
+        ndarray (2, 2, n)
+        """
+        E = self._propagators.get(length)
+        if E is None:
+            if len(self._propagators) > 256:
+                self._propagators.clear()
+            E = self._propagators[length] = spring_exponential(self.stiffness, self.damping, length)
+        return E
+
+    def _runge_kutta(self, y: Array, v: Array, drives: Array, grid: StepGrid) -> tuple[Array, Array]:
+        """One step of the classical fourth-order method on the printed form."""
+        k, b, h = self.stiffness, self.damping, grid.length
+        first, middle, last = drives
+        tau_0, tau_m, tau_1 = grid.tau
+        a_1 = (first - k * y - b * v) / tau_0
+        v_2 = v + 0.5 * h * a_1
+        a_2 = (middle - k * (y + 0.5 * h * v) - b * v_2) / tau_m
+        v_3 = v + 0.5 * h * a_2
+        a_3 = (middle - k * (y + 0.5 * h * v_2) - b * v_3) / tau_m
+        v_4 = v + h * a_3
+        a_4 = (last - k * (y + h * v_3) - b * v_4) / tau_1
+        return y + h / 6.0 * (v + 2.0 * v_2 + 2.0 * v_3 + v_4), v + h / 6.0 * (a_1 + 2.0 * a_2 + 2.0 * a_3 + a_4)
+
+
+def default_gains(duration: float) -> tuple[float, float]:
+    """Critically damped gains that settle within a movement of the given duration.
+
+    b = 25/T, k = b²/4: the constants of Ijspeert et al. (2013) for a movement of T seconds at τ = 1.
+
+    Parameters
+    ----------
+    duration : float
+        Duration of the movement or period of the cycle [s].
+
+    Returns
+    -------
+    stiffness, damping : float
+        [1/s²], [1/s]
+    """
+    damping = 25.0 / duration
+    return 0.25 * damping**2, damping
+
+
+def quadratic_drive_step(k: ArrayLike, b: ArrayLike, propagator: Array, y: Array, z: Array, drives: Array,
+                         length: ArrayLike) -> tuple[Array, Array]:
+    """Exact solution of y' = z, z' = u(s) − k y − b z for a quadratic u; all arguments broadcast.
+
+    Parameters
+    ----------
+    k, b : array_like (...)
+        Stiffness and damping.
+    propagator : ndarray (2, 2, ...)
+        :func:`spring_exponential` of the same k, b and length.
+    y, z : ndarray (...)
+        State at s = 0.
+    drives : ndarray (3, ...)
+        u at 0, length/2 and length.
+    length : array_like (...)
+        Length of the step [s].
+
+    Returns
+    -------
+    y, z : ndarray (...)
+    """
+    first, middle, last = drives
+    u2 = 2.0 * (first - 2.0 * middle + last) / length**2
+    u1 = (4.0 * middle - 3.0 * first - last) / length
+    a2 = u2 / k                                         # particular solution a0 + a1 s + a2 s²
+    a1 = (u1 - 2.0 * b * a2) / k
+    a0 = (first - b * a1 - 2.0 * a2) / k
+    y, z = y - a0, z - a1
+    return (propagator[0, 0] * y + propagator[0, 1] * z + a0 + length * (a1 + length * a2),
+            propagator[1, 0] * y + propagator[1, 1] * z + a1 + 2.0 * length * a2)
+
+
+def spring_exponential(k: ArrayLike, b: ArrayLike, length: ArrayLike) -> Array:
+    """exp of [[0, 1], [−k, −b]] times s, as e^{−μs}(C I + S (A + μ I)) with μ = b/2; arguments broadcast.
+
+    Parameters
+    ----------
+    k, b, length : array_like (...)
+        Stiffness, damping and s.
+
+    Returns
+    -------
+    ndarray (2, 2, ...)
+    """
+    k, length = np.asarray(k, dtype=float), np.asarray(length, dtype=float)
+    mu = 0.5 * np.asarray(b, dtype=float)
+    root = np.sqrt((mu * mu - k).astype(complex)) * length                            # imaginary: oscillating
+    grow, fall = np.exp(root - mu * length), np.exp(-root - mu * length)
+    C = (0.5 * (grow + fall)).real
+    small = np.abs(root) < 1e-3
+    series = np.exp(-mu * length) * (1.0 + (root * root).real / 6.0)
+    S = length * np.where(small, series, (0.5 * (grow - fall) / np.where(small, 1.0, root)).real)
+    return np.array([[C + mu * S, S], [-k * S, C - mu * S]])
