@@ -3,17 +3,17 @@
 """
 Installs the package with pip and with colcon, so that both find the same things.
 
-`ros2 run` looks for executable files in ``lib/dmp_cpg_ros``; a shell looks on its path, in ``bin``.
-Console scripts therefore go to ``bin``, and a small shell wrapper of each goes to
+`ros2 run` looks for executable files in ``lib/dmp_cpg_ros``; a shell looks on its path, in
+``bin``. Console scripts therefore go to ``bin``, and a small shell wrapper of each goes to
 ``lib/dmp_cpg_ros``. Both come from the one table `EXECUTABLES`.
 """
 
 from __future__ import annotations
 
 import os
-from pathlib import Path
 import re
 import tempfile
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
@@ -78,8 +78,9 @@ def shared_files() -> list[tuple[str, list[str]]]:
     by_folder: dict[str, list[str]] = {}
     for top in ('config', 'launch'):
         for path in sorted(Path(top).rglob('*')):
-            if path.is_file() and path.suffix in ('.yaml', '.py', '.rviz', '.md'):
-                by_folder.setdefault(f'share/{NAME}/{path.parent.as_posix()}', []).append(str(path))
+            if path.is_file() and '__pycache__' not in path.parts:
+                folder = f'share/{NAME}/{path.parent.as_posix()}'
+                by_folder.setdefault(folder, []).append(str(path))
     return sorted(by_folder.items())
 
 
