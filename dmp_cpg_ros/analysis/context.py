@@ -1,0 +1,68 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is known of a run besides its recording: the robot, the gait, the inhibition."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.gait import Gait
+from dmp_cpg_ros.core.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.robot_description import RobotDescription
+
+CONTACT_WEIGHT_SHARE = 0.02
+"""A foot is on the ground while it carries more than this share of the weight."""
+
+USUAL_CONTACT_FORCE = 2.0
+"""The same for a robot whose mass is not known [N]."""
+
+
+@dataclass(frozen=True)
+class RunContext:
+    """Knowledge that metrics and figures use when they have it.
+
+    Attributes
+    ----------
+    robot : RobotDescription or None
+        Geometry, mass and limits; metrics that need them are null without.
+    gait : Gait or None
+        The gait that was walked; without, phase offsets are taken from the recording.
+    inhibition : InhibitionParameters
+        Region C and inhibited legs.
+    radius : float
+        Radius r of the limit cycle.
+    """
+
+    robot: RobotDescription | None = None
+    gait: Gait | None = None
+    inhibition: InhibitionParameters = field(default_factory=InhibitionParameters)
+    radius: float = 1.0
+
+    @property
+    def contact_force(self) -> float:
+        """Normal force above which a foot counts as being on the ground [N]."""
+        if self.robot is None:
+            return USUAL_CONTACT_FORCE
+        return CONTACT_WEIGHT_SHARE * self.robot.mass * 9.81
+
+    @property
+    def phase_offsets(self) -> NDArray[np.float64] | None:
+        """Phases of the legs relative to fl that the gait plans, ndarray (4,) [rad]."""
+        return None if self.gait is None else self.gait.phases
+
+
+def find_parameter(parameters: Mapping[str, Any] | None, name: str, default: Any = None) -> Any:
+    """Value of a parameter wherever it stands in nested mappings (node, ``ros__parameters``, group)."""
+    for key, value in (parameters or {}).items():
+        if key == name and not isinstance(value, Mapping):
+            return value
+        if isinstance(value, Mapping):
+            found = find_parameter(value, name)
+            if found is not None:
+                return found
+    return default

@@ -1,0 +1,58 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Fingerprints of a run: equal digests mean that every byte that was published is equal."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.rosbag2 import ReaderError
+
+from dmp_cpg_ros.analysis.bag import bag_folder, opened
+from dmp_cpg_ros.core.errors import DataError
+
+TOPICS = ('canonical_state', 'joint_states', 'joint_targets')
+SHARED_TOPIC = 'joint_targets'
+"""Topic with one publisher per leg; their messages interleave differently in every run."""
+
+
+def payload_digests(path: Path | str) -> dict[str, str]:
+    """One SHA-256 per publisher over the message payloads as recorded, in their order.
+
+    Parameters
+    ----------
+    path : path-like
+        Bag or run's folder.
+
+    Returns
+    -------
+    dict of str to str
+        Hexadecimal digests of ``joint_states``, ``canonical_state``, and ``joint_targets/fl``, …, whose publisher
+        is known by the leg that its first joint's name begins with.
+
+    Raises
+    ------
+    MissingFileError, DataError
+        If there is no readable bag.
+    """
+    folder = bag_folder(path)
+    hashes: dict[str, hashlib._Hash] = {}
+    try:
+        with opened(folder) as reader:
+            used = [connection for connection in reader.connections
+                    if connection.topic.rsplit('/', 1)[-1] in TOPICS]
+            for connection, _, raw in reader.messages(used) if used else ():
+                key = connection.topic.rsplit('/', 1)[-1]
+                if key == SHARED_TOPIC:
+                    key = f'{key}/{_leg(reader, raw, connection.msgtype)}'
+                hashes.setdefault(key, hashlib.sha256()).update(raw)
+    except (AnyReaderError, ReaderError, OSError) as error:
+        raise DataError(f"the bag '{folder}' is damaged: {error}") from error
+    return {key: value.hexdigest() for key, value in sorted(hashes.items())}
+
+
+def _leg(reader: AnyReader, raw: bytes, msgtype: str) -> str:
+    names = reader.deserialize(raw, msgtype).name  # type: ignore[attr-defined]
+    return str(names[0]).split('_', 1)[0] if names else 'unnamed'

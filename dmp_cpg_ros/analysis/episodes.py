@@ -1,0 +1,126 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""When the robot walked, when its command was constant, when it was stopping and starting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
+from dmp_cpg_ros.core.phase import phase
+
+Array = NDArray[np.float64]
+
+STOPPING = ('waiting', 'captured', 'at_rest')
+RUNNING = ('free', 'walking')
+STARTING = ('releasing',)
+
+STEADY_RATES = np.array([0.02, 0.02, 0.05])
+"""Rates of v_x, v_y [m/s^2] and γ [rad/s^2] below which the reference counts as constant."""
+
+SETTLING = 1.0
+"""What is left out at the beginning of walking and of every constant reference, for the body to settle [s]."""
+
+SHORTEST_SEGMENT = 1.0
+"""Constant references that last less after settling are not evaluated [s]."""
+
+MOVING = 0.02
+"""Reference speed [m/s] or turn rate [rad/s] above which the robot is meant to move."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """Consecutive inhibition states of one kind.
+
+    Attributes
+    ----------
+    start, end : float
+        From its first state to the first state of the next episode, or to the end of the recording [s].
+    events : tuple of StatusEvent
+        The states.
+    """
+
+    start: float
+    end: float
+    events: tuple[StatusEvent, ...]
+
+
+def episodes(recording: Recording, words: tuple[str, ...]) -> list[Episode]:
+    """Longest stretches in which the inhibition's state is one of ``words``."""
+    found: list[Episode] = []
+    current: list[StatusEvent] = []
+    for event in recording.inhibition:
+        if event.message in words:
+            current.append(event)
+        elif current:
+            found.append(Episode(current[0].time, event.time, tuple(current)))
+            current = []
+    if current:
+        found.append(Episode(current[0].time, max(recording.span[1], current[-1].time), tuple(current)))
+    return found
+
+
+def running_intervals(recording: Recording) -> list[tuple[float, float]]:
+    """Intervals without inhibition; the whole recording when the inhibition was not recorded."""
+    if not recording.inhibition:
+        return [recording.span] if recording.span[1] > recording.span[0] else []
+    return [(episode.start, episode.end) for episode in episodes(recording, RUNNING)]
+
+
+def unwrapped_phases(recording: Recording) -> Array:
+    """Growing phases of the four oscillators, ndarray (n, 4) [rad]."""
+    return np.unwrap(phase(recording.canonical.x), axis=0)
+
+
+def cycle_starts(recording: Recording, start: float, end: float) -> Array:
+    """Times in an interval at which oscillator fl passes phase 0, ndarray (m,) [s]."""
+    time = recording.canonical.time
+    inside = (time >= start) & (time <= end)
+    if np.count_nonzero(inside) < 2:
+        return np.array([])
+    phi, time = unwrapped_phases(recording)[inside, 0] / (2.0 * np.pi), time[inside]
+    turns = np.arange(np.ceil(phi[0]), np.floor(phi[-1]) + 1.0)
+    return np.interp(turns, np.maximum.accumulate(phi), time)
+
+
+def cycle_count(recording: Recording, start: float, end: float) -> float:
+    """Gait cycles of oscillator fl between two times; 0 when no oscillators were recorded."""
+    if not recording.canonical.time.size:
+        return 0.0
+    turns = unwrapped_phases(recording)[:, 0] / (2.0 * np.pi)
+    return float(np.diff(np.interp([start, end], recording.canonical.time, turns))[0])
+
+
+def gait_period(recording: Recording) -> float | None:
+    """Median duration of a gait cycle while running [s], None where there is none."""
+    periods = [np.diff(cycle_starts(recording, *interval)) for interval in running_intervals(recording)]
+    lengths = np.concatenate([np.array([]), *periods])
+    return float(np.median(lengths)) if lengths.size else None
+
+
+def steady_segments(recording: Recording) -> list[tuple[float, float]]:
+    """Intervals of constant, moving reference while running, settled and cut to whole gait cycles [s].
+
+    Where no oscillators were recorded the intervals are not cut.
+    """
+    time, value = recording.reference.time, recording.reference.value
+    if len(time) < 3:
+        return []
+    rate = np.abs(np.gradient(value, time, axis=0))
+    steady = (rate < STEADY_RATES).all(axis=1) & (np.abs(value) > MOVING).any(axis=1)
+    running = np.zeros(len(time), dtype=bool)
+    for start, end in running_intervals(recording):
+        running |= (time >= start) & (time < end)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (steady & running).astype(int), [0]])))
+    segments = []
+    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
+        start, end = float(time[first]) + SETTLING, float(time[last])
+        if recording.canonical.time.size and end > start:
+            cycles = cycle_starts(recording, start, end)
+            start, end = (float(cycles[0]), float(cycles[-1])) if cycles.size else (start, start)
+        if end - start >= SHORTEST_SEGMENT:
+            segments.append((start, end))
+    return segments

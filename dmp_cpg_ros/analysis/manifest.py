@@ -1,0 +1,95 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a run was made with: versions, commit, parameters, seeds, host; nothing personal."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import platform
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import dmp_cpg_ros
+from dmp_cpg_ros.analysis.provenance import source_commit
+
+PACKAGES = ('numpy', 'mujoco', 'rosbags', 'matplotlib', 'rclpy', 'mcap')
+
+
+def build_manifest(parameters: Mapping[str, Any] | None = None, seeds: Mapping[str, int] | None = None,
+                   digests: Mapping[str, str] | None = None, **facts: Any) -> dict[str, Any]:
+    """Contents of ``manifest.json``.
+
+    Parameters
+    ----------
+    parameters : mapping, optional
+        Parameters of all nodes.
+    seeds : mapping, optional
+        Every seed by name.
+    digests : mapping, optional
+        As from :func:`~dmp_cpg_ros.analysis.digests.payload_digests`.
+    **facts
+        Anything else that matters, such as ``scenario`` or ``mode``.
+
+    Returns
+    -------
+    dict
+        Absolute paths in texts are cut to file names; host and user names are not asked for.
+    """
+    return without_paths({
+        'created': datetime.datetime.now(datetime.timezone.utc).isoformat(timespec='seconds'),
+        'versions': versions(), 'commit': source_commit(), **facts,
+        'parameters': dict(parameters or {}), 'seeds': dict(seeds or {}),
+        'digests': dict(digests or {}), 'host': host_facts()})
+
+
+def versions() -> dict[str, str]:
+    """Versions of the package, of Python and of what is installed of the packages it stands on."""
+    found = {'dmp_cpg_ros': dmp_cpg_ros.__version__, 'python': platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    distribution = os.environ.get('ROS_DISTRO')
+    return {**found, 'ros_distro': distribution} if distribution else found
+
+
+def host_facts() -> dict[str, Any]:
+    """Facts that change how fast a run goes: processor, number of cores, load, system."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()
+    load = [round(value, 2) for value in os.getloadavg()] if hasattr(os, 'getloadavg') else None
+    return {'system': platform.system(), 'machine': platform.machine(), 'processor': _processor(),
+            'cores': os.cpu_count(), 'usable_cores': usable, 'load_average': load,
+            'rmw': os.environ.get('RMW_IMPLEMENTATION', 'default')}
+
+
+def without_paths(value: Any) -> Any:
+    """Copy of nested values in which texts that are absolute paths are cut to their last part."""
+    if isinstance(value, Mapping):
+        return {key: without_paths(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [without_paths(entry) for entry in value]
+    if isinstance(value, Path):
+        value = str(value)
+    if isinstance(value, str) and (value.startswith(('/', '~/')) or value[1:3] in (':\\', ':/')):
+        # topic names begin with a slash too, but name no folder that exists
+        return value.replace('\\', '/').rsplit('/', 1)[-1] if _in_a_folder(value) else value
+    return value
+
+
+def _in_a_folder(text: str) -> bool:
+    path = Path(text).expanduser()
+    return path.exists() or (len(path.parts) > 2 and path.parent.exists())
+
+
+def _processor() -> str:
+    try:
+        for line in Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
+            if line.startswith('model name'):
+                return line.split(':', 1)[1].strip()
+    except OSError:
+        pass
+    return platform.processor() or 'unknown'

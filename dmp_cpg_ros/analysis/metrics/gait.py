@@ -1,0 +1,96 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the legs kept their places, and how long each foot stood."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.episodes import (
+    MOVING, SETTLING, gait_period, running_intervals, steady_segments)
+from dmp_cpg_ros.analysis.motion import held, mean_between
+from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.core.leg_primitive import body_scale
+from dmp_cpg_ros.core.phase import phase, wrapped
+from dmp_cpg_ros.core.robot_state import LEGS
+
+Array = NDArray[np.float64]
+
+
+def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
+    """Group ``gait`` of ``metrics.json``.
+
+    Returns
+    -------
+    dict
+        ``phase_error_rad_max``, the largest deviation of a leg from its place in the gait while walking freely and
+        settled; ``duty_factor``, the measured share of the cycle on the ground, mean of the legs, with
+        ``duty_factor_of_leg`` and the planned ``duty_factor_planned``; ``period_s``, the median gait cycle.
+    """
+    time, errors = phase_errors(recording, context)
+    settled = settled_rows(recording, time)
+    duty = duty_factors(recording, context)
+    return {
+        'name': None if context.gait is None else context.gait.name,
+        'phase_error_rad_max': float(np.abs(errors[settled]).max()) if settled.any() else None,
+        'duty_factor': None if duty is None else float(duty.mean()),
+        'duty_factor_of_leg': None if duty is None else dict(zip(LEGS, map(float, duty), strict=True)),
+        'duty_factor_planned': planned_duty_factor(recording, context),
+        'period_s': gait_period(recording)}
+
+
+def phase_errors(recording: Recording, context: RunContext) -> tuple[Array, Array]:
+    """Deviation of each leg's phase from its place, relative to the circular mean of the four.
+
+    Returns
+    -------
+    time : ndarray (n,)
+        [s]
+    error : ndarray (n, 4)
+        [rad]; where the gait is not known its offsets are the circular means of the settled walk.
+    """
+    time, phi = recording.canonical.time, phase(recording.canonical.x)
+    offsets = context.phase_offsets
+    if offsets is None:
+        relative = (phi - phi[:, :1])[settled_rows(recording, time)]
+        offsets = np.arctan2(np.sin(relative).sum(axis=0), np.cos(relative).sum(axis=0))
+    places = phi - offsets
+    common = np.arctan2(np.sin(places).sum(axis=1), np.cos(places).sum(axis=1))
+    return time, wrapped(places - common[:, None])
+
+
+def settled_rows(recording: Recording, time: Array) -> NDArray[np.bool_]:
+    """Which times lie in settled, moving walking, boolean ndarray (n,)."""
+    inside = np.zeros(len(time), dtype=bool)
+    for start, end in running_intervals(recording):
+        inside |= (time >= start + SETTLING) & (time < end)
+    if recording.reference.time.size and time.size:
+        value = held(recording.reference.time, recording.reference.value, time)
+        inside &= (np.abs(value) > MOVING).any(axis=1)
+    return inside
+
+
+def duty_factors(recording: Recording, context: RunContext) -> Array | None:
+    """Measured share of time on the ground over whole cycles of steady walking, ndarray (4,)."""
+    segments = steady_segments(recording)
+    if not segments or not recording.feet.time.size:
+        return None
+    contact = (recording.feet.force > context.contact_force).astype(float)
+    shares = [mean_between(recording.feet.time, contact, start, end) for start, end in segments]
+    return np.average(shares, axis=0, weights=[end - start for start, end in segments])
+
+
+def planned_duty_factor(recording: Recording, context: RunContext) -> float | None:
+    """Duty factor that the gait plans, averaged over the same stretches."""
+    segments = steady_segments(recording)
+    if context.gait is None or context.robot is None or not segments:
+        return None
+    scale = body_scale(context.robot)
+    planned = [context.gait.duty(scale.foot_speed(*held(
+        recording.reference.time, recording.reference.value, np.array([start]))[0]), scale)
+        for start, _ in segments]
+    return float(np.average(planned, weights=[end - start for start, end in segments]))

@@ -1,0 +1,97 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How the robot fared: falls, distance, drift, energy, slip."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.episodes import MOVING, steady_segments
+from dmp_cpg_ros.analysis.foot_motion import foot_slip
+from dmp_cpg_ros.analysis.motion import held, integral, roll_pitch_yaw, smoothed, tilt
+from dmp_cpg_ros.analysis.recording import Recording
+
+FALLEN_HEIGHT_SHARE = 0.5
+"""Share of the standing height below which the robot has fallen."""
+
+FALLEN_TILT = np.deg2rad(60.0)
+"""Tilt of the base beyond which the robot has fallen [rad]."""
+
+SWAY_WINDOW = 1.0
+"""The path is averaged over this time so that sway does not count as distance [s]."""
+
+SHORTEST_DISTANCE = 0.5
+"""Distance below which figures per metre are not given [m]."""
+
+
+def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
+    """Group ``robot`` of ``metrics.json``; None where a topic or the robot's description is missing.
+
+    Returns
+    -------
+    dict
+        ``fell``; ``distance_m``, the length of the horizontal path without sway; ``yaw_drift_deg_per_10m``, the
+        size of the yaw gained on straight, steady stretches; ``cost_of_transport``, positive mechanical joint
+        work over m g distance; ``foot_slip_m``, the sum over feet and run of sliding under load, and
+        ``foot_slip_m_per_foot_and_m``.
+    """
+    distance = distance_walked(recording)
+    slip = None if context.robot is None else foot_slip(recording, context.robot, context.contact_force)
+    total = None if slip is None else float(slip.sum())
+    far = distance is not None and distance >= SHORTEST_DISTANCE
+    return {
+        'fell': fell(recording, context), 'distance_m': distance,
+        'yaw_drift_deg_per_10m': yaw_drift(recording),
+        'cost_of_transport': cost_of_transport(recording, context, distance) if far else None,
+        'foot_slip_m': total,
+        'foot_slip_m_per_foot_and_m': total / 4.0 / distance if far and total is not None else None}
+
+
+def fell(recording: Recording, context: RunContext) -> bool | None:
+    """Whether the base ever was too low or too tilted."""
+    odometry = recording.odometry
+    if not odometry.time.size:
+        return None
+    height = odometry.position_in_world[:, 2]
+    standing = height[0] if context.robot is None else context.robot.stance_height
+    too_low = height < FALLEN_HEIGHT_SHARE * standing
+    return bool(np.any(too_low | (tilt(odometry.quaternion) > FALLEN_TILT)))
+
+
+def distance_walked(recording: Recording) -> float | None:
+    """Length of the horizontal path of the base, sway averaged out [m]."""
+    odometry = recording.odometry
+    if not odometry.time.size:
+        return None
+    path = smoothed(odometry.time, odometry.position_in_world[:, :2], SWAY_WINDOW)
+    return float(np.hypot(*np.diff(path, axis=0).T).sum())
+
+
+def yaw_drift(recording: Recording) -> float | None:
+    """Size of the yaw gained per 10 m on straight, steady stretches [deg]."""
+    odometry = recording.odometry
+    if not odometry.time.size:
+        return None
+    yaw = roll_pitch_yaw(odometry.quaternion)[:, 2]
+    gained = walked = 0.0
+    for start, end in steady_segments(recording):
+        v_x, v_y, gamma = held(recording.reference.time, recording.reference.value, np.array([start]))[0]
+        if abs(gamma) > MOVING or np.hypot(v_x, v_y) < MOVING:
+            continue
+        there = [np.array([np.interp(t, odometry.time, column) for column in odometry.position_in_world[:, :2].T])
+                 for t in (start, end)]
+        walked += float(np.hypot(*(there[1] - there[0])))
+        gained += abs(float(np.interp(end, odometry.time, yaw) - np.interp(start, odometry.time, yaw)))
+    return float(np.rad2deg(gained)) * 10.0 / walked if walked >= SHORTEST_DISTANCE else None
+
+
+def cost_of_transport(recording: Recording, context: RunContext, distance: float | None) -> float | None:
+    """Positive mechanical work of all joints over m g d (Tucker 1975); no losses, no recuperation."""
+    joints = recording.joints
+    if context.robot is None or not distance or not joints.time.size:
+        return None
+    power = np.maximum(joints.effort * joints.velocity, 0.0).sum(axis=1)
+    return float(integral(joints.time, power)[-1] / (context.robot.mass * 9.81 * distance))

@@ -1,0 +1,99 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every stop and every start: predicted, bounded, measured, and what the body did."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.episodes import RUNNING, STARTING, STOPPING, Episode, episodes
+from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
+
+STILL_SPEED = 0.01
+"""Speed below which the body stands still [m/s]."""
+
+REST_SETTLING = 0.5
+"""Time after the oscillators' rest from which on the body is expected to be still [s]."""
+
+
+def stop_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
+    """Group ``stop`` of ``metrics.json``: the slowest completed stop, the counts, and ``all``."""
+    entries = [_stop(recording, context, episode) for episode in episodes(recording, STOPPING)
+               if episode.events[0].message != 'at_rest']
+    return _summary(entries)
+
+
+def start_metrics(recording: Recording) -> dict[str, Any]:
+    """Group ``start`` of ``metrics.json``: the slowest completed start, the counts, and ``all``."""
+    return _summary([_start(recording, episode) for episode in episodes(recording, STARTING)])
+
+
+def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
+    completed = [entry for entry in entries if entry['measured_s'] is not None]
+    slowest = max(completed, key=lambda entry: float(entry['measured_s']), default={})
+    return {**{key: slowest.get(key) for key in ('predicted_s', 'bound_s', 'measured_s')},
+            'count': len(entries), 'completed': len(completed), 'all': entries}
+
+
+def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[str, Any]:
+    at_rest = next((event for event in episode.events if event.message == 'at_rest'), None)
+    entry = _times(episode, at_rest)
+    if at_rest is None:
+        return entry
+    window = (min(at_rest.time + REST_SETTLING, episode.end), episode.end)
+    return {**entry, 'rest_s': at_rest.time, 'rest_until_s': episode.end,
+            **_body_at_rest(recording, entry['request_s'], window), **_feet_at_rest(recording, context, window)}
+
+
+def _start(recording: Recording, episode: Episode) -> dict[str, Any]:
+    walking = next((event for event in recording.inhibition
+                    if event.time >= episode.end and event.message in RUNNING), None)
+    interrupted = walking is None or walking.time > episode.end
+    return _times(episode, None if interrupted else walking)
+
+
+def _times(episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
+    """Request, prediction, bound and measurement; the node's own numbers where it states them."""
+    first = episode.events[0]
+    stated = first.number('request_stamp')
+    # a stamp far from the event that bears it belongs to another request
+    request = stated if stated is not None and abs(stated - first.time) < 1.0 else first.time
+    measured = None
+    if done is not None:
+        measured = done.number('measured_s')
+        measured = done.time - request if measured is None else measured
+    return {'request_s': request, 'predicted_s': _first(episode, 'predicted_s'),
+            'bound_s': _first(episode, 'bound_s'), 'measured_s': measured}
+
+
+def _first(episode: Episode, key: str) -> float | None:
+    numbers = (event.number(key) for event in episode.events)
+    return next((number for number in numbers if number is not None), None)
+
+
+def _body_at_rest(recording: Recording, request: float, window: tuple[float, float]) -> dict[str, Any]:
+    odometry = recording.odometry
+    rows = (odometry.time >= window[0]) & (odometry.time < window[1])
+    if not rows.any():
+        return {'body_speed_at_rest': None, 'body_still_after_s': None, 'displacement_m': None}
+    speed = np.linalg.norm(odometry.velocity_in_base, axis=1)
+    since = (odometry.time >= request) & (odometry.time < window[1])
+    moving = odometry.time[since & (speed >= STILL_SPEED)]
+    still_after = float(moving[-1]) - request if moving.size else 0.0
+    start, end = (odometry.position_in_world[rows_of][0, :2] for rows_of in (since, rows))
+    return {'body_speed_at_rest': float(speed[rows].max()),
+            'body_still_after_s': still_after if speed[rows][-1] < STILL_SPEED else None,
+            'displacement_m': float(np.hypot(*(end - start)))}
+
+
+def _feet_at_rest(recording: Recording, context: RunContext, window: tuple[float, float]) -> dict[str, Any]:
+    feet = recording.feet
+    rows = (feet.time >= window[0]) & (feet.time < window[1])
+    if not rows.any():
+        return {'feet_down_at_rest': None, 'least_foot_force_n': None}
+    force = feet.force[rows]
+    return {'feet_down_at_rest': bool((force > context.contact_force).all()),
+            'least_foot_force_n': float(force.min())}

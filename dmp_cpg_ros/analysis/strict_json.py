@@ -1,0 +1,43 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""JSON that every parser reads: no NaN, no infinity, no NumPy types."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping, Set
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def plain(value: Any) -> Any:
+    """Value as None, bool, int, float, str, list and dict only; numbers that are not finite become None."""
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return plain({field.name: getattr(value, field.name) for field in dataclasses.fields(value)})
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, Set):
+        return sorted((plain(entry) for entry in value), key=str)
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, (bool, int, str)) else str(value)
+
+
+def to_json(value: Any) -> str:
+    """Strict, indented JSON text with a newline at its end."""
+    return json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + '\n'
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write strict JSON as UTF-8."""
+    path.write_text(to_json(value), encoding='utf-8')
