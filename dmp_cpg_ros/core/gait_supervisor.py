@@ -29,7 +29,7 @@ STATE_WORDS = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing')
 REST_ACTIVITY = 0.02
 """Swing activity below which a leg is at rest: its foot is below 2 % of its clearance."""
 
-REST_SPEED = 0.005
+REST_SPEED = 0.01
 """Reference foot speed below which the reference is at rest [m/s]."""
 
 REST_PHASE_RATE = 0.05

@@ -7,35 +7,25 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait_network import GaitNetwork
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters, LegPrimitive, LegState, body_scale
-from dmp_cpg_ros.core.posture import PostureController, PostureFeedback, PostureParameters
-from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.leg_primitive import LegPrimitive, LegState, body_scale
+from dmp_cpg_ros.core.posture import PostureController, PostureFeedback
+from dmp_cpg_ros.core.reference import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation import TransformationState
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class SuiteParameters:
-    """Parameters of all parts of the suite."""
-
-    reference: ReferenceParameters = field(default_factory=ReferenceParameters)
-    canonical: CanonicalParameters = field(default_factory=CanonicalParameters)
-    inhibition: InhibitionParameters = field(default_factory=InhibitionParameters)
-    leg: LegParameters = field(default_factory=LegParameters)
-    posture: PostureParameters = field(default_factory=PostureParameters)
 
 
 @dataclass(frozen=True)
