@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,8 +19,9 @@ from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_f
 
 Picture = NDArray[np.uint8]
 
-AZIMUTH, ELEVATION = 140.0, -16.0  # [deg] from behind the robot's right shoulder onto its left side
+AZIMUTH, ELEVATION = 140.0, -16.0  # [deg] onto the robot's right side and face
 DISTANCE_OVER_HEIGHT = 3.6  # distance of the camera over the robot's stance height
+FAR_CLIPPING = 400.0  # in units of the model's extent
 
 _log = logging.getLogger(__name__)
 
@@ -51,9 +51,10 @@ class Camera:
                  height: int = 720) -> None:
         if not isinstance(robot_file, RobotFile):
             robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
-        self._model = load_model(robot_file.model)
+        self._model = load_model(robot_file.model, robot_file.base)
         self._ids = find_ids(self._model, robot_file)
-        self._distance = DISTANCE_OVER_HEIGHT * read_description(self._model, robot_file).stance_height
+        height_of_base = read_description(self._model, robot_file).stance_height
+        self._distance = DISTANCE_OVER_HEIGHT * height_of_base
         self._data = mujoco.MjData(self._model)
         self._renderer, self.reason = _renderer(self._model, width, height)
 
@@ -141,9 +142,10 @@ def pose_pictures(robot_file: RobotFile | Path | str | None, base_positions_in_w
         Empty where pictures cannot be drawn; the reason is logged.
     """
     with Camera(robot_file, width, height) as camera:
-        poses: Sequence[Any] = tuple(zip(np.asarray(base_positions_in_world), np.asarray(base_quaternions),
-                                         np.asarray(joint_positions), strict=True))
-        pictures = [camera.picture(*pose, **view) for pose in poses]
+        pictures = [camera.picture(place, quaternion, joints, **view)
+                    for place, quaternion, joints in zip(
+                        np.asarray(base_positions_in_world), np.asarray(base_quaternions),
+                        np.asarray(joint_positions), strict=True)]
     return [picture for picture in pictures if picture is not None]
 
 
@@ -153,9 +155,9 @@ def open_viewer(model: mujoco.MjModel, data: mujoco.MjData) -> Any | None:
     Returns
     -------
     handle or None
-        MuJoCo's passive viewer: call ``sync()`` after each tick, ``close()`` at the end, and stop syncing when
-        ``is_running()`` turns false. None without a screen or where the window cannot be opened; the reason
-        is logged.
+        MuJoCo's passive viewer: call ``sync()`` after each tick, ``close()`` at the end, and stop
+        syncing when ``is_running()`` turns false. None without a screen or where the window cannot
+        be opened; the reason is logged.
     """
     if not has_screen():
         _log.warning('no window: there is no screen (DISPLAY and WAYLAND_DISPLAY are unset)')
@@ -172,6 +174,8 @@ def _renderer(model: mujoco.MjModel, width: int, height: int) -> tuple[Any | Non
     """Return a renderer, or None and the reason."""
     model.vis.global_.offwidth = max(model.vis.global_.offwidth, width)
     model.vis.global_.offheight = max(model.vis.global_.offheight, height)
+    # A far clipping plane that is near makes software renderers speckle the floor with shadow.
+    model.vis.map.zfar = max(model.vis.map.zfar, FAR_CLIPPING)
     try:
         return mujoco.Renderer(model, height, width), None
     except Exception as error:  # what a missing or broken OpenGL raises depends on the backend

@@ -28,7 +28,7 @@ class ContactReader:
         self._wrench = np.zeros(6)
 
     def foot_force(self, data: mujoco.MjData) -> NDArray[np.float64]:
-        """Return the normal force of each foot (4,), summed over its contacts with the surroundings [N]."""
+        """Return the normal force of each foot (4,), summed over its contacts [N]."""
         force = [0.0, 0.0, 0.0, 0.0]
         for i, (first, second) in enumerate(data.contact.geom.tolist()):
             one, other = self._owner[first], self._owner[second]

@@ -44,8 +44,8 @@ def _leg(leg: LegGeometry, height: float) -> NDArray[np.float64]:
         reach = kinematics.thigh_length + kinematics.shank_length
         down = leg.hip_in_base[2] + leg.hip_offset[2] - foot_in_base[2]
         raise ParameterError(
-            f'leg {leg.name} cannot stand at a base height of {height:g} m: its hip joint would be '
-            f'{down:.3f} m over the foot, the leg is {reach:.3f} m long')
+            f'leg {leg.name} cannot stand at a base height of {height:g} m: its hip joint would '
+            f'be {down:.3f} m over the foot, the leg is {reach:.3f} m long')
     for angle, low, high, joint in zip(angles, leg.position_lower, leg.position_upper,
                                        JOINTS_OF_LEG):
         if not low <= angle <= high:

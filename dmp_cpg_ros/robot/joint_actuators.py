@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How joint torques get into MuJoCo: through motors where the model has them, directly otherwise."""
+"""How torques get into MuJoCo: through motors where the model has them, else directly."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from dmp_cpg_ros.robot.mujoco_import import mujoco
 class JointActuators:
     """Applies torques to twelve joints.
 
-    When every joint has a plain motor the motors get the torques. Otherwise all torques are applied to the
-    joints themselves, and the model's own actuators of these joints (position servos, say) are switched off
-    in ``model``.
+    When every joint has a plain motor the motors get the torques. Otherwise all torques are applied
+    to the joints themselves, and the model's own actuators of these joints (position servos, say)
+    are switched off in ``model``.
     """
 
     def __init__(self, model: mujoco.MjModel, joints: NDArray[np.int64]) -> None:

@@ -14,14 +14,14 @@ from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JointTargets
 Vector = NDArray[np.float64]
 
 ROLL_OFF_FROM = 0.7
-"""Share of the speed limit above which the torque that drives a joint on falls, linearly to zero."""
+"""Share of the speed limit above which torque along the motion falls, linearly to zero."""
 
 
 class JointDrive:
     """τ = kp (q_d − q) + kd (q̇_d − q̇) + τ_ff for twelve joints, within torque and speed limits.
 
-    Between two arrivals of targets q_d moves on with q̇_d, for one tick at most; then it stands still. A joint
-    whose targets are the same numbers as before has received nothing new.
+    Between two arrivals of targets q_d moves on with q̇_d, for one tick at most; then it stands
+    still. A joint whose targets are the same numbers as before has received nothing new.
 
     Parameters
     ----------
@@ -93,13 +93,14 @@ class JointDrive:
     def limited(self, torque: Vector, velocity: Vector) -> Vector:
         """Clip torques (12,) to what the actuators can give at these speeds.
 
-        Torque along the motion is limited to τ_max up to 0.7 of the speed limit and falls linearly to zero at
-        the speed limit; torque against the motion is limited to τ_max only.
+        Torque along the motion is limited to τ_max up to 0.7 of the speed limit and falls linearly
+        to zero at the speed limit; torque against the motion is limited to τ_max only.
         """
         lost = self._slope * velocity
         upper = np.minimum(self._limit, np.maximum(self._stall - lost, 0.0))
         lower = np.minimum(self._limit, np.maximum(self._stall + lost, 0.0))
-        return np.minimum(upper, np.maximum(-lower, torque))
+        clipped: Vector = np.minimum(upper, np.maximum(-lower, torque))
+        return clipped
 
 
 def checked_targets(targets: JointTargets) -> NDArray[np.float64]:
@@ -114,7 +115,8 @@ def checked_targets(targets: JointTargets) -> NDArray[np.float64]:
     for name, value in (('position', targets.position), ('velocity', targets.velocity),
                         ('effort', targets.effort)):
         if np.shape(value) != shape:
-            raise DataError(f'joint targets: {name} has shape {np.shape(value)}, it must be {shape}')
+            raise DataError(
+                f'joint targets: {name} has shape {np.shape(value)}, it must be {shape}')
     stacked = np.array((targets.position, targets.velocity, targets.effort), dtype=float)
     if not np.isfinite(stacked).all():
         bad = [JOINT_NAMES[i] for i in np.flatnonzero(~np.isfinite(stacked).all(axis=0))]

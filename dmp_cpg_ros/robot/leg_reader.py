@@ -22,7 +22,7 @@ _AXIS_TOLERANCE = 0.02  # [rad] of an axis from x or y
 
 @dataclass(frozen=True)
 class Foot:
-    """Where a foot is: body, point in the body's frame [m], contact radius [m], geoms that touch."""
+    """A foot: its body, its point in the body's frame [m], radius [m], and geoms that touch."""
 
     body: int
     point_in_body: Vector
@@ -34,7 +34,7 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, what: str) -> in
     """Return the id of a named object; raises ParameterError that lists the names there are."""
     number = mujoco.mj_name2id(model, kind, name)
     if number < 0:
-        count = {mujoco.mjtObj.mjOBJ_JOINT: model.njnt, mujoco.mjtObj.mjOBJ_BODY: model.nbody}[kind]
+        count = model.njnt if kind == mujoco.mjtObj.mjOBJ_JOINT else model.nbody
         names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
         valid = ', '.join(entry for entry in names if entry)
         raise ParameterError(f"the model has no {what} '{name}'; it has {valid}")
@@ -44,7 +44,8 @@ def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, what: str) -> in
 def find_foot(model: mujoco.MjModel, name: str) -> Foot:
     """Find a foot by the name of a geom, a site or a body (in this order).
 
-    A site or body takes the nearest collision sphere of its body, if there is one, as its contact sphere.
+    A site or body takes the nearest collision sphere of its body, if there is one, as its contact
+    sphere.
 
     Raises
     ------
@@ -77,7 +78,8 @@ def _foot_of_geom(model: mujoco.MjModel, geom: int) -> Foot:
 
 def foot_position(data: mujoco.MjData, foot: Foot) -> Vector:
     """Return the centre of the foot's contact sphere in the world [m], after mj_kinematics."""
-    return data.xpos[foot.body] + data.xmat[foot.body].reshape(3, 3) @ foot.point_in_body
+    place: Vector = data.xpos[foot.body] + data.xmat[foot.body].reshape(3, 3) @ foot.point_in_body
+    return place
 
 
 def check_leg(model: mujoco.MjModel, data: mujoco.MjData, leg: str, joints: list[int], foot: Foot,
@@ -103,8 +105,9 @@ def check_leg(model: mujoco.MjModel, data: mujoco.MjData, leg: str, joints: list
         wanted = 'xyz'.index(_AXES[role])
         if np.arccos(min(1.0, abs(axis[wanted]))) > _AXIS_TOLERANCE:
             raise ParameterError(
-                f"joint '{name}' ({role} of leg {leg}) must turn about {_AXES[role]} of the base when all "
-                f'joints are at zero; its axis is [{axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f}]')
+                f"joint '{name}' ({role} of leg {leg}) must turn about {_AXES[role]} of the base "
+                f'when all joints are at zero; its axis is '
+                f'[{axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f}]')
         signs[i] = np.sign(axis[wanted])
     found = _joints_up_to(model, foot.body, base)
     if found != joints[::-1]:
@@ -134,7 +137,7 @@ def actuator_of(model: mujoco.MjModel, joint: int) -> int | None:
 
 
 def is_motor(model: mujoco.MjModel, actuator: int) -> bool:
-    """Return whether an actuator is a plain motor: force = gain · control, no bias, no dynamics."""
+    """Return whether an actuator is a plain motor: force = gain · control."""
     return bool(model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_FIXED
                 and model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE
                 and model.actuator_dyntype[actuator] == mujoco.mjtDyn.mjDYN_NONE)
@@ -168,6 +171,7 @@ def torque_limit(model: mujoco.MjModel, joint: int) -> float:
             add(model.actuator_ctrllimited[actuator], model.actuator_ctrlrange[actuator],
                 motor_ratio(model, actuator))
     if not limits:
-        raise ParameterError(f"the model gives no torque limit for joint '{model.joint(joint).name}' "
-                             "(ctrlrange, forcerange or actuatorfrcrange); add 'torque_limit' to the robot file")
+        raise ParameterError(
+            f"the model gives no torque limit for joint '{model.joint(joint).name}' (ctrlrange, "
+            "forcerange or actuatorfrcrange); add 'torque_limit' to the robot file")
     return min(limits)

@@ -5,23 +5,32 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 LONGEST_PHYSICS_STEP = 0.001  # [s] the joint drive runs at 1 kHz or faster
 
+_GROUND = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+_SKY = mujoco.mjtTexture.mjTEXTURE_SKYBOX
+_GRADIENT = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
+_CHECKER = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
 
-def load_model(path: Path) -> mujoco.MjModel:
+
+def load_model(path: Path, base: str) -> mujoco.MjModel:
     """Compile a model for use as a robot.
 
-    A floor is added when the model has neither plane nor height field outside its robot, and a physics
-    step longer than 1 ms is shortened to 1 ms, the rate of the joint drive.
+    A floor is added when the world body has neither plane nor height field, a light that follows
+    the base when there is no light at all, and a sky when there is none. A physics step longer than
+    1 ms is shortened to 1 ms, the rate of the joint drive.
 
     Parameters
     ----------
     path : Path
         MJCF file.
+    base : str
+        Body that the light follows.
 
     Raises
     ------
@@ -34,8 +43,13 @@ def load_model(path: Path) -> mujoco.MjModel:
         raise MissingFileError(f"model '{path}' does not exist")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        if not _has_ground(spec):
+        if not any(geom.type in _GROUND for geom in spec.worldbody.geoms):
             _add_floor(spec)
+        if not spec.lights and (body := spec.body(base)) is not None:
+            _add_light(body)
+        if not any(texture.type == _SKY for texture in spec.textures):
+            spec.add_texture(name='added_sky', type=_SKY, builtin=_GRADIENT, width=256, height=1536,
+                             rgb1=[0.36, 0.56, 0.80], rgb2=[0.86, 0.92, 0.97])
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise ParameterError(f"model '{path}' cannot be compiled: {error}") from error
@@ -43,13 +57,16 @@ def load_model(path: Path) -> mujoco.MjModel:
     return model
 
 
-def _has_ground(spec: mujoco.MjSpec) -> bool:
-    ground = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
-    return any(geom.type in ground for geom in spec.worldbody.geoms)
-
-
 def _add_floor(spec: mujoco.MjSpec) -> None:
+    spec.add_texture(name='added_floor', type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=_CHECKER,
+                     rgb1=[0.80, 0.82, 0.84], rgb2=[0.70, 0.73, 0.76], width=512, height=512)
+    material = spec.add_material(name='added_floor', texrepeat=[2, 2], texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = 'added_floor'
     spec.worldbody.add_geom(name='added_floor', type=mujoco.mjtGeom.mjGEOM_PLANE,
-                            size=[0.0, 0.0, 0.25], rgba=[0.75, 0.78, 0.80, 1.0])
-    spec.worldbody.add_light(pos=[0.0, 0.0, 4.0], dir=[0.2, 0.2, -1.0],
-                             type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+                            size=[0.0, 0.0, 0.25], material='added_floor')
+
+
+def _add_light(body: Any) -> None:
+    body.add_light(name='added_light', mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
+                   type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=[-0.5, -0.4, 2.5],
+                   dir=[0.2, 0.16, -1.0])

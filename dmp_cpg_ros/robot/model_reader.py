@@ -15,7 +15,13 @@ from dmp_cpg_ros.core.robot_description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.leg_reader import (
-    Foot, check_leg, find, find_foot, foot_position, torque_limit)
+    Foot,
+    check_leg,
+    find,
+    find_foot,
+    foot_position,
+    torque_limit,
+)
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
@@ -64,7 +70,7 @@ def load_description(path: Path | str | None = None) -> RobotDescription:
         If a file is missing, or the model is no quadruped of the kind that this package drives.
     """
     file = own_robot_file() if path is None else load_robot_file(path)
-    return read_description(load_model(file.model), file)
+    return read_description(load_model(file.model, file.base), file)
 
 
 def find_ids(model: mujoco.MjModel, file: RobotFile) -> ModelIds:
@@ -73,20 +79,22 @@ def find_ids(model: mujoco.MjModel, file: RobotFile) -> ModelIds:
     Raises
     ------
     ParameterError
-        If a name is not in the model (the names there are get listed), or the base cannot move freely.
+        If a name is not in the model (those there are get listed), or the base cannot move freely.
     """
     base = find(model, mujoco.mjtObj.mjOBJ_BODY, file.base, 'body')
     free = int(model.body_jntadr[base])
     if free < 0 or model.jnt_type[free] != mujoco.mjtJoint.mjJNT_FREE:
         raise ParameterError(f"the base '{file.base}' must have a free joint")
-    joints = [find(model, mujoco.mjtObj.mjOBJ_JOINT, name, 'joint') for leg in file.joints for name in leg]
+    joints = [find(model, mujoco.mjtObj.mjOBJ_JOINT, name, 'joint')
+              for leg in file.joints for name in leg]
     if len(set(joints)) != len(joints):
         raise ParameterError(f'the twelve joints must differ; named are {file.joints}')
-    return ModelIds(base, free, np.array(joints), tuple(find_foot(model, name) for name in file.feet))
+    feet = tuple(find_foot(model, name) for name in file.feet)
+    return ModelIds(base, free, np.array(joints), feet)
 
 
 def pose(model: mujoco.MjModel, ids: ModelIds, joint_position: Vector) -> mujoco.MjData:
-    """Return data with the base at the origin, the joints as given, and all kinematics computed."""
+    """Return data with the base at the origin, the joints as given, and kinematics computed."""
     data = mujoco.MjData(model)
     start = int(model.jnt_qposadr[ids.free_joint])
     data.qpos[start:start + 7] = (0, 0, 0, 1, 0, 0, 0)
@@ -115,47 +123,51 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
     at_zero = pose(model, ids, np.zeros(12))
     home = _home_keyframe(model, ids)
     legs = tuple(_read_leg(model, at_zero, ids, i, file, home) for i in range(4))
-    leg_length = float(np.mean([np.linalg.norm(leg.thigh) + np.linalg.norm(leg.shank) for leg in legs]))
+    leg_length = float(np.mean([np.linalg.norm(leg.thigh) + np.linalg.norm(leg.shank)
+                                for leg in legs]))
     mass = float(model.body_subtreemass[ids.base])
     height = file.stance_height or _stance_height(model, ids, legs, leg_length, home)
     kp = file.kp or (GAIN_OVER_WEIGHT * mass * GRAVITY * leg_length,) * 3
     kd = file.kd or tuple(DAMPING_TIME * np.sqrt(leg_length / GRAVITY) * gain for gain in kp)
     description = RobotDescription(
-        name=file.model.stem, legs=legs, mass=mass, base_inertia=np.zeros((3, 3)), com_in_base=np.zeros(3),
-        stance_height=height, kp=np.array(kp), kd=np.array(kd))
-    com, inertia = _composite_inertia(model, pose(model, ids, home_joint_position(description)), ids.base)
+        name=file.model.stem, legs=legs, mass=mass, base_inertia=np.zeros((3, 3)),
+        com_in_base=np.zeros(3), stance_height=height, kp=np.array(kp), kd=np.array(kd))
+    standing = pose(model, ids, home_joint_position(description))
+    com, inertia = _composite_inertia(model, standing, ids.base)
     return replace(description, base_inertia=inertia, com_in_base=com)
 
 
-def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, index: int, file: RobotFile,
-              home: Vector | None) -> LegGeometry:
+def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, index: int,
+              file: RobotFile, home: Vector | None) -> LegGeometry:
     name, foot = LEGS[index], ids.feet[index]
     joints = [int(joint) for joint in ids.joints[3 * index:3 * index + 3]]
     sign = check_leg(model, at_zero, name, joints, foot, ids.base)
     anchor = at_zero.xanchor[joints]
     if tuple(np.sign(anchor[1, :2])) != _PLACE_OF_LEG[name]:
-        raise ParameterError(f'leg {name} is not where its name says: with x forward and y left its hip joint '
-                             f'is at x = {anchor[1, 0]:.3f} m, y = {anchor[1, 1]:.3f} m')
+        raise ParameterError(
+            f'leg {name} is not where its name says: with x forward and y left its hip joint is '
+            f'at x = {anchor[1, 0]:.3f} m, y = {anchor[1, 1]:.3f} m')
     limited = model.jnt_limited[joints].astype(bool)
     bounds = np.where(limited[:, None], model.jnt_range[joints], (-np.pi, np.pi))
     thigh, shank = anchor[2] - anchor[1], foot_position(at_zero, foot) - anchor[2]
     knee = bounds[2].mean() if home is None else home[3 * index + 2]
     return LegGeometry(
-        name=name, hip_in_base=anchor[0].copy(), hip_offset=anchor[1] - anchor[0], thigh=thigh, shank=shank,
-        axis_sign=sign, knee_sign=_knee_sign(name, thigh, shank, sign[2] * knee),
+        name=name, hip_in_base=anchor[0].copy(), hip_offset=anchor[1] - anchor[0], thigh=thigh,
+        shank=shank, axis_sign=sign, knee_sign=_knee_sign(name, thigh, shank, sign[2] * knee),
         position_lower=bounds[:, 0].copy(), position_upper=bounds[:, 1].copy(),
-        torque_limit=np.array(file.torque_limit or [torque_limit(model, joint) for joint in joints]),
+        torque_limit=np.array(file.torque_limit or [torque_limit(model, j) for j in joints]),
         velocity_limit=np.array(file.velocity_limit or (USUAL_VELOCITY_LIMIT,) * 3),
         rotor_inertia=model.dof_armature[model.jnt_dofadr[joints]].copy(), foot_radius=foot.radius)
 
 
 def _knee_sign(leg: str, thigh: Vector, shank: Vector, angle: float) -> int:
-    """Return the sign of the rotation about +y from thigh to shank, with the knee turned by an angle."""
+    """Return the sign of the rotation about +y from thigh to shank at a knee angle."""
     bend = angle + np.arctan2(thigh[2] * shank[0] - thigh[0] * shank[2], thigh[::2] @ shank[::2])
     bend = (bend + np.pi) % (2 * np.pi) - np.pi
     if abs(bend) < 0.05:
-        raise ParameterError(f"leg {leg}: which way the knee bends cannot be told: it is straight in the "
-                             "keyframe 'home', or in the middle of its range when there is none")
+        raise ParameterError(
+            f'leg {leg}: which way the knee bends cannot be told: it is straight in the keyframe '
+            "'home', or in the middle of its range when there is none")
     return int(np.sign(bend))
 
 
@@ -165,8 +177,8 @@ def _home_keyframe(model: mujoco.MjModel, ids: ModelIds) -> Vector | None:
     return None if key < 0 else model.key_qpos[key, model.jnt_qposadr[ids.joints]].copy()
 
 
-def _stance_height(model: mujoco.MjModel, ids: ModelIds, legs: tuple[LegGeometry, ...], leg_length: float,
-                   home: Vector | None) -> float:
+def _stance_height(model: mujoco.MjModel, ids: ModelIds, legs: tuple[LegGeometry, ...],
+                   leg_length: float, home: Vector | None) -> float:
     """Return the height at which the home keyframe's feet touch, or 0.7 of the leg's length."""
     usual = float(np.mean([STANCE_LEG_SHARE * leg_length + leg.foot_radius
                            - leg.hip_in_base[2] - leg.hip_offset[2] for leg in legs]))
@@ -177,13 +189,16 @@ def _stance_height(model: mujoco.MjModel, ids: ModelIds, legs: tuple[LegGeometry
     return height if 0.6 * usual < height < 1.3 * usual else usual
 
 
-def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData, base: int) -> tuple[Vector, Vector]:
-    """Return centre of mass (3,) and inertia about it (3, 3) of the base and all that hangs on it."""
-    bodies = [body for body in range(model.nbody) if model.body_rootid[body] == model.body_rootid[base]]
+def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData,
+                       base: int) -> tuple[Vector, Vector]:
+    """Return centre of mass (3,) and inertia about it (3, 3) of the base and all on it."""
+    root = model.body_rootid[base]
+    bodies = [body for body in range(model.nbody) if model.body_rootid[body] == root]
     mass, place = model.body_mass[bodies], data.xipos[bodies]
     com = mass @ place / mass.sum()
     inertia = np.zeros((3, 3))
     for body, m, arm in zip(bodies, mass, place - com):
         R = data.ximat[body].reshape(3, 3)
-        inertia += (R * model.body_inertia[body]) @ R.T + m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        inertia += (R * model.body_inertia[body]) @ R.T
+        inertia += m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     return com, inertia

@@ -33,8 +33,8 @@ INITIAL_PENETRATION = 1e-5  # [m] without any there would be no contact at the f
 class MujocoRobot:
     """A quadruped in MuJoCo behind the port ``Robot``.
 
-    Two runs from ``reset`` with the same targets are identical bit for bit. Contact forces, efforts and the
-    accelerometer are those of the last physics step before the stamp.
+    Two runs from ``reset`` with the same targets are identical bit for bit. Contact forces, efforts
+    and the accelerometer are those of the last physics step before the stamp.
 
     Parameters
     ----------
@@ -56,10 +56,11 @@ class MujocoRobot:
     """
 
     def __init__(self, robot_file: RobotFile | Path | str | None = None, tick_ns: int = 4_000_000,
-                 seed: int = 0, initial_spread: float = 0.0, initial_height: float | None = None) -> None:
+                 seed: int = 0, initial_spread: float = 0.0,
+                 initial_height: float | None = None) -> None:
         if not isinstance(robot_file, RobotFile):
             robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
-        self.model = model = load_model(robot_file.model)
+        self.model = model = load_model(robot_file.model, robot_file.base)
         self.description: RobotDescription = read_description(model, robot_file)
         self.tick_ns = tick_ns
         self._step_ns = round(model.opt.timestep * 1e9)
@@ -91,13 +92,15 @@ class MujocoRobot:
         self._drive.reset()
         self._tick, self._push = 0, (np.zeros(3), 0)
         spread = np.random.default_rng(self._seed).uniform(-1.0, 1.0, 12) * self._spread
-        height = (self.description.stance_height - INITIAL_PENETRATION if self._initial_height is None
-                  else self._initial_height)
+        height = self._initial_height
+        if height is None:
+            height = self.description.stance_height - INITIAL_PENETRATION
         b = self._base_qpos
         data.qpos[b:b + 7] = (0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0)
         data.qpos[self._qpos] = self._home + spread
         mujoco.mj_forward(model, data)
-        self._effort = self._drive.limited(standing_torque(model, data, self._ids, self._dof), np.zeros(12))
+        holding = standing_torque(model, data, self._ids, self._dof)
+        self._effort = self._drive.limited(holding, np.zeros(12))
         self._actuators.apply(data, self._effort)
         mujoco.mj_forward(model, data)
         d = self._base_dof
@@ -126,8 +129,9 @@ class MujocoRobot:
             step(model, data)
         self._tick += 1
         if not (np.isfinite(qpos).all() and np.isfinite(qvel).all()):
-            raise RobotError(f'the simulation became unstable in the tick that ends at '
-                             f'{self._tick * self.tick_ns * 1e-9:.3f} s; lower the gains kp and kd or the step')
+            raise RobotError('the simulation became unstable in the tick that ends at '
+                             f'{self._tick * self.tick_ns * 1e-9:.3f} s; lower the gains kp and '
+                             'kd or the physics step')
         self._acceleration_in_world = (qvel[d:d + 3] - before) / model.opt.timestep
         return self._state()
 
@@ -137,11 +141,13 @@ class MujocoRobot:
         Raises
         ------
         ParameterError
-            If the force is not three finite numbers or the duration is not a multiple of the physics step.
+            If the force is not three finite numbers, or the duration not a positive multiple of
+            the physics step.
         """
         force = np.array(force_in_world, dtype=float)
         if force.shape != (3,) or not np.isfinite(force).all():
-            raise ParameterError(f'a push must be three finite numbers [N], not {force_in_world!r}')
+            raise ParameterError(
+                f'a push must be three finite numbers [N], not {force_in_world!r}')
         self._push = (force, steps_per_tick(duration_ns, self._step_ns))
 
     def _push_on(self) -> None:
@@ -155,7 +161,7 @@ class MujocoRobot:
 
     @property
     def fallen(self) -> bool:
-        """Whether the base is below half the stance height, tilted by more than 60°, or on the ground."""
+        """Whether the base is below half its height, tilted by over 60°, or on the ground."""
         data, b = self.data, self._base_qpos
         x, y = data.qpos[b + 4], data.qpos[b + 5]
         upright = 1.0 - 2.0 * (x * x + y * y)  # cosine between the base's z and the world's
@@ -172,6 +178,7 @@ class MujocoRobot:
             (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
             (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
             (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))))
+        specific_force = self._acceleration_in_world - self.model.opt.gravity
         return RobotState(
             time_ns=self._tick * self.tick_ns,
             joint_position=data.qpos[self._qpos],
@@ -181,5 +188,5 @@ class MujocoRobot:
             base_quaternion=np.array((x, y, z, w)),
             base_velocity_in_base=data.qvel[d:d + 3] @ R_world_base,
             base_rate_in_base=data.qvel[d + 3:d + 6].copy(),
-            acceleration_in_base=(self._acceleration_in_world - self.model.opt.gravity) @ R_world_base,
+            acceleration_in_base=specific_force @ R_world_base,
             foot_force=self._contacts.foot_force(data))

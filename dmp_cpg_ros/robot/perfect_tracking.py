@@ -23,9 +23,9 @@ CONTACT_HEIGHT = 0.002  # [m] over the lowest foot within which a foot counts as
 class PerfectTrackingRobot:
     """Joints are exactly where they were told to be; the level body rides on its lowest feet.
 
-    After each tick the lowest foot touches the ground, and the body has moved and turned in the plane such that
-    the feet that stand before and after the tick stay where they were, in the least-squares sense. Roll and
-    pitch stay zero. The weight is shared evenly by the feet that stand.
+    After each tick the lowest foot touches the ground, and the body has moved and turned in the
+    plane such that the feet that stand before and after the tick stay where they were, in the
+    least-squares sense. Roll and pitch stay zero. The weight is shared evenly by the feet that stand.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ class PerfectTrackingRobot:
 
 
 def _planar_fit(moved: Vector, fixed: Vector) -> tuple[float, Vector]:
-    """Return angle and shift with the least Σ |R(angle) moved_i + shift − fixed_i|² over points (n, 2)."""
+    """Return angle and shift of least Σ |R(angle) moved_i + shift − fixed_i|², points (n, 2)."""
     if not len(moved):
         return 0.0, np.zeros(2)
     centre, target = moved.mean(axis=0), fixed.mean(axis=0)

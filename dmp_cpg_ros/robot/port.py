@@ -61,6 +61,6 @@ def steps_per_tick(tick_ns: int, step_ns: int) -> int:
         If the tick is not a positive whole multiple of the step: times would drift apart.
     """
     if tick_ns <= 0 or step_ns <= 0 or tick_ns % step_ns:
-        raise ParameterError(f'the control tick of {tick_ns} ns is not a positive whole multiple of the '
-                             f'physics step of {step_ns} ns')
+        raise ParameterError(f'{tick_ns} ns is not a positive whole multiple of the physics step '
+                             f'of {step_ns} ns')
     return tick_ns // step_ns

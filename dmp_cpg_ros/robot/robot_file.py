@@ -42,7 +42,8 @@ class RobotFile:
     stance_height : float or None
         Height of the base over the ground when standing [m]; None: from the model.
     kp, kd : tuple of float or None
-        Gains of the joint drive per joint of a leg [N m/rad], [N m s/rad]; None: from size and mass.
+        Gains of the joint drive per joint of a leg [N m/rad], [N m s/rad]; None: from size and
+        mass.
     torque_limit, velocity_limit : tuple of float or None
         Per joint of a leg [N m], [rad/s]; None: from the model, and a common value for the speed.
     """
@@ -59,7 +60,7 @@ class RobotFile:
 
 
 def own_robot_file() -> RobotFile:
-    """Return the names of the package's own robot; ``config/robots/mini_quadruped.yaml`` says the same."""
+    """Return what ``config/robots/mini_quadruped.yaml`` says, without looking for that file."""
     return RobotFile(
         model=find_model(OWN_MODEL, None), base='base_link',
         joints=tuple((f'{leg}_abduction', f'{leg}_hip', f'{leg}_knee') for leg in LEGS),
@@ -95,7 +96,7 @@ def load_robot_file(path: Path | str) -> RobotFile:
 
 
 def parse_robot_file(content: Any, where: str, folder: Path | None) -> RobotFile:
-    """Build a RobotFile from the YAML's content; `where` names it in errors, `folder` holds models."""
+    """Build a RobotFile from a YAML file's content; `where` names the file in errors."""
     if not isinstance(content, Mapping):
         raise ParameterError(f"{where}: a robot file is a mapping with {', '.join(_REQUIRED)}")
     for key in content:
@@ -113,7 +114,8 @@ def parse_robot_file(content: Any, where: str, folder: Path | None) -> RobotFile
         if not isinstance(names, (list, tuple)) or len(names) != len(JOINTS_OF_LEG):
             raise ParameterError(f"{where}: joints.{leg} must list the three joints "
                                  f"{', '.join(JOINTS_OF_LEG)}, not {names!r}")
-        joints.append(tuple(_text(name, f'joints.{leg}', where) for name in names))
+        abduction, hip, knee = (_text(name, f'joints.{leg}', where) for name in names)
+        joints.append((abduction, hip, knee))
     feet = tuple(_text(name, 'feet', where) for name in _by_leg(content['feet'], 'feet', where))
     height = content.get('stance_height')
     return RobotFile(
@@ -126,8 +128,8 @@ def parse_robot_file(content: Any, where: str, folder: Path | None) -> RobotFile
 def find_model(name: str, folder: Path | None) -> Path:
     """Return the path of a model file.
 
-    `name` is looked up relative to `folder` (the robot file's), then among the package's own models;
-    ``package://NAME/PATH`` is a file inside an installed Python package.
+    `name` is looked up relative to `folder` (the robot file's), then among the package's own
+    models; ``package://NAME/PATH`` is a file inside an installed Python package.
 
     Raises
     ------

@@ -16,8 +16,8 @@ def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,
                     dof: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the torques of statics, τ = h(q) − Σ J_iᵀ f_i, with vertical foot forces f_i.
 
-    The forces carry the weight and have no moment about the centre of mass; of all such forces those of
-    least norm are taken.
+    The forces carry the weight and have no moment about the centre of mass; of all such forces
+    those of least norm are taken.
 
     Parameters
     ----------
@@ -36,11 +36,13 @@ def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,
     places = [foot_position(data, foot) for foot in ids.feet]
     com = data.subtree_com[ids.base]
     weight = -model.body_subtreemass[ids.base] * model.opt.gravity[2]
-    balance = np.array([np.ones(4), [p[0] - com[0] for p in places], [p[1] - com[1] for p in places]])
+    arms = np.array(places) - com
+    balance = np.array([np.ones(4), arms[:, 0], arms[:, 1]])
     force = np.linalg.lstsq(balance, np.array([weight, 0.0, 0.0]), rcond=None)[0]
-    torque = data.qfrc_bias.copy()
+    torque: NDArray[np.float64] = data.qfrc_bias.copy()
     J = np.zeros((3, model.nv))
     for foot, place, f in zip(ids.feet, places, force):
         mujoco.mj_jac(model, data, J, None, place, foot.body)
         torque -= J[2] * f
-    return torque[dof]
+    at_joints: NDArray[np.float64] = torque[dof]
+    return at_joints
