@@ -165,7 +165,7 @@ def open_viewer(model: mujoco.MjModel, data: mujoco.MjData) -> Any | None:
     try:
         import mujoco.viewer as viewer
         return viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
-    except Exception as error:  # what a missing or broken OpenGL raises depends on the backend
+    except Exception as error:  # noqa: BLE001 (what a broken OpenGL raises varies)
         _log.warning('no window: %s', error)
         return None
 
@@ -178,7 +178,7 @@ def _renderer(model: mujoco.MjModel, width: int, height: int) -> tuple[Any | Non
     model.vis.map.zfar = max(model.vis.map.zfar, FAR_CLIPPING)
     try:
         return mujoco.Renderer(model, height, width), None
-    except Exception as error:  # what a missing or broken OpenGL raises depends on the backend
+    except Exception as error:  # noqa: BLE001 (what a broken OpenGL raises varies)
         reason = f'no pictures: OpenGL cannot draw offscreen here ({error})'
         _log.warning('%s', reason)
         return None, reason

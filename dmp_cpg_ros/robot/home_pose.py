@@ -47,7 +47,7 @@ def _leg(leg: LegGeometry, height: float) -> NDArray[np.float64]:
             f'leg {leg.name} cannot stand at a base height of {height:g} m: its hip joint would '
             f'be {down:.3f} m over the foot, the leg is {reach:.3f} m long')
     for angle, low, high, joint in zip(angles, leg.position_lower, leg.position_upper,
-                                       JOINTS_OF_LEG):
+                                       JOINTS_OF_LEG, strict=True):
         if not low <= angle <= high:
             raise ParameterError(
                 f'leg {leg.name}: standing at {height:g} m needs {angle:.3f} rad at the {joint}, '

@@ -14,9 +14,9 @@ from dmp_cpg_ros.robot.mujoco_import import mujoco
 class JointActuators:
     """Applies torques to twelve joints.
 
-    When every joint has a plain motor the motors get the torques. Otherwise all torques are applied
-    to the joints themselves, and the model's own actuators of these joints (position servos, say)
-    are switched off in ``model``.
+    When every joint has a plain motor the motors get the torques. Otherwise all torques are
+    applied to the joints themselves, and the model's own actuators of these joints (position
+    servos, say) are switched off in ``model``.
     """
 
     def __init__(self, model: mujoco.MjModel, joints: NDArray[np.int64]) -> None:

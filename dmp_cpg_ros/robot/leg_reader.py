@@ -97,7 +97,7 @@ def check_leg(model: mujoco.MjModel, data: mujoco.MjData, leg: str, joints: list
         That names the joint and says what was found.
     """
     signs = np.zeros(3)
-    for i, (role, joint) in enumerate(zip(JOINTS_OF_LEG, joints)):
+    for i, (role, joint) in enumerate(zip(JOINTS_OF_LEG, joints, strict=True)):
         name = model.joint(joint).name
         if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
             raise ParameterError(f"joint '{name}' ({role} of leg {leg}) is not a hinge")

@@ -22,8 +22,8 @@ def load_model(path: Path, base: str) -> mujoco.MjModel:
     """Compile a model for use as a robot.
 
     A floor is added when the world body has neither plane nor height field, a light that follows
-    the base when there is no light at all, and a sky when there is none. A physics step longer than
-    1 ms is shortened to 1 ms, the rate of the joint drive.
+    the base when there is no light at all, and a sky when there is none. A physics step longer
+    than 1 ms is shortened to 1 ms, the rate of the joint drive.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def load_model(path: Path, base: str) -> mujoco.MjModel:
         if not spec.lights and (body := spec.body(base)) is not None:
             _add_light(body)
         if not any(texture.type == _SKY for texture in spec.textures):
-            spec.add_texture(name='added_sky', type=_SKY, builtin=_GRADIENT, width=256, height=1536,
-                             rgb1=[0.36, 0.56, 0.80], rgb2=[0.86, 0.92, 0.97])
+            spec.add_texture(name='added_sky', type=_SKY, builtin=_GRADIENT, width=256,
+                             height=1536, rgb1=[0.36, 0.56, 0.80], rgb2=[0.86, 0.92, 0.97])
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise ParameterError(f"model '{path}' cannot be compiled: {error}") from error

@@ -197,7 +197,7 @@ def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData,
     mass, place = model.body_mass[bodies], data.xipos[bodies]
     com = mass @ place / mass.sum()
     inertia = np.zeros((3, 3))
-    for body, m, arm in zip(bodies, mass, place - com):
+    for body, m, arm in zip(bodies, mass, place - com, strict=True):
         R = data.ximat[body].reshape(3, 3)
         inertia += (R * model.body_inertia[body]) @ R.T
         inertia += m * (arm @ arm * np.eye(3) - np.outer(arm, arm))

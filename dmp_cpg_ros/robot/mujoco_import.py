@@ -3,9 +3,10 @@
 """The one place that imports MuJoCo, so that it works where pictures cannot be drawn.
 
 MuJoCo picks its OpenGL backend from the environment variable ``MUJOCO_GL`` while it is imported,
-and with ``egl`` or ``osmesa`` that import fails when the library is missing. The simulation needs no
-OpenGL at all, so the variable is checked first: without a screen it becomes ``egl`` where EGL can be
-loaded and ``disable`` elsewhere. Every module of this package that needs MuJoCo takes it from here.
+and with ``egl`` or ``osmesa`` that import fails when the library is missing. The simulation needs
+no OpenGL at all, so the variable is checked first: without a screen it becomes ``egl`` where EGL
+can be loaded and ``disable`` elsewhere. Every module of this package that needs MuJoCo takes it
+from here.
 """
 
 from __future__ import annotations

@@ -33,8 +33,8 @@ INITIAL_PENETRATION = 1e-5  # [m] without any there would be no contact at the f
 class MujocoRobot:
     """A quadruped in MuJoCo behind the port ``Robot``.
 
-    Two runs from ``reset`` with the same targets are identical bit for bit. Contact forces, efforts
-    and the accelerometer are those of the last physics step before the stamp.
+    Two runs from ``reset`` with the same targets are identical bit for bit. Contact forces,
+    efforts and the accelerometer are those of the last physics step before the stamp.
 
     Parameters
     ----------

@@ -25,7 +25,8 @@ class PerfectTrackingRobot:
 
     After each tick the lowest foot touches the ground, and the body has moved and turned in the
     plane such that the feet that stand before and after the tick stay where they were, in the
-    least-squares sense. Roll and pitch stay zero. The weight is shared evenly by the feet that stand.
+    least-squares sense. Roll and pitch stay zero. The weight is shared evenly by the feet that
+    stand.
 
     Parameters
     ----------

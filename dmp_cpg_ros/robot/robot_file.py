@@ -110,7 +110,7 @@ def parse_robot_file(content: Any, where: str, folder: Path | None) -> RobotFile
     model, base = _text(content['model'], 'model', where), _text(content['base'], 'base', where)
     per_leg = _by_leg(content['joints'], 'joints', where)
     joints = []
-    for leg, names in zip(LEGS, per_leg):
+    for leg, names in zip(LEGS, per_leg, strict=True):
         if not isinstance(names, (list, tuple)) or len(names) != len(JOINTS_OF_LEG):
             raise ParameterError(f"{where}: joints.{leg} must list the three joints "
                                  f"{', '.join(JOINTS_OF_LEG)}, not {names!r}")

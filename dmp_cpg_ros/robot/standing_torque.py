@@ -41,7 +41,7 @@ def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,
     force = np.linalg.lstsq(balance, np.array([weight, 0.0, 0.0]), rcond=None)[0]
     torque: NDArray[np.float64] = data.qfrc_bias.copy()
     J = np.zeros((3, model.nv))
-    for foot, place, f in zip(ids.feet, places, force):
+    for foot, place, f in zip(ids.feet, places, force, strict=True):
         mujoco.mj_jac(model, data, J, None, place, foot.body)
         torque -= J[2] * f
     at_joints: NDArray[np.float64] = torque[dof]
