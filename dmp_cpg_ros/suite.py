@@ -16,11 +16,17 @@ from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.gait_network import CanonicalParameters
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters
-from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.posture import PostureParameters
 from dmp_cpg_ros.core.reference import ReferenceParameters
 from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, MujocoRobotParameters, SuiteParameters
+from dmp_cpg_ros.core.suite_parameters import (
+    NODE_PARAMETERS,
+    GaitParameters,
+    RobotFileParameters,
+    RobotParameters,
+    SuiteParameters,
+    TickParameters,
+)
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""
@@ -36,8 +42,10 @@ class Suite:
         Parameters of the parts.
     gait : Gait
         The gait that is named.
-    robot : MujocoRobotParameters
-        Parameters of the robot.
+    robot : RobotParameters
+        How the robot is run.
+    tick_ns : int
+        Control tick [ns].
     robot_file : Path
         The robot file that is named.
     file : Path
@@ -46,7 +54,8 @@ class Suite:
 
     parameters: SuiteParameters
     gait: Gait
-    robot: MujocoRobotParameters
+    robot: RobotParameters
+    tick_ns: int
     robot_file: Path
     file: Path
 
@@ -102,57 +111,65 @@ def load_suite(file: str | Path | None = None, overrides: Mapping[str, Any] | No
     DmpCpgError
         If the file is not there, or a name or value in it is wrong; the text says where and what is valid.
     """
-    path = find_config(file or DEFAULT_FILE)
-    overrides = dict(overrides or {})
-    sets = {kind: node_set(path, kind, overrides) for kind in NODE_PARAMETERS}
-    every_name = {field.name for cls in NODE_PARAMETERS.values() for field in dataclasses.fields(cls)}
-    unknown = [name for name in overrides if name not in every_name]
-    if unknown:
-        raise ParameterError(f"there is no parameter '{unknown[0]}'; valid are {', '.join(sorted(every_name))}")
+    path, overrides = find_config(file or DEFAULT_FILE), dict(overrides or {})
+    for name in overrides:
+        if name not in SUITE_NAMES:
+            raise ParameterError(f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}")
+    sets = {kind: node_sets(path, kind, overrides) for kind in NODE_PARAMETERS}
     canonical, robot = sets['canonical_oscillators'], sets['mujoco_robot']
-    assert isinstance(robot, MujocoRobotParameters)
     parameters = SuiteParameters(
-        _part(sets['reference_filter'], ReferenceParameters), _part(canonical, CanonicalParameters),
-        _part(sets['inhibition'], InhibitionParameters), _part(sets['leg_transformation'], LegParameters),
-        _part(sets['posture_control'], PostureParameters))
-    values = dataclasses.asdict(canonical)
-    return Suite(parameters, load_gait(values['gait'], values['gaits_file']), robot, find_config(robot.robot),
-                 path)
+        sets['reference_filter'][ReferenceParameters], canonical[CanonicalParameters],
+        sets['inhibition'][InhibitionParameters], sets['leg_transformation'][LegParameters],
+        sets['posture_control'][PostureParameters])
+    gait = canonical[GaitParameters]
+    return Suite(parameters, load_gait(gait.gait, gait.gaits_file), robot[RobotParameters],
+                 robot[TickParameters].tick_ns, find_config(robot[RobotFileParameters].robot), path)
 
 
-def node_set(path: Path, kind: str, overrides: Mapping[str, Any] | None = None) -> Parameters:
-    """Parameter set of one kind of node from a parameter file.
+def node_sets(path: Path, kind: str, overrides: Mapping[str, Any] | None = None) -> dict[type[Any], Any]:
+    """Parameter sets of one kind of node from a parameter file.
 
-    Values for other nodes under ``/**`` are left aside; names that no node has are errors. The legs'
-    own sections ``leg_fl`` … must agree, since one set stands for the four.
+    Values for other nodes under ``/**`` are left aside; names that no node has are errors. Of the four legs the
+    section of fl is read.
+
+    Parameters
+    ----------
+    path : Path
+        Parameter file.
+    kind : str
+        Kind of node, a key of ``NODE_PARAMETERS``.
+    overrides : mapping, optional
+        Values by parameter name; names that this kind has not are left aside.
+
+    Returns
+    -------
+    dict of class → instance
 
     Raises
     ------
     DmpCpgError
         As :func:`load_suite`.
     """
-    cls = NODE_PARAMETERS[kind]
-    names = {field.name for field in dataclasses.fields(cls)}
-    every_name = {field.name for other in NODE_PARAMETERS.values() for field in dataclasses.fields(other)}
-    node = f'leg_{LEGS[0]}' if kind == 'leg_transformation' else kind
-    values: dict[str, Any] = {}
-    for name, value in node_parameters(path, node).items():
-        if name in names:
-            values[name] = value
-        elif name not in every_name and name not in NODE_NAMES:
+    node = f'{kind}_{LEGS[0]}' if kind == 'leg_transformation' else kind
+    given = {**node_parameters(path, node), **(overrides or {})}
+    for name in given:
+        if name not in SUITE_NAMES and name not in NODE_NAMES:
             raise ParameterError(f"'{path}', {node}: there is no parameter '{name}'; valid are "
-                                 f"{', '.join(sorted(names))}")
-    values.update({name: value for name, value in (overrides or {}).items() if name in names})
-    try:
-        return cls.from_mapping(values, f"'{path}', {node}")
-    except DmpCpgError as error:
-        raise ParameterError(f"'{path}', {node}: {error}") from error
+                                 f"{', '.join(sorted(SUITE_NAMES))}")
+    sets: dict[type[Any], Any] = {}
+    for cls in NODE_PARAMETERS[kind]:
+        names = {field.name for field in dataclasses.fields(cls)}
+        try:
+            sets[cls] = cls(**{name: value for name, value in given.items() if name in names})
+        except DmpCpgError as error:
+            raise ParameterError(f"'{path}', {node}: {error}") from error
+    return sets
 
 
-NODE_NAMES = ('autostart', 'executor', 'use_sim_time', 'storage', 'output', 'topics', 'flush_period')
+SUITE_NAMES = frozenset(field.name for sets in NODE_PARAMETERS.values() for cls in sets
+                        for field in dataclasses.fields(cls))
+"""Names of all parameters of all parts."""
+
+NODE_NAMES = ('autostart', 'executor', 'expected_nodes', 'lock_step', 'use_sim_time', 'storage', 'output', 'topics',
+              'flush_period')
 """Parameters that nodes have as nodes, not for their part of the core."""
-
-
-def _part(values: Parameters, cls: type[Any]) -> Any:
-    """The fields of one part out of a node's set."""
-    return cls(**{field.name: getattr(values, field.name) for field in dataclasses.fields(cls)})

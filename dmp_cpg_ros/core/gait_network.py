@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,10 @@ from dmp_cpg_ros.core.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.robot_state import LEGS
 
 Array = NDArray[np.float64]
+
+
+LONGEST_STEP = 0.005
+"""Longest time step of the oscillators [s]."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +63,15 @@ class GaitNetwork:
         return self.gait.omega(self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2])), self.scale)
 
     def step(self, x: Array, r: Array, inhibition: Inhibition, dt: float) -> Array:
-        """Advance the states (4, 2) by dt [s] at reference r under an inhibition that is switched by region."""
-        gains = inhibition.acting_gains(x, self.system.target)
-        return self.system.step(x, self.omega(r), gains, dt)
+        """Advance the states (4, 2) by dt [s] at reference r under an inhibition that is switched by region.
+
+        After a gap in the robot's states the time is made up in parts of at most ``LONGEST_STEP``.
+        """
+        parts = max(1, ceil(dt / LONGEST_STEP - 1e-9))
+        for _ in range(parts):
+            gains = inhibition.acting_gains(x, self.system.target)
+            x = self.system.step(x, self.omega(r), gains, dt / parts)
+        return x
 
     def rate(self, x: Array, r: Array, inhibition: Inhibition) -> Array:
         """Rate of the states, ẋ (4, 2) [1/s]."""
