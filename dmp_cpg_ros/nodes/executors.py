@@ -1,0 +1,162 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Running nodes: which executor, how long, and what the process says at its end."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Sequence
+from types import FrameType
+
+import rclpy
+from rclpy.context import Context
+from rclpy.exceptions import ParameterException
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.task import Future
+from rclpy.utilities import get_default_context, remove_ros_args
+
+from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
+from dmp_cpg_ros.nodes.help_text import help_text
+from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
+
+FOREVER_S = 1e6
+"""A wait that is bounded, since unbounded waits of the events executor do not work in some builds [s]."""
+
+OK, FAILED, BAD_INPUT = 0, 1, 2
+"""Exit statuses."""
+
+
+def make_executor(kind: str, context: Context | None = None) -> Executor:
+    """Make an executor.
+
+    Parameters
+    ----------
+    kind : str
+        ``events`` or ``single``. Where the events executor is missing or does not run a first task, the
+        single-threaded one is returned, with a warning.
+    context : Context, optional
+        Default: the global one.
+    """
+    if kind == 'events':
+        try:
+            from rclpy.experimental import EventsExecutor
+            executor = EventsExecutor(context=context or get_default_context())
+            task = executor.create_task(lambda: True)
+            executor.spin_until_future_complete(task, timeout_sec=2.0)
+            if task.done():
+                return executor
+            reason = 'it did not run a first task'
+        except (ImportError, AttributeError, TypeError, RuntimeError) as error:
+            reason = str(error)
+        get_logger('executor').warning(f'no events executor ({reason}); using the single-threaded one')
+    return SingleThreadedExecutor(context=context)
+
+
+def spin(nodes: Node | Sequence[Node], kind: str = 'events', until: Future | None = None) -> None:
+    """Run nodes of one context in one executor until it is shut down or a future is done.
+
+    Parameters
+    ----------
+    nodes : Node or sequence of Node
+        Several nodes make up a composed process.
+    kind : str
+        As for :func:`make_executor`.
+    until : Future, optional
+        Ends the run.
+    """
+    nodes = [nodes] if isinstance(nodes, Node) else list(nodes)
+    context, until = nodes[0].context, until or Future()
+    executor = make_executor(kind, context)
+    try:
+        for node in nodes:
+            executor.add_node(node)
+        while context.ok() and not until.done():
+            begin = time.monotonic()
+            executor.spin_until_future_complete(until, timeout_sec=FOREVER_S)
+            if context.ok() and not until.done() and time.monotonic() - begin < 1.0:
+                raise RuntimeError('the executor returned at once; choose another with parameter executor')
+    except ExternalShutdownException:
+        pass
+    except Exception:
+        if context.ok():
+            raise
+    finally:
+        for node in nodes:
+            executor.remove_node(node)
+
+
+def run_node(node_class: type[ManagedNode], arguments: Sequence[str] | None = None) -> int:
+    """Body of the executable of a node.
+
+    Parameters
+    ----------
+    node_class : type of ManagedNode
+        Kind of node.
+    arguments : sequence of str, optional
+        Command line without the program's name; default that of the process.
+
+    Returns
+    -------
+    int
+        Exit status: 0 after Ctrl-C or SIGTERM, 2 when a parameter or argument is bad, 1 when something else failed.
+    """
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if {'-h', '--help'} & set(_before_ros_args(arguments)):
+        print(help_text(node_class))
+        return OK
+    # rclpy's own handler ends the context; Python's would raise KeyboardInterrupt inside a callback.
+    signal.signal(signal.SIGINT, _ignore)
+    node: ManagedNode | None = None
+    initialised = False
+    try:
+        unknown = remove_ros_args([node_class.KIND, *arguments])[1:]
+        if unknown:
+            raise ParameterError(f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
+        rclpy.init(args=[node_class.KIND, *arguments])
+        initialised = True
+        node = node_class(node_class.default_name(arguments))
+        node.start()
+        spin(node, node.parameters_of(NodeParameters).executor)
+        return OK
+    except ExternalShutdownException:
+        return OK
+    except (ParameterError, MissingFileError, ParameterException) as error:
+        return _failed(node_class, str(error), BAD_INPUT)
+    except DmpCpgError as error:
+        return _failed(node_class, str(error), FAILED)
+    except Exception as error:
+        if initialised and not rclpy.ok():
+            return OK
+        if type(error).__name__ in ('RCLInvalidROSArgsError', 'UnknownROSArgsError'):
+            return _failed(node_class, str(error), BAD_INPUT)
+        return _failed(node_class, traceback.format_exc(), FAILED)
+    finally:
+        _end(node)
+
+
+def _end(node: ManagedNode | None) -> None:
+    try:
+        if node is not None:
+            node.close()
+            node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+def _failed(node_class: type[ManagedNode], message: str, status: int) -> int:
+    print(f'{node_class.KIND}: {message}', file=sys.stderr, flush=True)
+    return status
+
+
+def _before_ros_args(arguments: list[str]) -> list[str]:
+    return arguments[:arguments.index('--ros-args')] if '--ros-args' in arguments else arguments
+
+
+def _ignore(signum: int, frame: FrameType | None) -> None:
+    """Leave the interrupt to rclpy's handler."""

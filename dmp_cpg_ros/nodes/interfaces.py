@@ -1,0 +1,191 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every topic and service of the suite in one table: name, type, quality of service, who writes and who reads.
+
+Quality of service. What is sent at every tick is reliable: in lock-step a single lost message would stop the run,
+and in a recording it would be a hole. REP-2003 asks *consumers* of sensor data to be best effort; a reliable
+publisher matches such consumers too, so users' tools lose nothing by this choice. Our own consumers are reliable.
+Nothing can block: keep-last publishers overwrite their oldest message when a reader hangs.
+
+Depths. A publisher keeps ``PUBLISHER_DEPTH`` messages, because that is what can still be sent again to a reader that
+was not scheduled for a while (the recorder is on no tick's path and may lag). The suite's nodes are never more than
+two ticks apart in lock-step; their depth bounds how far a late node works through old ticks in real time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
+from std_srvs.srv import SetBool, Trigger
+
+from dmp_cpg_ros.core.errors import ParameterError
+
+PUBLISHER_DEPTH = 200
+"""Messages that a publisher of every tick keeps for readers that lag (0.8 s at 250 Hz)."""
+
+READER_DEPTH = 10
+"""Messages of one publisher that a node of the suite queues."""
+
+RECORDER_DEPTH = 2000
+"""Messages per topic that the recorder queues."""
+
+INSTANCES = {'leg_transformation': 4}
+"""How many nodes of a kind make up the suite, where it is not one."""
+
+SUITE = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition', 'posture_control',
+         'mujoco_robot', 'bag_recorder')
+"""Kinds of nodes in the order of the data flow."""
+
+GATE_OWNER = 'mujoco_robot'
+"""The node that holds the gate; its private topics bear its name."""
+
+
+def _qos(depth: int, *, latched: bool = False) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE)
+
+
+@dataclass(frozen=True)
+class Interface:
+    """One topic or service.
+
+    Attributes
+    ----------
+    name : str
+        Relative name, absolute where it starts with ``/``, private where it starts with ``~/``.
+    type : type
+        Message or service class.
+    meaning : str
+        What it carries, in a few words.
+    publishers, subscribers : tuple of str
+        Kinds of nodes that write and read it; of a service: that serve and call it. The recorder reads every
+        topic and is named nowhere; ``user`` stands for whoever is outside the suite.
+    latched : bool
+        Whether a late reader gets the last message (transient local, depth 1).
+    service : bool
+        Whether it is a service.
+    """
+
+    name: str
+    type: type[Any]
+    meaning: str
+    publishers: tuple[str, ...]
+    subscribers: tuple[str, ...]
+    latched: bool = False
+    service: bool = False
+
+    @property
+    def publisher_qos(self) -> QoSProfile:
+        """Profile that publishers offer."""
+        return _qos(1, latched=True) if self.latched else _qos(PUBLISHER_DEPTH)
+
+    @property
+    def reader_qos(self) -> QoSProfile:
+        """Profile with which the suite's nodes read; deep enough for one tick's messages of every publisher."""
+        if self.latched:
+            return _qos(1, latched=True)
+        return _qos(READER_DEPTH * max(1, expected_count(self.publishers)))
+
+    @property
+    def recorder_qos(self) -> QoSProfile:
+        """Profile with which the recorder reads: compatible with what is offered, and deep."""
+        return _qos(RECORDER_DEPTH, latched=self.latched)
+
+    @property
+    def type_name(self) -> str:
+        """ROS name of the type, such as ``sensor_msgs/msg/JointState``."""
+        package, kind = self.type.__module__.split('.')[:2]
+        return f'{package}/{kind}/{self.type.__name__}'
+
+
+def expected_count(kinds: tuple[str, ...] | list[str]) -> int:
+    """Number of nodes that some kinds of nodes stand for."""
+    return sum(INSTANCES.get(kind, 1) for kind in kinds)
+
+
+TOPICS: tuple[Interface, ...] = (
+    Interface('cmd_vel', Twist, 'commanded speed and turn rate (TwistStamped with stamped_cmd_vel)',
+              ('user',), ('reference_filter',)),
+    Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z', ('reference_filter',),
+              ('canonical_oscillators', 'leg_transformation', 'inhibition', 'posture_control')),
+    Interface('canonical_state', JointState, 'oscillators: position = x, velocity = its rate',
+              ('canonical_oscillators',), ('leg_transformation', 'inhibition', 'posture_control')),
+    Interface('posture_feedback', JointState, 'balance: effort = torques, position = foot placement shifts',
+              ('posture_control',), ('leg_transformation',)),
+    Interface('joint_targets', JointState, 'targets of the three joints of one leg', ('leg_transformation',),
+              ('mujoco_robot',)),
+    Interface('joint_states', JointState, 'measured joints; the tick of the suite', ('mujoco_robot',),
+              ('reference_filter', 'leg_transformation', 'posture_control')),
+    Interface('imu', Imu, 'inertial measurement in base_link', ('mujoco_robot',), ()),
+    Interface('odom', Odometry, 'pose and twist of base_link in odom', ('mujoco_robot',), ('posture_control',)),
+    Interface('foot_contacts', JointState, 'effort = normal force of each foot', ('mujoco_robot',),
+              ('posture_control',)),
+    Interface('/clock', Clock, 'the clock of the robot', ('mujoco_robot',), ()),
+    Interface('inhibition_state', DiagnosticArray, 'stop and start: state word, gains, times', ('inhibition',),
+              ('reference_filter', 'canonical_oscillators'), latched=True),
+    Interface('/diagnostics', DiagnosticArray, 'health of every node', SUITE, ()),
+    Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds', (GATE_OWNER,), ('user',),
+              latched=True),
+    Interface(f'{GATE_OWNER}/advance_until', Clock, 'stamp up to which the gate lets ticks pass', ('user',),
+              (GATE_OWNER,)),
+)
+"""Topics of the suite."""
+
+SERVICES: tuple[Interface, ...] = (
+    Interface('inhibit', SetBool, 'true stops the gait, false resumes it', ('inhibition',), ('user',), service=True),
+    Interface('~/ready', Trigger, 'whether the node is active and connected with its neighbours', SUITE, ('user',),
+              service=True),
+)
+"""Services of the suite."""
+
+INTERFACES: dict[str, Interface] = {interface.name: interface for interface in TOPICS + SERVICES}
+
+
+def interface(name: str) -> Interface:
+    """Look an interface up.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that name; the valid names are listed.
+    """
+    try:
+        return INTERFACES[name]
+    except KeyError:
+        raise ParameterError(f"there is no interface '{name}'; valid are {', '.join(INTERFACES)}") from None
+
+
+def published_by(kind: str) -> tuple[Interface, ...]:
+    """Topics that a kind of node writes."""
+    return tuple(topic for topic in TOPICS if kind in topic.publishers)
+
+
+def read_by(kind: str) -> tuple[Interface, ...]:
+    """Topics that a kind of node reads; the recorder reads all."""
+    if kind == 'bag_recorder':
+        return TOPICS
+    return tuple(topic for topic in TOPICS if kind in topic.subscribers)
+
+
+def served_by(kind: str) -> tuple[Interface, ...]:
+    """Services that a kind of node offers."""
+    return tuple(service for service in SERVICES if kind in service.publishers)
+
+
+def readers_of(topic: Interface) -> tuple[str, ...]:
+    """Kinds of nodes of the suite that read a topic, the recorder included."""
+    readers = tuple(kind for kind in SUITE if kind in topic.subscribers)
+    return readers + ('bag_recorder',)
+
+
+STAMPED_CMD_VEL = Interface('cmd_vel', TwistStamped, 'commanded speed and turn rate', ('user',),
+                            ('reference_filter',))
+"""``cmd_vel`` with parameter ``stamped_cmd_vel:=true``."""

@@ -1,0 +1,76 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a node is connected with the nodes that it works with.
+
+Discovery is not symmetric in time: a reader may know a writer before the writer knows the reader, and a reliable
+volatile writer sends nothing to readers that it does not know yet. So each node answers for its own ends only: its
+expected partners are in the graph, and as many ends as the graph shows are matched here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.subscription import Subscription
+
+from dmp_cpg_ros.nodes.interfaces import INSTANCES, Interface, readers_of
+
+
+def missing_connections(node: Node, kind: str, outputs: Sequence[tuple[Interface, Publisher]],
+                        inputs: Sequence[tuple[Interface, Subscription]],
+                        expected: Collection[str]) -> list[str]:
+    """List what is missing.
+
+    Parameters
+    ----------
+    node : Node
+        The node.
+    kind : str
+        Its kind.
+    outputs, inputs : sequences of pairs
+        Its publishers and subscriptions with their interfaces.
+    expected : collection of str
+        Kinds of nodes that take part; others are not waited for.
+
+    Returns
+    -------
+    list of str
+        One text per missing connection.
+    """
+    missing: list[str] = []
+    for topic, publisher in outputs:
+        ends = node.get_subscriptions_info_by_topic(publisher.topic_name)
+        absent = _absent(ends, readers_of(topic), kind, expected)
+        missing += [f'{topic.name} is not read by {name}' for name in absent]
+        known = sum(_compatible(publisher.qos_profile, end.qos_profile) for end in ends)
+        if not absent and publisher.get_subscription_count() < known:
+            missing.append(f'{topic.name} is not matched with all of its {known} readers')
+    for topic, subscription in inputs:
+        ends = node.get_publishers_info_by_topic(subscription.topic_name)
+        absent = _absent(ends, topic.publishers, kind, expected)
+        missing += [f'{topic.name} is not published by {name}' for name in absent]
+        known = sum(_compatible(end.qos_profile, subscription.qos_profile) for end in ends)
+        if not absent and subscription.get_publisher_count() < known:
+            missing.append(f'{topic.name} is not matched with all of its {known} publishers')
+    return missing
+
+
+def _absent(ends: Sequence[Any], partners: Sequence[str], kind: str, expected: Collection[str]) -> list[str]:
+    """Partners that are expected and not, or not in full number, among the ends of a topic."""
+    absent = []
+    for partner in partners:
+        if partner not in expected or partner == kind:
+            continue
+        needed = INSTANCES.get(partner, 1)
+        found = sum(end.node_name == partner or end.node_name.startswith(f'{partner}_') for end in ends)
+        if found < needed:
+            absent.append(partner if needed == 1 else f'{partner} ({found} of {needed})')
+    return absent
+
+
+def _compatible(offered: QoSProfile, requested: QoSProfile) -> bool:
+    return bool(qos_check_compatible(offered, requested)[0] != QoSCompatibility.ERROR)

@@ -1,0 +1,201 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Matching of messages by stamp: what belongs to one tick, however the messages arrive.
+
+The class knows no ROS, so that its rules can be tested by themselves; :func:`drain` takes any rclpy subscription.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+TickCallback = Callable[[int, dict[str, Any]], None]
+
+RESET_NS = 100_000_000
+"""A stamp that lies this far behind the last tick means that the robot was reset [ns]."""
+
+PENDING_TICKS = 16
+"""Ticks that may be incomplete at one time; older ones are forgotten."""
+
+PATIENCE = 3
+"""In real time: ticks in a row that an input may miss before ticks stop waiting for it."""
+
+
+class TickInputs:
+    """Collects the inputs of each tick and calls back once per tick, in the order of the stamps.
+
+    In lock-step a tick fires when every input with its stamp is there, and every delayed input with the stamp of the
+    tick before (at the first tick delayed inputs are None). In real time it fires the same way, or else, when the
+    trigger of a later tick arrives, with the newest value of each input that was lost.
+
+    Parameters
+    ----------
+    on_tick : callable (stamp_ns, values)
+        Called with the stamp [ns] and a dict from the name of each input to its value.
+    inputs : sequence of str
+        Inputs that bear the stamp of the tick.
+    trigger : str
+        The input without which there is no tick; one of ``inputs``.
+    delayed : sequence of str
+        Inputs that act one tick later. In real time the one that arrived last acts.
+    optional : sequence of str
+        Of ``inputs``: those without which a tick may run in real time; their value is None until the first arrives.
+    lock_step : bool
+        Whether ticks wait for exact stamps.
+    """
+
+    def __init__(self, on_tick: TickCallback, inputs: Sequence[str], trigger: str, *, delayed: Sequence[str] = (),
+                 optional: Sequence[str] = (), lock_step: bool = False) -> None:
+        """Start without any message."""
+        if trigger not in inputs or not set(optional) <= set(inputs) - {trigger} or set(delayed) & set(inputs):
+            raise ValueError('the trigger and the optional inputs must be inputs, the delayed ones must not')
+        self._on_tick, self._inputs, self._trigger = on_tick, tuple(inputs), trigger
+        self._delayed, self._optional, self._lock_step = tuple(delayed), frozenset(optional), lock_step
+        self._others = tuple(name for name in inputs if name != trigger)
+        self._held: dict[str, Any] = dict.fromkeys(delayed)
+        self.ignored = 0
+        self.incomplete = 0
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all ticks and their messages.
+
+        What was counted stays, and so do delayed inputs in real time: those are sent when they change.
+        """
+        self._pending: dict[int, dict[str, Any]] = {}
+        self._newest: dict[str, tuple[int, Any]] = {}
+        self._late: dict[str, dict[int, Any]] = {name: {} for name in self._delayed}
+        self._missed = dict.fromkeys(self._inputs, 0)
+        self.last_ns: int | None = None
+
+    def add(self, name: str, stamp_ns: int, value: Any) -> None:
+        """Take a message; ticks that it completes are fired before this returns.
+
+        Parameters
+        ----------
+        name : str
+            Input.
+        stamp_ns : int
+            Stamp of the message [ns].
+        value : object
+            Its content.
+        """
+        if name in self._held:
+            self._add_delayed(name, stamp_ns, value)
+            return
+        last = self.last_ns
+        if last is not None and stamp_ns <= last - RESET_NS:
+            self.reset()
+            last = None
+        newest = self._newest.get(name)
+        if newest is None or stamp_ns > newest[0]:
+            self._newest[name] = (stamp_ns, value)
+            if last is None or stamp_ns >= last:
+                self._missed[name] = 0
+        if last is not None and stamp_ns <= last:
+            self.ignored += 1
+            return
+        tick = self._pending.setdefault(stamp_ns, {})
+        if name in tick:
+            self.ignored += 1
+            return
+        tick[name] = value
+        if self._lock_step:
+            self._fire_exact()
+        else:
+            self._fire_newest(name == self._trigger, stamp_ns)
+        if len(self._pending) > PENDING_TICKS:
+            del self._pending[min(self._pending)]
+            self.incomplete += 1
+
+    def _add_delayed(self, name: str, stamp_ns: int, value: Any) -> None:
+        if not self._lock_step:
+            self._held[name] = value
+            return
+        late = self._late[name]
+        late[stamp_ns] = value
+        if len(late) > PENDING_TICKS:
+            del late[min(late)]
+        self._fire_exact()
+
+    def _fire_exact(self) -> None:
+        """Lock-step: fire the oldest tick once it is complete; later ticks never overtake it."""
+        while self._pending:
+            stamp = min(self._pending)
+            tick, last = self._pending[stamp], self.last_ns
+            if len(tick) < len(self._inputs):
+                return
+            for name in self._delayed:
+                if last is not None and last not in self._late[name]:
+                    return
+                tick[name] = None if last is None else self._late[name][last]
+            self._fire(stamp, tick)
+
+    def _fire_newest(self, triggered: bool, stamp_ns: int) -> None:
+        """Real time: fire ticks that a later trigger has overtaken, then this one if nothing is worth waiting for."""
+        if triggered and len(self._pending) > 1:
+            for stamp in sorted(self._pending):
+                if stamp < stamp_ns and stamp in self._pending:
+                    self._fire_incomplete(stamp)
+        tick = self._pending.get(stamp_ns)
+        if tick is None or self._trigger not in tick:
+            return
+        for name in self._others:
+            if name not in tick and self._missed[name] < PATIENCE:
+                return
+        self._fire_incomplete(stamp_ns)
+
+    def _fire_incomplete(self, stamp: int) -> None:
+        tick = self._pending[stamp]
+        if self._trigger not in tick:
+            del self._pending[stamp]
+            self.incomplete += 1
+            return
+        for name in self._others:
+            if name in tick:
+                continue
+            self._missed[name] += 1
+            if name in self._newest:
+                tick[name] = self._newest[name][1]
+            elif name in self._optional:
+                tick[name] = None
+            else:
+                del self._pending[stamp]
+                self.incomplete += 1
+                return
+        tick.update(self._held)
+        self._fire(stamp, tick)
+
+    def _fire(self, stamp: int, tick: dict[str, Any]) -> None:
+        del self._pending[stamp]
+        for name, late in self._late.items() if self._lock_step else ():
+            self._late[name] = {at: value for at, value in late.items() if at >= stamp}
+        self.last_ns = stamp
+        self._on_tick(stamp, tick)
+
+
+def drain(subscription: Any) -> int:
+    """Take what waits in a subscription's queue now, in order, as the executor would.
+
+    A node calls this for its command topics at the start of its tick, so that commands which arrived before the tick
+    act in it whatever the executor's order. The executor later finds the queue empty, which it takes in its stride.
+
+    Parameters
+    ----------
+    subscription : rclpy.subscription.Subscription
+        Its callback is called for every message.
+
+    Returns
+    -------
+    int
+        Number of messages taken.
+    """
+    count, handle, msg_type, raw = 0, subscription.handle, subscription.msg_type, subscription.raw
+    while True:
+        with handle:
+            taken = handle.take_message(msg_type, raw)
+        if taken is None:
+            return count
+        count += 1
+        subscription.callback(taken[0])
