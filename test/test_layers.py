@@ -1,0 +1,95 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nothing imports upwards: the layers of doc/architecture.md, enforced."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from graphlib import TopologicalSorter
+
+import pytest
+from checkout import PACKAGE, ROOT, imports, modules
+
+MESSAGES = {'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'lifecycle_msgs', 'nav_msgs',
+            'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'}
+ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', *MESSAGES}
+RECORDS = {'rosbags', 'mcap'}
+FIGURES = {'matplotlib', 'PIL'}
+EVERYTHING = {'numpy', 'yaml', 'mujoco', *ROS, *RECORDS, *FIGURES}
+
+# layer: (own layers below it, packages of others); the standard library is everyone's.
+LAYERS = {
+    'core': (set(), {'numpy'}),
+    'configuration': ({'core'}, {'yaml'}),
+    'suite': ({'core', 'configuration'}, set()),
+    'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml', 'PIL'}),
+    'nodes': ({'core', 'configuration', 'suite', 'robot'}, {'numpy', *ROS, *RECORDS}),
+    'analysis': ({'core', 'configuration', 'suite'}, {'numpy', *RECORDS, *FIGURES}),
+    'commands': ({'core', 'configuration', 'suite', 'robot', 'nodes', 'analysis'}, EVERYTHING),
+    'models': (set(), set()),
+    '': (set(), set()),  # the package itself: its version
+}
+
+
+def layer_of(module: str) -> str:
+    """Second word of a module's name: dmp_cpg_ros.core.phase is of core."""
+    return module.split('.')[1] if '.' in module else ''
+
+
+def test_the_table_is_that_of_the_architecture() -> None:
+    text = (ROOT / 'doc' / 'architecture.md').read_text(encoding='utf-8')
+    described = set(re.findall(rf'^\| `{PACKAGE}\.(\w+)` \|', text, re.MULTILINE))
+    assert described == set(LAYERS) - {'', 'models'}
+
+
+def test_every_module_is_in_a_layer() -> None:
+    assert {layer_of(module) for module in modules()} <= set(LAYERS)
+
+
+@pytest.mark.parametrize('layer', [layer for layer in LAYERS if layer])
+def test_a_layer_imports_only_what_is_below_it(layer: str) -> None:
+    own, foreign = LAYERS[layer]
+    wrong = []
+    for module, path in modules().items():
+        if layer_of(module) != layer:
+            continue
+        for name in sorted(imports(module, path)):
+            top = name.split('.')[0]
+            if top == PACKAGE:
+                allowed = layer_of(name) in {layer, '', *own}
+            else:
+                allowed = top in foreign or top in sys.stdlib_module_names
+            if not allowed:
+                wrong.append(f'{module} imports {name}')
+    assert not wrong, '\n'.join(wrong)
+
+
+def test_no_import_runs_in_a_circle() -> None:
+    known = modules()
+    graph = {module: imports(module, path, at_import_time=True) & set(known) - {module}
+             for module, path in known.items()}
+    list(TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle
+
+
+@pytest.mark.parametrize(('layers', 'unwanted'), [
+    (['core'], EVERYTHING - {'numpy'}),
+    (['configuration', 'models', 'analysis'], ROS | {'mujoco'}),
+    (['robot'], ROS | RECORDS),
+])
+def test_importing_a_layer_loads_nothing_that_it_must_do_without(
+        layers: list[str], unwanted: set[str]) -> None:
+    names = [module for module in modules() if layer_of(module) in layers]
+    program = (
+        'import importlib, sys\n'
+        'before = set(sys.modules)\n'
+        f'for name in {names!r}:\n'
+        '    importlib.import_module(name)\n'
+        "    loaded = {module.split('.')[0] for module in set(sys.modules) - before}\n"
+        f'    wrong = loaded & {unwanted!r}\n'
+        '    if wrong:\n'
+        "        sys.exit(f'{name} loads {wrong}')\n")
+    done = subprocess.run([sys.executable, '-c', program], cwd=ROOT, capture_output=True,
+                          text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
