@@ -85,8 +85,9 @@ def _messages(recording: Recording, stamped: bool) -> Iterator[tuple[int, str, s
         yield _ns(time) + 500_000, 'cmd_vel', message.__msgtype__, message
     for event in recording.inhibition:
         yield _ns(event.time), 'inhibition_state', *_status({'inhibition': event})
-    for name, event in recording.diagnostics.items():
-        yield _ns(event.time), '/diagnostics', *_status({name: event})
+    for name, history in recording.statuses.items():
+        for event in history:
+            yield _ns(event.time), '/diagnostics', *_status({name: event})
 
 
 def _robot_messages(recording: Recording) -> Iterator[tuple[int, str, str, Any]]:

@@ -150,7 +150,7 @@ class SyntheticWalk:
             odometry=OdometrySeries(t, position, quaternion, velocity, rate),
             imu=ImuSeries(t, quaternion, rate, gravity), feet=FootForceSeries(t, force),
             posture=PostureSeries(t, 0.1 * effort, np.zeros((len(t), 4, 2))),
-            inhibition=self.events(), diagnostics=self.diagnostics())
+            inhibition=self.events(), statuses=self.statuses())
 
     def _joint_angles(self, position: Array, yaw: Array) -> Array:
         feet = self.feet_in_world() - position[:, None]
@@ -181,8 +181,9 @@ class SyntheticWalk:
             StatusEvent(self.release_s, 0, 'releasing', start),
             StatusEvent(walk_s, 0, 'walking', {**start, 'measured_s': repr(self.time_to_walk_s)}))
 
-    def diagnostics(self) -> dict[str, StatusEvent]:
-        """What the robot says about its timing."""
-        return {'mujoco_robot: timing': StatusEvent(self.time[-1], 0, 'running', {
-            'rate_hz': repr(self.rate_hz), 'real_time_factor': '0.998', 'latency_ms_p50': '1.25',
-            'latency_ms_p99': '3.5', 'deadline_misses': '2'})}
+    def statuses(self) -> dict[str, tuple[StatusEvent, ...]]:
+        """What the robot says about its timing, once a second."""
+        return {'mujoco_robot: timing': tuple(StatusEvent(float(second), 0, 'running', {
+            'rate_hz': repr(self.rate_hz), 'real_time_factor': '0.998', 'latency_ms_p50': repr(1.25 + 0.01 * second),
+            'latency_ms_p99': '3.5', 'deadline_misses': str(second // 4)})
+            for second in range(1, int(self.end_s)))}

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.named_values import NamedValues
 from dmp_cpg_ros.analysis.recording import (
-    CanonicalSeries, FootForceSeries, ImuSeries, JointSeries, OdometrySeries, PostureSeries, Recording,
-    StatusEvent, VelocitySeries)
+    ArrivalSeries, CanonicalSeries, FootForceSeries, ImuSeries, JointSeries, OdometrySeries, PostureSeries,
+    Recording, StatusEvent, VelocitySeries)
 from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS
 
 Array = NDArray[np.float64]
@@ -34,10 +34,12 @@ class Collector:
         self._clock: tuple[list[int], list[int]] = ([], [])      # bag time, robot's clock [ns]
         self._ticks: tuple[list[int], list[int]] = ([], [])
         self._inhibition: list[StatusEvent] = []
-        self._diagnostics: dict[str, StatusEvent] = {}
+        self._statuses: dict[str, list[StatusEvent]] = {}
+        self._last_target: dict[int, int] = {}                   # stamp, bag time of the last leg [ns]
         self._handlers: dict[tuple[str, str], Handler] = {
             ('joint_states', 'sensor_msgs/msg/JointState'): self._take_joint_states,
-            **{(name, 'sensor_msgs/msg/JointState'): self._taker_of_named(name) for name in JOINT_TOPICS[1:]},
+            ('joint_targets', 'sensor_msgs/msg/JointState'): self._take_joint_targets,
+            **{(name, 'sensor_msgs/msg/JointState'): self._taker_of_named(name) for name in JOINT_TOPICS[2:]},
             ('reference', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('reference'),
             ('cmd_vel', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('cmd_vel'),
             ('cmd_vel', 'geometry_msgs/msg/Twist'): self._take_unstamped_twist,
@@ -73,7 +75,8 @@ class Collector:
             odometry=OdometrySeries(odometry[0], *np.split(odometry[1], (3, 7, 10), axis=1)),
             imu=ImuSeries(imu[0], *np.split(imu[1], (4, 7), axis=1)),
             feet=self._feet(), posture=self._posture(), inhibition=tuple(self._inhibition),
-            diagnostics=self._diagnostics, counts=counts)
+            statuses={name: tuple(history) for name, history in self._statuses.items()},
+            arrivals=self._arrivals(), counts=counts)
 
     def _joints(self, topic: str) -> JointSeries:
         time, values = self._named[topic].table(JOINT_NAMES)
@@ -95,6 +98,16 @@ class Collector:
         bag_ns, unstamped = self._unstamped_commands
         stamped = [*stamps, *_robot_clock(bag_ns, self._clock if self._clock[0] else self._ticks)]
         return VelocitySeries(*_stacked((stamped, rows + unstamped), 3))
+
+    def _arrivals(self) -> ArrivalSeries:
+        stamps = np.array(self._ticks[1], dtype=np.int64)
+        targets = np.array([self._last_target.get(stamp, np.nan) for stamp in self._ticks[1]], dtype=float)
+        return ArrivalSeries(stamps / 1e9, np.array(self._ticks[0], dtype=np.int64) / 1e9, targets / 1e9)
+
+    def _take_joint_targets(self, bag_ns: int, message: Any) -> None:
+        stamp = _stamp_ns(message.header.stamp)
+        self._last_target[stamp] = bag_ns
+        self._named['joint_targets'].add(stamp, message)
 
     def _take_joint_states(self, bag_ns: int, message: Any) -> None:
         stamp = _stamp_ns(message.header.stamp)
@@ -140,7 +153,8 @@ class Collector:
                 self._inhibition.append(event)
 
     def _take_diagnostics(self, _: int, message: Any) -> None:
-        self._diagnostics.update(_events(message))
+        for name, event in _events(message).items():
+            self._statuses.setdefault(name, []).append(event)
 
 
 def _stamp_ns(stamp: Any) -> int:

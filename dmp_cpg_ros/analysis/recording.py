@@ -186,6 +186,29 @@ class StatusEvent:
 
 
 @dataclass(frozen=True)
+class ArrivalSeries:
+    """When the recorder got a tick's state and the last of its targets.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        Stamp of the tick [s].
+    state, targets : ndarray (n,)
+        Record times [s]: of ``joint_states``, and of the last ``joint_targets`` with the same stamp (NaN
+        without). They are on whatever clock the recorder used.
+    """
+
+    time: Array = field(default_factory=no_rows)
+    state: Array = field(default_factory=no_rows)
+    targets: Array = field(default_factory=no_rows)
+
+    @property
+    def on_wall_clock(self) -> bool:
+        """Whether the record times tell anything: they do not when the recorder copied stamps."""
+        return self.time.size > 1 and bool(np.ptp(self.state - self.time) > 1e-6)
+
+
+@dataclass(frozen=True)
 class Recording:
     """One run.
 
@@ -207,8 +230,10 @@ class Recording:
         Balance feedback.
     inhibition : tuple of StatusEvent
         ``inhibition_state`` where it changed.
-    diagnostics : mapping of str to StatusEvent
-        The last status of every name.
+    statuses : mapping of str to tuple of StatusEvent
+        What every name on ``/diagnostics`` said, in order.
+    arrivals : ArrivalSeries
+        Record times of the ticks.
     counts : mapping of str to int
         Messages per recorded topic.
     """
@@ -223,8 +248,14 @@ class Recording:
     feet: FootForceSeries = field(default_factory=FootForceSeries)
     posture: PostureSeries = field(default_factory=PostureSeries)
     inhibition: tuple[StatusEvent, ...] = ()
-    diagnostics: Mapping[str, StatusEvent] = field(default_factory=dict)
+    statuses: Mapping[str, tuple[StatusEvent, ...]] = field(default_factory=dict)
+    arrivals: ArrivalSeries = field(default_factory=ArrivalSeries)
     counts: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def diagnostics(self) -> dict[str, StatusEvent]:
+        """The last status of every name on ``/diagnostics``."""
+        return {name: history[-1] for name, history in self.statuses.items() if history}
 
     @property
     def span(self) -> tuple[float, float]:

@@ -1,0 +1,93 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Gait diagram: when each foot was planned to stand, and when it did."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.episodes import RUNNING, episodes, gait_period, steady_segments
+from dmp_cpg_ros.analysis.figures import style
+from dmp_cpg_ros.analysis.motion import held
+from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.core.leg_primitive import body_scale
+from dmp_cpg_ros.core.phase import phase
+from dmp_cpg_ros.core.robot_state import LEGS
+
+CAPTION = ('Footfall diagram: bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles of '
+           'steady walking. Bottom: the first stop, at whose end all four feet stand, and the start after it.')
+
+CYCLES = 6
+"""Gait cycles of steady walking that are drawn."""
+
+
+def draw(recording: Recording, context: RunContext) -> Figure | None:
+    """Draw steady walking and the first stop; None without contact forces."""
+    if not recording.feet.time.size:
+        return None
+    steady, stop = steady_window(recording), style.stop_window(recording)
+    windows = [stop] if steady is None else [steady, stop]
+    figure, axes = style.new_figure(1.75 * len(windows) + 0.5, len(windows))
+    for panel, window in zip(axes[:, 0], windows, strict=True):
+        _diagram(panel, recording, context, window)
+    shades = style.shade_stops(axes[-1, 0], recording)
+    axes[-1, 0].set_xlabel('time [s]')
+    planned = [Patch(color='#BBBBBB', label='planned')] if context.gait is not None else []
+    figure.legend(handles=[Patch(color='#555555', label='measured'), *planned, *shades],
+                  loc='outside upper center', ncols=4)
+    return figure
+
+
+def steady_window(recording: Recording, cycles: int = CYCLES) -> tuple[float, float] | None:
+    """Last cycles of the first steady walking, None when there is none [s]."""
+    segments, period = steady_segments(recording), gait_period(recording)
+    if not segments or period is None:
+        return None
+    start, end = segments[0]
+    return max(start, end - cycles * period), end
+
+
+def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool_] | None:
+    """Which feet the gait plans on the ground at the canonical states' times, boolean ndarray (n, 4).
+
+    While a stop or a start is under way every foot is planned where it is, and nothing is drawn.
+    """
+    canonical, reference = recording.canonical, recording.reference
+    if context.gait is None or context.robot is None or not (canonical.time.size and reference.time.size):
+        return None
+    scale = body_scale(context.robot)
+    values = held(reference.time, reference.value, canonical.time)
+    duty = np.array([context.gait.duty(scale.foot_speed(*value), scale) for value in values])
+    stance = np.abs(context.gait.cycle_position(phase(canonical.x))) >= 0.5 * (1.0 - duty[:, None])
+    running = np.zeros(len(canonical.time), dtype=bool)
+    for episode in episodes(recording, RUNNING):
+        running |= (canonical.time >= episode.start) & (canonical.time < episode.end)
+    return stance & (running if recording.inhibition else True)[:, None]
+
+
+def _diagram(axes: Axes, recording: Recording, context: RunContext, window: tuple[float, float]) -> None:
+    contact = recording.feet.force > context.contact_force
+    planned = planned_stance(recording, context)
+    for row, leg in enumerate(LEGS):
+        y = len(LEGS) - 1 - row
+        if planned is not None:
+            axes.broken_barh(bars(recording.canonical.time, planned[:, row]), (y - 0.4, 0.8),
+                             facecolor=style.LEG_COLOURS[leg], alpha=0.28, linewidth=0)
+        axes.broken_barh(bars(recording.feet.time, contact[:, row]), (y - 0.22, 0.44),
+                         facecolor=style.LEG_COLOURS[leg], linewidth=0)
+    axes.set_yticks(range(len(LEGS)), [style.LEG_NAMES[leg] for leg in reversed(LEGS)])
+    axes.set_ylim(-0.6, len(LEGS) - 0.4)
+    axes.grid(visible=False, axis='y')
+    style.limit_view(axes, window)
+
+
+def bars(time: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """Start and length of each stretch in which a mask holds [s]."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return [(float(time[first]), float(time[min(last, len(time) - 1)] - time[first]))
+            for first, last in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,120 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One look for all figures: sizes, colours that colour-blind readers can tell apart, shared marks.
+
+Figures are made without pyplot: nothing is global and nothing needs a screen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from dmp_cpg_ros.analysis.episodes import STOPPING, episodes
+from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.core.robot_state import LEGS
+
+WIDTH = 7.2
+"""Width of every figure [inch], that of a page."""
+
+DPI = 200
+
+LEG_COLOURS = dict(zip(LEGS, ('#0072B2', '#D55E00', '#009E73', '#CC79A7'), strict=True))
+"""Okabe & Ito's palette, which keeps its contrast with every kind of colour vision."""
+
+LEG_NAMES = dict(zip(LEGS, ('front left', 'front right', 'rear left', 'rear right'), strict=True))
+
+INK, GREY, MEASURED, REFERENCE = '#222222', '#8A8A8A', '#0072B2', '#222222'
+WAITING, INHIBITED = '#F6E8B1', '#D9DEE4'
+
+_PARAMETERS: dict[str, Any] = {
+    'font.family': 'sans-serif', 'font.size': 8.5, 'axes.labelsize': 8.5, 'axes.titlesize': 8.5,
+    'legend.fontsize': 8.0, 'xtick.labelsize': 8.0, 'ytick.labelsize': 8.0, 'mathtext.fontset': 'dejavusans',
+    'axes.spines.top': False, 'axes.spines.right': False, 'axes.edgecolor': '#555555', 'axes.linewidth': 0.7,
+    'axes.labelcolor': INK, 'text.color': INK, 'xtick.color': '#555555', 'ytick.color': '#555555',
+    'xtick.labelcolor': INK, 'ytick.labelcolor': INK, 'axes.grid': True, 'grid.color': '#E4E4E4',
+    'grid.linewidth': 0.6, 'axes.axisbelow': True, 'lines.linewidth': 1.2, 'legend.frameon': False,
+    'figure.facecolor': 'white', 'axes.facecolor': 'white', 'savefig.dpi': DPI, 'figure.dpi': DPI,
+    'axes.titlelocation': 'left', 'axes.titlepad': 4.0, 'agg.path.chunksize': 10_000}
+
+
+@contextmanager
+def applied() -> Iterator[None]:
+    """Context in which figures are made and saved; a user's own matplotlibrc does not matter in it."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_PARAMETERS)
+        yield
+
+
+def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
+    """Figure of page width and its axes, ndarray (rows, columns).
+
+    Parameters
+    ----------
+    height : float
+        [inch]
+    rows, columns : int
+        Panels.
+    **options
+        For :meth:`matplotlib.figure.Figure.subplots`.
+    """
+    figure = Figure(figsize=(WIDTH, height), layout='constrained')
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def leg_legend(figure: Figure, extra: list[Any] | None = None) -> None:
+    """Legend of the four legs, and more handles, in one row above the panels."""
+    lines = [Line2D([], [], color=LEG_COLOURS[leg], label=LEG_NAMES[leg]) for leg in LEGS]
+    handles = lines + (extra or [])
+    figure.legend(handles=handles, loc='outside upper center', ncols=len(handles), columnspacing=1.3,
+                  handlelength=1.5, handletextpad=0.5)
+
+
+def shade_stops(axes: Axes, recording: Recording) -> list[Patch]:
+    """Shade the time in which a stop is requested and in which inhibition holds; returns legend handles."""
+    waiting = inhibited = False
+    for episode in episodes(recording, STOPPING):
+        captures = [event.time for event in episode.events if event.message != 'waiting']
+        capture = captures[0] if captures else episode.end
+        if capture > episode.start:
+            axes.axvspan(episode.start, capture, color=WAITING, linewidth=0, zorder=0)
+            waiting = True
+        if episode.end > capture:
+            axes.axvspan(capture, episode.end, color=INHIBITED, linewidth=0, zorder=0)
+            inhibited = True
+    return ([Patch(color=WAITING, label='stop requested')] * waiting
+            + [Patch(color=INHIBITED, label='inhibited')] * inhibited)
+
+
+def limit_view(axes: Axes, window: tuple[float, float]) -> None:
+    """Show a time window [s] without margins."""
+    axes.set_xlim(*window)
+    axes.margins(x=0.0)
+
+
+def stop_window(recording: Recording, before: float = 2.5, after: float = 2.5,
+                longest: float = 14.0) -> tuple[float, float]:
+    """Window around the first stop that was asked for, up to the walking after it [s].
+
+    Without a stop it is the end of the recording.
+    """
+    first, last = recording.span
+    for episode in episodes(recording, STOPPING):
+        if episode.events[0].message != 'at_rest':
+            start = max(first, episode.start - before)
+            return start, min(last, episode.end + after, start + longest)
+    return max(first, last - before - after), last
+
+
+def rows_in(time: Any, window: tuple[float, float]) -> Any:
+    """Rows of a time axis in a window, boolean ndarray."""
+    return (np.asarray(time) >= window[0]) & (np.asarray(time) <= window[1])

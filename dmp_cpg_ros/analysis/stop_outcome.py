@@ -1,0 +1,158 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What became of one stop and start, and what a set of them has in common."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis.foot_motion import foot_slip
+from dmp_cpg_ros.analysis.metrics.stops import STILL_SPEED
+from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.core.robot_description import RobotDescription
+
+Array = NDArray[np.float64]
+
+STANDING_WINDOW = 0.5
+"""Time at the end of the hold in which the robot must stand still [s]."""
+
+WALKING_ERROR = 0.1
+"""Share of the commanded speed by which a robot that walks on may miss it."""
+
+
+@dataclass(frozen=True)
+class StopOutcome:
+    """Outcome of one stop and start.
+
+    Attributes
+    ----------
+    fell : bool
+        Whether the robot fell between request and end.
+    standing : bool
+        Whether it stood at the end of the hold: all feet loaded, body below 1 cm/s.
+    walked_on : bool
+        Whether it walked at the commanded speed within 10 % after the resume.
+    predicted_s, bound_s, measured_s : float
+        Time to rest of the oscillators: predicted, bounded, measured [s]; NaN where there is none.
+    body_rest_s : float
+        Time after which the body stays below 1 cm/s [s].
+    slip_m : float
+        Distance slid under load before the body was at rest, the mean over the feet [m].
+    displacement_m : float
+        Horizontal distance that the body moved from the request to rest [m].
+    resumed_speed : float
+        Mean forward speed after the resume [m/s].
+    """
+
+    fell: bool
+    standing: bool = False
+    walked_on: bool = False
+    predicted_s: float = float('nan')
+    bound_s: float = float('nan')
+    measured_s: float = float('nan')
+    body_rest_s: float = float('nan')
+    slip_m: float = float('nan')
+    displacement_m: float = float('nan')
+    resumed_speed: float = float('nan')
+
+    @property
+    def prediction_error(self) -> float:
+        """Share of the measured time by which the prediction missed it; NaN without either."""
+        return abs(self.predicted_s - self.measured_s) / self.measured_s
+
+    @property
+    def bound_exceeded(self) -> bool:
+        """Whether the measured time is longer than its bound; false without a bound."""
+        return self.measured_s > self.bound_s + 1e-9
+
+
+def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float) -> dict[str, float]:
+    """Standing, time to rest, slip and displacement of the recorded hold.
+
+    Parameters
+    ----------
+    hold : Recording
+        Joints, odometry and foot forces from the request to the resume.
+    robot : RobotDescription
+        The robot.
+    contact_force : float
+        Load from which a foot counts as standing [N].
+
+    Returns
+    -------
+    dict
+        The fields ``standing``, ``body_rest_s``, ``slip_m`` and ``displacement_m`` of StopOutcome.
+    """
+    odometry = hold.odometry
+    speed = np.linalg.norm(odometry.velocity_in_base, axis=1)
+    time = odometry.time - odometry.time[0]
+    last = time > time[-1] - STANDING_WINDOW
+    standing = bool((speed[last] < STILL_SPEED).all() and (hold.feet.force[last] > contact_force).all())
+    moving = np.flatnonzero(speed >= STILL_SPEED)
+    rest = min(moving[-1] + 1, len(time) - 1) if moving.size else 0
+    path = odometry.position_in_world[:rest + 1, :2]
+    slip = foot_slip(_first_rows(hold, rest + 1), robot, contact_force)
+    return {'standing': standing, 'body_rest_s': float(time[rest]),
+            'slip_m': 0.0 if slip is None else float(slip.mean()),
+            'displacement_m': float(np.hypot(*(path[-1] - path[0])))}
+
+
+def _first_rows(hold: Recording, count: int) -> Recording:
+    joints, odometry, feet = hold.joints, hold.odometry, hold.feet
+    return Recording(
+        joints=type(joints)(joints.time[:count], joints.position[:count], joints.velocity[:count],
+                            joints.effort[:count]),
+        odometry=type(odometry)(odometry.time[:count], odometry.position_in_world[:count],
+                                odometry.quaternion[:count], odometry.velocity_in_base[:count],
+                                odometry.rate_in_base[:count]),
+        feet=type(feet)(feet.time[:count], feet.force[:count]))
+
+
+@dataclass(frozen=True)
+class StopSummary:
+    """What a set of outcomes has in common; times, errors and lengths as (median, worst).
+
+    Attributes
+    ----------
+    count, fell, standing, walked_on, bounded, bound_exceeded : int
+        Numbers of cases; ``bounded`` are those that have a bound.
+    prediction_error : tuple of float
+        Share of the measured time.
+    measured_s, body_rest_s : tuple of float
+        [s]
+    slip_m, displacement_m : tuple of float
+        [m]
+    """
+
+    count: int
+    fell: int
+    standing: int
+    walked_on: int
+    bounded: int
+    bound_exceeded: int
+    prediction_error: tuple[float, float]
+    measured_s: tuple[float, float]
+    body_rest_s: tuple[float, float]
+    slip_m: tuple[float, float]
+    displacement_m: tuple[float, float]
+
+
+def summary(outcomes: Sequence[StopOutcome]) -> StopSummary:
+    """Summarise outcomes; those that fell count, but have no times or lengths."""
+    def number(name: str) -> int:
+        return sum(bool(getattr(outcome, name)) for outcome in outcomes)
+
+    def spread(name: str) -> tuple[float, float]:
+        values = np.array([getattr(outcome, name) for outcome in outcomes if not outcome.fell])
+        values = values[np.isfinite(values)]
+        return (float(np.median(values)), float(values.max())) if values.size else (np.nan, np.nan)
+
+    return StopSummary(
+        len(outcomes), number('fell'), number('standing'), number('walked_on'),
+        sum(np.isfinite(outcome.bound_s) for outcome in outcomes), number('bound_exceeded'),
+        spread('prediction_error'), spread('measured_s'), spread('body_rest_s'), spread('slip_m'),
+        spread('displacement_m'))
