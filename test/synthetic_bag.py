@@ -21,8 +21,15 @@ WALL_PER_ROBOT = 1.1
 """A wall clock that runs faster than the robot's: a real-time factor of 1/1.1."""
 
 
-def write_bag(recording: Recording, folder: Path, *, storage: StoragePlugin = StoragePlugin.MCAP,
-              wall_clock: bool = False, namespace: str = '', stamped_commands: bool = False) -> Path:
+def write_bag(
+    recording: Recording,
+    folder: Path,
+    *,
+    storage: StoragePlugin = StoragePlugin.MCAP,
+    wall_clock: bool = False,
+    namespace: str = '',
+    stamped_commands: bool = False,
+) -> Path:
     """Write a bag.
 
     Parameters
@@ -42,7 +49,9 @@ def write_bag(recording: Recording, folder: Path, *, storage: StoragePlugin = St
     """
     with Writer(folder, version=9, storage_plugin=storage) as writer:
         connections: dict[str, Any] = {}
-        for time_ns, topic, kind, message in sorted(_messages(recording, stamped_commands), key=lambda m: m[0]):
+        for time_ns, topic, kind, message in sorted(
+            _messages(recording, stamped_commands), key=lambda m: m[0]
+        ):
             name = topic if topic.startswith('/') else f'{namespace}/{topic}'
             if name not in connections:
                 connections[name] = writer.add_connection(name, kind, typestore=STORE)
@@ -59,24 +68,56 @@ def make(kind: str, **fields: Any) -> Any:
 def _messages(recording: Recording, stamped: bool) -> Iterator[tuple[int, str, str, Any]]:
     yield from _robot_messages(recording)
     for time, value in zip(recording.reference.time, recording.reference.value, strict=True):
-        yield _ns(time), 'reference', 'geometry_msgs/msg/TwistStamped', make(
-            'geometry_msgs/msg/TwistStamped', header=_header(time, 'base_link'), twist=_twist(*value))
+        yield (
+            _ns(time),
+            'reference',
+            'geometry_msgs/msg/TwistStamped',
+            make(
+                'geometry_msgs/msg/TwistStamped',
+                header=_header(time, 'base_link'),
+                twist=_twist(*value),
+            ),
+        )
     names = [f'{leg}_x{k}' for leg in LEGS for k in (1, 2)]
-    for time, x, x_dot in zip(recording.canonical.time, recording.canonical.x, recording.canonical.x_dot,
-                              strict=True):
-        yield _ns(time), 'canonical_state', *_joint_state(time, names, x.ravel(), x_dot.ravel(), np.array([]))
+    for time, x, x_dot in zip(
+        recording.canonical.time, recording.canonical.x, recording.canonical.x_dot, strict=True
+    ):
+        yield (
+            _ns(time),
+            'canonical_state',
+            *_joint_state(time, names, x.ravel(), x_dot.ravel(), np.array([])),
+        )
     names = [*JOINT_NAMES, *(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xy')]
     posture = recording.posture
-    for time, torque, shift in zip(posture.time, posture.torque, posture.foot_shift_in_base, strict=True):
-        yield _ns(time), 'posture_feedback', *_joint_state(
-            time, names, np.concatenate([np.zeros(12), shift.ravel()]), np.zeros(20),
-            np.concatenate([torque, np.zeros(8)]))
+    for time, torque, shift in zip(
+        posture.time, posture.torque, posture.foot_shift_in_base, strict=True
+    ):
+        yield (
+            _ns(time),
+            'posture_feedback',
+            *_joint_state(
+                time,
+                names,
+                np.concatenate([np.zeros(12), shift.ravel()]),
+                np.zeros(20),
+                np.concatenate([torque, np.zeros(8)]),
+            ),
+        )
     for row, time in enumerate(recording.targets.time):
         for leg in range(4):
             columns = slice(3 * leg, 3 * leg + 3)
-            yield _ns(time), 'joint_targets', *_joint_state(
-                time, JOINT_NAMES[columns], *(getattr(recording.targets, name)[row, columns]
-                                              for name in ('position', 'velocity', 'effort')))
+            yield (
+                _ns(time),
+                'joint_targets',
+                *_joint_state(
+                    time,
+                    JOINT_NAMES[columns],
+                    *(
+                        getattr(recording.targets, name)[row, columns]
+                        for name in ('position', 'velocity', 'effort')
+                    ),
+                ),
+            )
     for time, value in zip(recording.commands.time, recording.commands.value, strict=True):
         message = _twist(*value)
         if stamped:
@@ -91,46 +132,103 @@ def _messages(recording: Recording, stamped: bool) -> Iterator[tuple[int, str, s
 
 
 def _robot_messages(recording: Recording) -> Iterator[tuple[int, str, str, Any]]:
-    joints, odometry, imu, feet = recording.joints, recording.odometry, recording.imu, recording.feet
+    joints, odometry, imu, feet = (
+        recording.joints,
+        recording.odometry,
+        recording.imu,
+        recording.feet,
+    )
     for row, time in enumerate(joints.time):
-        yield _ns(time), '/clock', 'rosgraph_msgs/msg/Clock', make('rosgraph_msgs/msg/Clock', clock=_stamp(time))
-        yield _ns(time), 'joint_states', *_joint_state(
-            time, JOINT_NAMES, joints.position[row], joints.velocity[row], joints.effort[row])
+        yield (
+            _ns(time),
+            '/clock',
+            'rosgraph_msgs/msg/Clock',
+            make('rosgraph_msgs/msg/Clock', clock=_stamp(time)),
+        )
+        yield (
+            _ns(time),
+            'joint_states',
+            *_joint_state(
+                time, JOINT_NAMES, joints.position[row], joints.velocity[row], joints.effort[row]
+            ),
+        )
     for time, force in zip(feet.time, feet.force, strict=True):
-        yield _ns(time), 'foot_contacts', *_joint_state(time, LEGS, np.array([]), np.array([]), force)
+        yield (
+            _ns(time),
+            'foot_contacts',
+            *_joint_state(time, LEGS, np.array([]), np.array([]), force),
+        )
     for row, time in enumerate(imu.time):
-        yield _ns(time), 'imu', 'sensor_msgs/msg/Imu', make(
-            'sensor_msgs/msg/Imu', header=_header(time, 'base_link'),
-            orientation=_quaternion(imu.quaternion[row]), orientation_covariance=np.zeros(9),
-            angular_velocity=_vector(imu.rate_in_base[row]), angular_velocity_covariance=np.zeros(9),
-            linear_acceleration=_vector(imu.acceleration_in_base[row]), linear_acceleration_covariance=np.zeros(9))
+        yield (
+            _ns(time),
+            'imu',
+            'sensor_msgs/msg/Imu',
+            make(
+                'sensor_msgs/msg/Imu',
+                header=_header(time, 'base_link'),
+                orientation=_quaternion(imu.quaternion[row]),
+                orientation_covariance=np.zeros(9),
+                angular_velocity=_vector(imu.rate_in_base[row]),
+                angular_velocity_covariance=np.zeros(9),
+                linear_acceleration=_vector(imu.acceleration_in_base[row]),
+                linear_acceleration_covariance=np.zeros(9),
+            ),
+        )
     for row, time in enumerate(odometry.time):
         yield _ns(time), 'odom', 'nav_msgs/msg/Odometry', _odometry(odometry, row, time)
 
 
 def _odometry(odometry: Any, row: int, time: float) -> Any:
     x, y, z = (float(value) for value in odometry.position_in_world[row])
-    pose = make('geometry_msgs/msg/Pose', position=make('geometry_msgs/msg/Point', x=x, y=y, z=z),
-                orientation=_quaternion(odometry.quaternion[row]))
-    twist = make('geometry_msgs/msg/Twist', linear=_vector(odometry.velocity_in_base[row]),
-                 angular=_vector(odometry.rate_in_base[row]))
-    return make('nav_msgs/msg/Odometry', header=_header(time, 'odom'), child_frame_id='base_link',
-                pose=make('geometry_msgs/msg/PoseWithCovariance', pose=pose, covariance=np.zeros(36)),
-                twist=make('geometry_msgs/msg/TwistWithCovariance', twist=twist, covariance=np.zeros(36)))
+    pose = make(
+        'geometry_msgs/msg/Pose',
+        position=make('geometry_msgs/msg/Point', x=x, y=y, z=z),
+        orientation=_quaternion(odometry.quaternion[row]),
+    )
+    twist = make(
+        'geometry_msgs/msg/Twist',
+        linear=_vector(odometry.velocity_in_base[row]),
+        angular=_vector(odometry.rate_in_base[row]),
+    )
+    return make(
+        'nav_msgs/msg/Odometry',
+        header=_header(time, 'odom'),
+        child_frame_id='base_link',
+        pose=make('geometry_msgs/msg/PoseWithCovariance', pose=pose, covariance=np.zeros(36)),
+        twist=make('geometry_msgs/msg/TwistWithCovariance', twist=twist, covariance=np.zeros(36)),
+    )
 
 
-def _joint_state(time: float, names: Any, position: Any, velocity: Any, effort: Any) -> tuple[str, Any]:
+def _joint_state(
+    time: float, names: Any, position: Any, velocity: Any, effort: Any
+) -> tuple[str, Any]:
     kind = 'sensor_msgs/msg/JointState'
-    return kind, make(kind, header=_header(time), name=list(names), position=np.asarray(position, dtype=float),
-                      velocity=np.asarray(velocity, dtype=float), effort=np.asarray(effort, dtype=float))
+    return kind, make(
+        kind,
+        header=_header(time),
+        name=list(names),
+        position=np.asarray(position, dtype=float),
+        velocity=np.asarray(velocity, dtype=float),
+        effort=np.asarray(effort, dtype=float),
+    )
 
 
 def _status(events: dict[str, StatusEvent]) -> tuple[str, Any]:
     kind = 'diagnostic_msgs/msg/DiagnosticArray'
-    status = [make('diagnostic_msgs/msg/DiagnosticStatus', level=event.level, name=name, message=event.message,
-                   hardware_id='', values=[make('diagnostic_msgs/msg/KeyValue', key=key, value=value)
-                                           for key, value in event.values.items()])
-              for name, event in events.items()]
+    status = [
+        make(
+            'diagnostic_msgs/msg/DiagnosticStatus',
+            level=event.level,
+            name=name,
+            message=event.message,
+            hardware_id='',
+            values=[
+                make('diagnostic_msgs/msg/KeyValue', key=key, value=value)
+                for key, value in event.values.items()
+            ],
+        )
+        for name, event in events.items()
+    ]
     return kind, make(kind, header=_header(next(iter(events.values())).time), status=status)
 
 
@@ -158,4 +256,8 @@ def _quaternion(values: Any) -> Any:
 
 
 def _twist(v_x: float, v_y: float, gamma: float) -> Any:
-    return make('geometry_msgs/msg/Twist', linear=_vector((v_x, v_y, 0.0)), angular=_vector((0.0, 0.0, gamma)))
+    return make(
+        'geometry_msgs/msg/Twist',
+        linear=_vector((v_x, v_y, 0.0)),
+        angular=_vector((0.0, 0.0, gamma)),
+    )

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A walk whose slip, drift, duty factor and stop are known because they are prescribed, not simulated."""
+"""A walk whose slip, drift, duty factor and stop are prescribed, not simulated."""
 
 from __future__ import annotations
 
@@ -10,8 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.recording import (
-    CanonicalSeries, FootForceSeries, ImuSeries, JointSeries, OdometrySeries, PostureSeries, Recording,
-    StatusEvent, VelocitySeries)
+    CanonicalSeries,
+    FootForceSeries,
+    ImuSeries,
+    JointSeries,
+    OdometrySeries,
+    PostureSeries,
+    Recording,
+    StatusEvent,
+    VelocitySeries,
+)
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.phase import state_at
@@ -26,23 +34,50 @@ ALPHA_R = 3.0
 
 def robot(foot_radius: float = 0.0) -> RobotDescription:
     """Return a small quadruped with point feet (rolling feet where a radius is given)."""
-    legs = tuple(LegGeometry(
-        name=name, hip_in_base=np.array([x, y, 0.0]), hip_offset=np.array([0.0, side * 0.06, 0.0]),
-        thigh=np.array([0.0, 0.0, -0.21]), shank=np.array([0.0, 0.0, -0.2]), axis_sign=np.ones(3),
-        knee_sign=-1, position_lower=np.full(3, -3.0), position_upper=np.full(3, 3.0),
-        torque_limit=np.array([17.0, 17.0, 26.0]), velocity_limit=np.array([40.0, 40.0, 25.0]),
-        rotor_inertia=np.full(3, 0.01), foot_radius=foot_radius)
-        for name, x, y, side in (('fl', 0.19, 0.05, 1), ('fr', 0.19, -0.05, -1),
-                                 ('rl', -0.19, 0.05, 1), ('rr', -0.19, -0.05, -1)))
+    legs = tuple(
+        LegGeometry(
+            name=name,
+            hip_in_base=np.array([x, y, 0.0]),
+            hip_offset=np.array([0.0, side * 0.06, 0.0]),
+            thigh=np.array([0.0, 0.0, -0.21]),
+            shank=np.array([0.0, 0.0, -0.2]),
+            axis_sign=np.ones(3),
+            knee_sign=-1,
+            position_lower=np.full(3, -3.0),
+            position_upper=np.full(3, 3.0),
+            torque_limit=np.array([17.0, 17.0, 26.0]),
+            velocity_limit=np.array([40.0, 40.0, 25.0]),
+            rotor_inertia=np.full(3, 0.01),
+            foot_radius=foot_radius,
+        )
+        for name, x, y, side in (
+            ('fl', 0.19, 0.05, 1),
+            ('fr', 0.19, -0.05, -1),
+            ('rl', -0.19, 0.05, 1),
+            ('rr', -0.19, -0.05, -1),
+        )
+    )
     return RobotDescription(
-        name='point-footed', legs=legs, mass=MASS, base_inertia=np.diag([0.05, 0.2, 0.22]),
-        com_in_base=np.zeros(3), stance_height=HEIGHT, kp=np.full(3, 50.0), kd=np.full(3, 1.0))
+        name='point-footed',
+        legs=legs,
+        mass=MASS,
+        base_inertia=np.diag([0.05, 0.2, 0.22]),
+        com_in_base=np.zeros(3),
+        stance_height=HEIGHT,
+        kp=np.full(3, 50.0),
+        kd=np.full(3, 1.0),
+    )
 
 
 def amble(duty_factor: float = 0.7) -> Gait:
     """Return a four-beat gait."""
-    return Gait('amble', np.array([0.0, 0.5, 0.75, 0.25]), np.array([0.0]), np.array([0.3]),
-                np.array([duty_factor]))
+    return Gait(
+        'amble',
+        np.array([0.0, 0.5, 0.75, 0.25]),
+        np.array([0.0]),
+        np.array([0.3]),
+        np.array([duty_factor]),
+    )
 
 
 @dataclass(frozen=True)
@@ -50,15 +85,15 @@ class SyntheticWalk:
     """What is prescribed; a test asks the metrics for the same numbers."""
 
     rate_hz: float = 100.0
-    walk_s: float = 1.0               # standing before
-    stop_s: float = 9.0               # inhibition is requested
+    walk_s: float = 1.0  # standing before
+    stop_s: float = 9.0  # inhibition is requested
     release_s: float = 12.0
     end_s: float = 18.0
-    speed: float = 0.4                # [m/s]
-    turn_rate: float = 0.0            # commanded [rad/s]
+    speed: float = 0.4  # [m/s]
+    turn_rate: float = 0.0  # commanded [rad/s]
     yaw_drift_deg_per_m: float = 0.0  # on top of the command
-    speed_ratio: float = 1.0          # real speed over reference
-    slip_speed: float = 0.0           # of every foot in stance while walking, along world x [m/s]
+    speed_ratio: float = 1.0  # real speed over reference
+    slip_speed: float = 0.0  # of every foot in stance while walking, along world x [m/s]
     duty_factor: float = 0.7
     cadence_hz: float = 1.6
     phase_offset_error: Array = field(default_factory=lambda: np.zeros(4))
@@ -77,7 +112,9 @@ class SyntheticWalk:
 
     def _walking(self) -> Array:
         t = self.time
-        return (t >= self.walk_s) & ((t < self.stop_s + self.time_to_rest_s) | (t >= self.release_s))
+        return (t >= self.walk_s) & (
+            (t < self.stop_s + self.time_to_rest_s) | (t >= self.release_s)
+        )
 
     def reference(self) -> Array:
         """Return the filtered command, ndarray (n, 3)."""
@@ -114,19 +151,31 @@ class SyntheticWalk:
         """Feet that stay where they were put (but for the slip), ndarray (n, 4, 3)."""
         position, yaw, _ = self.body()
         stance, walking = self.stance(), self._walking()
-        home = np.array([[leg.hip_in_base[0], leg.hip_in_base[1] + leg.hip_offset[1], -HEIGHT]
-                         for leg in robot().legs])
+        home = np.array(
+            [
+                [leg.hip_in_base[0], leg.hip_in_base[1] + leg.hip_offset[1], -HEIGHT]
+                for leg in robot().legs
+            ]
+        )
         c, s = np.cos(yaw), np.sin(yaw)
-        under_hip = position[:, None] + np.stack([
-            c[:, None] * home[:, 0] - s[:, None] * home[:, 1],
-            s[:, None] * home[:, 0] + c[:, None] * home[:, 1],
-            np.broadcast_to(home[:, 2], (len(yaw), 4))], axis=-1)
+        under_hip = position[:, None] + np.stack(
+            [
+                c[:, None] * home[:, 0] - s[:, None] * home[:, 1],
+                s[:, None] * home[:, 0] + c[:, None] * home[:, 1],
+                np.broadcast_to(home[:, 2], (len(yaw), 4)),
+            ],
+            axis=-1,
+        )
         feet = under_hip.copy()
         for k in range(1, len(yaw)):
-            slipped = feet[k - 1] + np.array([self.slip_speed * walking[k] / self.rate_hz, 0.0, 0.0])
+            slipped = feet[k - 1] + np.array(
+                [self.slip_speed * walking[k] / self.rate_hz, 0.0, 0.0]
+            )
             swing = under_hip[k] + np.array([0.0, 0.0, 0.03])
             held = stance[k] & stance[k - 1]
-            feet[k] = np.where(held[:, None], slipped, np.where(stance[k][:, None], under_hip[k], swing))
+            feet[k] = np.where(
+                held[:, None], slipped, np.where(stance[k][:, None], under_hip[k], swing)
+            )
         return feet
 
     def recording(self) -> Recording:
@@ -144,22 +193,39 @@ class SyntheticWalk:
         velocity = np.column_stack([speed, np.zeros((len(t), 2))])
         gravity = np.tile([0.0, 0.0, 9.81], (len(t), 1))
         return Recording(
-            joints=JointSeries(t, q, dq, effort), targets=JointSeries(t, q, dq, 0.1 * effort),
+            joints=JointSeries(t, q, dq, effort),
+            targets=JointSeries(t, q, dq, 0.1 * effort),
             canonical=CanonicalSeries(t, x, np.gradient(x, 1.0 / self.rate_hz, axis=0)),
-            reference=VelocitySeries(t, reference), commands=self.commands(),
+            reference=VelocitySeries(t, reference),
+            commands=self.commands(),
             odometry=OdometrySeries(t, position, quaternion, velocity, rate),
-            imu=ImuSeries(t, quaternion, rate, gravity), feet=FootForceSeries(t, force),
+            imu=ImuSeries(t, quaternion, rate, gravity),
+            feet=FootForceSeries(t, force),
             posture=PostureSeries(t, 0.1 * effort, np.zeros((len(t), 4, 2))),
-            inhibition=self.events(), statuses=self.statuses())
+            inhibition=self.events(),
+            statuses=self.statuses(),
+        )
 
     def _joint_angles(self, position: Array, yaw: Array) -> Array:
         feet = self.feet_in_world() - position[:, None]
         c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
-        in_base = np.stack([c * feet[..., 0] + s * feet[..., 1],
-                            -s * feet[..., 0] + c * feet[..., 1], feet[..., 2]], axis=-1)
+        in_base = np.stack(
+            [
+                c * feet[..., 0] + s * feet[..., 1],
+                -s * feet[..., 0] + c * feet[..., 1],
+                feet[..., 2],
+            ],
+            axis=-1,
+        )
         solvers = [LegKinematics(leg) for leg in robot().legs]
-        return np.array([np.concatenate([solver.inverse(foot) for solver, foot in
-                                         zip(solvers, row, strict=True)]) for row in in_base])
+        return np.array(
+            [
+                np.concatenate(
+                    [solver.inverse(foot) for solver, foot in zip(solvers, row, strict=True)]
+                )
+                for row in in_base
+            ]
+        )
 
     def commands(self) -> VelocitySeries:
         """Commands at 10 Hz, between the ticks."""
@@ -169,9 +235,18 @@ class SyntheticWalk:
 
     def events(self) -> tuple[StatusEvent, ...]:
         """What the inhibition node says around the stop and the start."""
-        stop = {'requested': 'true', 'request_stamp': repr(self.stop_s), 'predicted_s': '0.78', 'bound_s': '1.5'}
-        start = {'requested': 'false', 'request_stamp': repr(self.release_s), 'predicted_s': '0.45',
-                 'bound_s': '0.9'}
+        stop = {
+            'requested': 'true',
+            'request_stamp': repr(self.stop_s),
+            'predicted_s': '0.78',
+            'bound_s': '1.5',
+        }
+        start = {
+            'requested': 'false',
+            'request_stamp': repr(self.release_s),
+            'predicted_s': '0.45',
+            'bound_s': '0.9',
+        }
         rest_s, walk_s = self.stop_s + self.time_to_rest_s, self.release_s + self.time_to_walk_s
         return (
             StatusEvent(0.0, 0, 'free', {'requested': 'false'}),
@@ -179,11 +254,25 @@ class SyntheticWalk:
             StatusEvent(self.stop_s + 0.3, 0, 'captured', stop),
             StatusEvent(rest_s, 0, 'at_rest', {**stop, 'measured_s': repr(self.time_to_rest_s)}),
             StatusEvent(self.release_s, 0, 'releasing', start),
-            StatusEvent(walk_s, 0, 'walking', {**start, 'measured_s': repr(self.time_to_walk_s)}))
+            StatusEvent(walk_s, 0, 'walking', {**start, 'measured_s': repr(self.time_to_walk_s)}),
+        )
 
     def statuses(self) -> dict[str, tuple[StatusEvent, ...]]:
         """What the robot says about its timing, once a second."""
-        return {'mujoco_robot: timing': tuple(StatusEvent(float(second), 0, 'running', {
-            'rate_hz': repr(self.rate_hz), 'real_time_factor': '0.998', 'latency_ms_p50': repr(1.25 + 0.01 * second),
-            'latency_ms_p99': '3.5', 'deadline_misses': str(second // 4)})
-            for second in range(1, int(self.end_s)))}
+        return {
+            'mujoco_robot: timing': tuple(
+                StatusEvent(
+                    float(second),
+                    0,
+                    'running',
+                    {
+                        'rate_hz': repr(self.rate_hz),
+                        'real_time_factor': '0.998',
+                        'latency_ms_p50': repr(1.25 + 0.01 * second),
+                        'latency_ms_p99': '3.5',
+                        'deadline_misses': str(second // 4),
+                    },
+                )
+                for second in range(1, int(self.end_s))
+            )
+        }

@@ -17,7 +17,7 @@ STORAGE_SUFFIXES = ('.mcap', '.db3')
 
 
 def bag_folder(path: Path | str) -> Path:
-    """Folder of the bag that a path names: the bag itself, a run's folder, or a file inside the bag.
+    """Folder of the bag that a path names: itself, in a run's folder, or around a file.
 
     Raises
     ------
@@ -28,14 +28,18 @@ def bag_folder(path: Path | str) -> Path:
     """
     path = Path(path)
     if not path.exists():
-        raise MissingFileError(f"'{path}' does not exist; name a rosbag2 folder or a run's folder with bag/ inside")
+        raise MissingFileError(
+            f"'{path}' does not exist; name a rosbag2 folder or a run's folder with bag/ inside"
+        )
     if path.is_file() and path.suffix in STORAGE_SUFFIXES + ('.yaml',):
         path = path.parent
     for folder in (path, path / 'bag'):
         if folder.is_dir() and (_storage_files(folder) or (folder / 'metadata.yaml').is_file()):
             return folder
-    raise DataError(f"'{path}' holds no rosbag2 recording; valid are a folder with *.mcap or *.db3, "
-                    f"or a run's folder with such a folder bag/ inside")
+    raise DataError(
+        f"'{path}' holds no rosbag2 recording; valid are a folder with *.mcap or *.db3, "
+        f"or a run's folder with such a folder bag/ inside"
+    )
 
 
 @contextmanager

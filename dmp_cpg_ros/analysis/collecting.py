@@ -12,15 +12,30 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.named_values import NamedValues
 from dmp_cpg_ros.analysis.recording import (
-    ArrivalSeries, CanonicalSeries, FootForceSeries, ImuSeries, JointSeries, OdometrySeries, PostureSeries,
-    Recording, StatusEvent, VelocitySeries)
+    ArrivalSeries,
+    CanonicalSeries,
+    FootForceSeries,
+    ImuSeries,
+    JointSeries,
+    OdometrySeries,
+    PostureSeries,
+    Recording,
+    StatusEvent,
+    VelocitySeries,
+)
 from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS
 
 Array = NDArray[np.float64]
 Handler = Callable[[int, Any], None]
 Rows = tuple[list[int], list[list[float]]]
 
-JOINT_TOPICS = ('joint_states', 'joint_targets', 'canonical_state', 'foot_contacts', 'posture_feedback')
+JOINT_TOPICS = (
+    'joint_states',
+    'joint_targets',
+    'canonical_state',
+    'foot_contacts',
+    'posture_feedback',
+)
 
 
 class Collector:
@@ -29,17 +44,22 @@ class Collector:
     def __init__(self) -> None:
         """Start empty."""
         self._named = {topic: NamedValues() for topic in JOINT_TOPICS}
-        self._rows: dict[str, Rows] = {topic: ([], []) for topic in ('reference', 'cmd_vel', 'odom', 'imu')}
+        self._rows: dict[str, Rows] = {
+            topic: ([], []) for topic in ('reference', 'cmd_vel', 'odom', 'imu')
+        }
         self._unstamped_commands: Rows = ([], [])
-        self._clock: tuple[list[int], list[int]] = ([], [])      # bag time, robot's clock [ns]
+        self._clock: tuple[list[int], list[int]] = ([], [])  # bag time, robot's clock [ns]
         self._ticks: tuple[list[int], list[int]] = ([], [])
         self._inhibition: list[StatusEvent] = []
         self._statuses: dict[str, list[StatusEvent]] = {}
-        self._last_target: dict[int, int] = {}                   # stamp, bag time of the last leg [ns]
+        self._last_target: dict[int, int] = {}  # stamp, bag time of the last leg [ns]
         self._handlers: dict[tuple[str, str], Handler] = {
             ('joint_states', 'sensor_msgs/msg/JointState'): self._take_joint_states,
             ('joint_targets', 'sensor_msgs/msg/JointState'): self._take_joint_targets,
-            **{(name, 'sensor_msgs/msg/JointState'): self._taker_of_named(name) for name in JOINT_TOPICS[2:]},
+            **{
+                (name, 'sensor_msgs/msg/JointState'): self._taker_of_named(name)
+                for name in JOINT_TOPICS[2:]
+            },
             ('reference', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('reference'),
             ('cmd_vel', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('cmd_vel'),
             ('cmd_vel', 'geometry_msgs/msg/Twist'): self._take_unstamped_twist,
@@ -51,7 +71,7 @@ class Collector:
         }
 
     def handler(self, topic: str, msgtype: str) -> Handler | None:
-        """Function that takes bag time [ns] and message of a topic; None when the topic is not used.
+        """Function that takes bag time [ns] and message of a topic, None for unused topics.
 
         Parameters
         ----------
@@ -64,19 +84,27 @@ class Collector:
 
     def recording(self, counts: dict[str, int]) -> Recording:
         """Stack everything that was taken."""
-        time, canonical = self._named['canonical_state'].table([f'{leg}_x{k}' for leg in LEGS for k in (1, 2)])
+        time, canonical = self._named['canonical_state'].table(
+            [f'{leg}_x{k}' for leg in LEGS for k in (1, 2)]
+        )
         x, x_dot = (canonical[name].reshape(-1, len(LEGS), 2) for name in ('position', 'velocity'))
         odometry = _stacked(self._rows['odom'], 13)
         imu = _stacked(self._rows['imu'], 10)
         return Recording(
-            joints=self._joints('joint_states'), targets=self._joints('joint_targets'),
+            joints=self._joints('joint_states'),
+            targets=self._joints('joint_targets'),
             canonical=CanonicalSeries(time, x, x_dot),
-            reference=VelocitySeries(*_stacked(self._rows['reference'], 3)), commands=self._commands(),
+            reference=VelocitySeries(*_stacked(self._rows['reference'], 3)),
+            commands=self._commands(),
             odometry=OdometrySeries(odometry[0], *np.split(odometry[1], (3, 7, 10), axis=1)),
             imu=ImuSeries(imu[0], *np.split(imu[1], (4, 7), axis=1)),
-            feet=self._feet(), posture=self._posture(), inhibition=tuple(self._inhibition),
+            feet=self._feet(),
+            posture=self._posture(),
+            inhibition=tuple(self._inhibition),
             statuses={name: tuple(history) for name, history in self._statuses.items()},
-            arrivals=self._arrivals(), counts=counts)
+            arrivals=self._arrivals(),
+            counts=counts,
+        )
 
     def _joints(self, topic: str) -> JointSeries:
         time, values = self._named[topic].table(JOINT_NAMES)
@@ -90,7 +118,9 @@ class Collector:
 
     def _posture(self) -> PostureSeries:
         time, torques = self._named['posture_feedback'].table(JOINT_NAMES)
-        _, shifts = self._named['posture_feedback'].table([f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xy'])
+        _, shifts = self._named['posture_feedback'].table(
+            [f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xy']
+        )
         return PostureSeries(time, torques['effort'], shifts['position'].reshape(-1, len(LEGS), 2))
 
     def _commands(self) -> VelocitySeries:
@@ -101,8 +131,12 @@ class Collector:
 
     def _arrivals(self) -> ArrivalSeries:
         stamps = np.array(self._ticks[1], dtype=np.int64)
-        targets = np.array([self._last_target.get(stamp, np.nan) for stamp in self._ticks[1]], dtype=float)
-        return ArrivalSeries(stamps / 1e9, np.array(self._ticks[0], dtype=np.int64) / 1e9, targets / 1e9)
+        targets = np.array(
+            [self._last_target.get(stamp, np.nan) for stamp in self._ticks[1]], dtype=float
+        )
+        return ArrivalSeries(
+            stamps / 1e9, np.array(self._ticks[0], dtype=np.int64) / 1e9, targets / 1e9
+        )
 
     def _take_joint_targets(self, bag_ns: int, message: Any) -> None:
         stamp = _stamp_ns(message.header.stamp)
@@ -122,6 +156,7 @@ class Collector:
     def _taker_of_twists(self, topic: str) -> Callable[[int, Any], None]:
         def handle(_: int, message: Any) -> None:
             self._row(topic, message, _twist(message.twist))
+
         return handle
 
     def _take_unstamped_twist(self, bag_ns: int, message: Any) -> None:
@@ -130,12 +165,29 @@ class Collector:
 
     def _take_odometry(self, _: int, message: Any) -> None:
         pose, twist = message.pose.pose, message.twist.twist
-        self._row('odom', message, [*_xyz(pose.position), *_xyz(pose.orientation), pose.orientation.w,
-                                    *_xyz(twist.linear), *_xyz(twist.angular)])
+        self._row(
+            'odom',
+            message,
+            [
+                *_xyz(pose.position),
+                *_xyz(pose.orientation),
+                pose.orientation.w,
+                *_xyz(twist.linear),
+                *_xyz(twist.angular),
+            ],
+        )
 
     def _take_imu(self, _: int, message: Any) -> None:
-        self._row('imu', message, [*_xyz(message.orientation), message.orientation.w,
-                                   *_xyz(message.angular_velocity), *_xyz(message.linear_acceleration)])
+        self._row(
+            'imu',
+            message,
+            [
+                *_xyz(message.orientation),
+                message.orientation.w,
+                *_xyz(message.angular_velocity),
+                *_xyz(message.linear_acceleration),
+            ],
+        )
 
     def _row(self, topic: str, message: Any, row: list[float]) -> None:
         stamps, rows = self._rows[topic]
@@ -171,9 +223,15 @@ def _twist(twist: Any) -> list[float]:
 
 def _events(message: Any) -> dict[str, StatusEvent]:
     time = _stamp_ns(message.header.stamp) / 1e9
-    return {status.name: StatusEvent(time, int(status.level), status.message,
-                                     {pair.key: pair.value for pair in status.values})
-            for status in message.status}
+    return {
+        status.name: StatusEvent(
+            time,
+            int(status.level),
+            status.message,
+            {pair.key: pair.value for pair in status.values},
+        )
+        for status in message.status
+    }
 
 
 def _stacked(rows: tuple[list[int], list[list[float]]], width: int) -> tuple[Array, Array]:
@@ -188,8 +246,8 @@ def _stacked(rows: tuple[list[int], list[list[float]]], width: int) -> tuple[Arr
 def _robot_clock(bag_ns: list[int], clock: tuple[list[int], list[int]]) -> list[int]:
     """Stamps on the robot's clock for messages without one.
 
-    The bag's record time may be wall time: each message gets the stamp of the tick that was recorded last before
-    it. A bag without ticks keeps its own time.
+    The bag's record time may be wall time: each message gets the stamp of the tick that was
+    recorded last before it. A bag without ticks keeps its own time.
     """
     if not bag_ns or not clock[0]:
         return bag_ns

@@ -57,7 +57,7 @@ class RunContext:
 
 
 def find_parameter(parameters: Mapping[str, Any] | None, name: str, default: Any = None) -> Any:
-    """Value of a parameter wherever it stands in nested mappings (node, ``ros__parameters``, group)."""
+    """Value of a parameter wherever it stands in nested mappings."""
     for key, value in (parameters or {}).items():
         if key == name and not isinstance(value, Mapping):
             return value

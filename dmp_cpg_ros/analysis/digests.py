@@ -29,8 +29,8 @@ def payload_digests(path: Path | str) -> dict[str, str]:
     Returns
     -------
     dict of str to str
-        Hexadecimal digests of ``joint_states``, ``canonical_state``, and ``joint_targets/fl``, …, whose publisher
-        is known by the leg that its first joint's name begins with.
+        Hexadecimal digests of ``joint_states``, ``canonical_state``, and ``joint_targets/fl``, …,
+        whose publisher is known by the leg that its first joint's name begins with.
 
     Raises
     ------
@@ -41,8 +41,11 @@ def payload_digests(path: Path | str) -> dict[str, str]:
     hashes: dict[str, hashlib._Hash] = {}
     try:
         with opened(folder) as reader:
-            used = [connection for connection in reader.connections
-                    if connection.topic.rsplit('/', 1)[-1] in TOPICS]
+            used = [
+                connection
+                for connection in reader.connections
+                if connection.topic.rsplit('/', 1)[-1] in TOPICS
+            ]
             for connection, _, raw in reader.messages(used) if used else ():
                 key = connection.topic.rsplit('/', 1)[-1]
                 if key == SHARED_TOPIC:

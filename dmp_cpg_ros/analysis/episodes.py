@@ -22,7 +22,7 @@ STEADY_RATES = np.array([0.02, 0.02, 0.05])
 """Rates of v_x, v_y [m/s^2] and γ [rad/s^2] below which the reference counts as constant."""
 
 SETTLING = 1.0
-"""What is left out at the beginning of walking and of every constant reference, for the body to settle [s]."""
+"""Time that walking, and every constant reference, is given to settle [s]."""
 
 SHORTEST_SEGMENT = 1.0
 """Constant references that last less after settling are not evaluated [s]."""
@@ -38,7 +38,8 @@ class Episode:
     Attributes
     ----------
     start, end : float
-        From its first state to the first state of the next episode, or to the end of the recording [s].
+        From its first state to the first state of the next episode, or to the end of the recording
+        [s].
     events : tuple of StatusEvent
         The states.
     """
@@ -59,7 +60,9 @@ def episodes(recording: Recording, words: tuple[str, ...]) -> list[Episode]:
             found.append(Episode(current[0].time, event.time, tuple(current)))
             current = []
     if current:
-        found.append(Episode(current[0].time, max(recording.span[1], current[-1].time), tuple(current)))
+        found.append(
+            Episode(current[0].time, max(recording.span[1], current[-1].time), tuple(current))
+        )
     return found
 
 
@@ -96,13 +99,15 @@ def cycle_count(recording: Recording, start: float, end: float) -> float:
 
 def gait_period(recording: Recording) -> float | None:
     """Median duration of a gait cycle while running [s], None where there is none."""
-    periods = [np.diff(cycle_starts(recording, *interval)) for interval in running_intervals(recording)]
+    periods = [
+        np.diff(cycle_starts(recording, *interval)) for interval in running_intervals(recording)
+    ]
     lengths = np.concatenate([np.array([]), *periods])
     return float(np.median(lengths)) if lengths.size else None
 
 
 def steady_segments(recording: Recording) -> list[tuple[float, float]]:
-    """Intervals of constant, moving reference while running, settled and cut to whole gait cycles [s].
+    """Intervals of settled walking at constant reference, cut to whole gait cycles [s].
 
     Where no oscillators were recorded the intervals are not cut.
     """

@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 def foot_slip(recording: Recording, robot: RobotDescription, contact_force: float) -> Array | None:
     """Distance that each foot's contact point slid horizontally while it carried load.
 
-    The contact point is the lowest point of the foot's sphere: a foot that rolls without sliding does not slip.
+    The contact point is the lowest point of the foot's sphere: a foot that rolls without sliding
+    does not slip.
 
     Parameters
     ----------
@@ -42,10 +43,16 @@ def foot_slip(recording: Recording, robot: RobotDescription, contact_force: floa
     R = rotations(odometry.quaternion[rows[1]])
     slips = []
     for i, leg in enumerate(robot.legs):
-        q, q_dot = (series[rows[0], 3 * i:3 * i + 3] for series in (joints.position, joints.velocity))
+        q, q_dot = (
+            series[rows[0], 3 * i : 3 * i + 3] for series in (joints.position, joints.velocity)
+        )
         loaded = feet.force[rows[2], i] > contact_force
-        foot = odometry.position_in_world[rows[1]] + np.einsum('nij,nj->ni', R, feet_in_base(leg, q))
-        rate = np.einsum('nij,nj->ni', R, odometry.rate_in_base[rows[1]] + shank_rate_in_base(leg, q, q_dot))
+        foot = odometry.position_in_world[rows[1]] + np.einsum(
+            'nij,nj->ni', R, feet_in_base(leg, q)
+        )
+        rate = np.einsum(
+            'nij,nj->ni', R, odometry.rate_in_base[rows[1]] + shank_rate_in_base(leg, q, q_dot)
+        )
         slips.append(_slid(time, foot[:, :2], rate, loaded, leg.foot_radius))
     return np.array(slips)
 
@@ -60,11 +67,15 @@ def shank_rate_in_base(leg: LegGeometry, q: Array, q_dot: Array) -> Array:
     """Angular velocity of the shank relative to the base: (n, 3), (n, 3) → (n, 3) [rad/s]."""
     angle, sign = leg.axis_sign[0] * q[:, 0], leg.axis_sign
     pitching = sign[1] * q_dot[:, 1] + sign[2] * q_dot[:, 2]
-    return np.stack([sign[0] * q_dot[:, 0], np.cos(angle) * pitching, np.sin(angle) * pitching], axis=1)
+    return np.stack(
+        [sign[0] * q_dot[:, 0], np.cos(angle) * pitching, np.sin(angle) * pitching], axis=1
+    )
 
 
-def _slid(time: Array, foot_xy: Array, rate: Array, loaded: NDArray[np.bool_], radius: float) -> float:
-    rolling = radius * np.stack([rate[:, 1], -rate[:, 0]], axis=1)    # ω × (radius ẑ)
+def _slid(
+    time: Array, foot_xy: Array, rate: Array, loaded: NDArray[np.bool_], radius: float
+) -> float:
+    rolling = radius * np.stack([rate[:, 1], -rate[:, 0]], axis=1)  # ω × (radius ẑ)
     rolled = 0.5 * (rolling[1:] + rolling[:-1]) * np.diff(time)[:, None]
     steps = np.hypot(*(np.diff(foot_xy, axis=0) - rolled).T)
     return float(steps[loaded[1:] & loaded[:-1]].sum())

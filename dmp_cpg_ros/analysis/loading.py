@@ -39,9 +39,12 @@ def load_recording(path: Path | str) -> Recording:
     try:
         with opened(folder) as reader:
             _check_one_robot(reader)
-            handlers = {connection.id: collector.handler(_base_name(connection.topic), connection.msgtype)
-                        for connection in reader.connections}
-            used = [connection for connection in reader.connections if handlers[connection.id] is not None]
+            handlers = {}
+            for connection in reader.connections:
+                handler = collector.handler(_base_name(connection.topic), connection.msgtype)
+                if handler is not None:
+                    handlers[connection.id] = handler
+            used = [connection for connection in reader.connections if connection.id in handlers]
             for connection, bag_ns, raw in reader.messages(used) if used else ():
                 handlers[connection.id](bag_ns, reader.deserialize(raw, connection.msgtype))
             counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}
@@ -57,4 +60,6 @@ def _base_name(topic: str) -> str:
 def _check_one_robot(reader: AnyReader) -> None:
     robots = sorted(topic for topic in reader.topics if _base_name(topic) == 'joint_states')
     if len(robots) > 1:
-        raise DataError(f'the bag holds {len(robots)} robots ({", ".join(robots)}); record one robot per bag')
+        raise DataError(
+            f'the bag holds {len(robots)} robots ({", ".join(robots)}); record one robot per bag'
+        )

@@ -18,8 +18,12 @@ from dmp_cpg_ros.analysis.provenance import source_commit
 PACKAGES = ('numpy', 'mujoco', 'rosbags', 'matplotlib', 'rclpy', 'mcap')
 
 
-def build_manifest(parameters: Mapping[str, Any] | None = None, seeds: Mapping[str, int] | None = None,
-                   digests: Mapping[str, str] | None = None, **facts: Any) -> dict[str, Any]:
+def build_manifest(
+    parameters: Mapping[str, Any] | None = None,
+    seeds: Mapping[str, int] | None = None,
+    digests: Mapping[str, str] | None = None,
+    **facts: Any,
+) -> dict[str, Any]:
     """Contents of ``manifest.json``.
 
     Parameters
@@ -38,11 +42,18 @@ def build_manifest(parameters: Mapping[str, Any] | None = None, seeds: Mapping[s
     dict
         Absolute paths in texts are cut to file names; host and user names are not asked for.
     """
-    return without_paths({
-        'created': datetime.datetime.now(datetime.timezone.utc).isoformat(timespec='seconds'),
-        'versions': versions(), 'commit': source_commit(), **facts,
-        'parameters': dict(parameters or {}), 'seeds': dict(seeds or {}),
-        'digests': dict(digests or {}), 'host': host_facts()})
+    return without_paths(
+        {
+            'created': datetime.datetime.now(datetime.timezone.utc).isoformat(timespec='seconds'),
+            'versions': versions(),
+            'commit': source_commit(),
+            **facts,
+            'parameters': dict(parameters or {}),
+            'seeds': dict(seeds or {}),
+            'digests': dict(digests or {}),
+            'host': host_facts(),
+        }
+    )
 
 
 def versions() -> dict[str, str]:
@@ -61,9 +72,15 @@ def host_facts() -> dict[str, Any]:
     """Facts that change how fast a run goes: processor, number of cores, load, system."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()
     load = [round(value, 2) for value in os.getloadavg()] if hasattr(os, 'getloadavg') else None
-    return {'system': platform.system(), 'machine': platform.machine(), 'processor': _processor(),
-            'cores': os.cpu_count(), 'usable_cores': usable, 'load_average': load,
-            'rmw': os.environ.get('RMW_IMPLEMENTATION', 'default')}
+    return {
+        'system': platform.system(),
+        'machine': platform.machine(),
+        'processor': _processor(),
+        'cores': os.cpu_count(),
+        'usable_cores': usable,
+        'load_average': load,
+        'rmw': os.environ.get('RMW_IMPLEMENTATION', 'default'),
+    }
 
 
 def without_paths(value: Any) -> Any:

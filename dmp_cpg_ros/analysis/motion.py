@@ -15,10 +15,14 @@ Array = NDArray[np.float64]
 def rotations(quaternion: Array) -> Array:
     """Rotation matrices R_world_base of quaternions x, y, z, w: (n, 4) → (n, 3, 3)."""
     x, y, z, w = quaternion.T
-    return np.stack([
-        np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=-1),
-        np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=-1),
-        np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1)], axis=-2)
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=-1),
+            np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=-1),
+            np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1),
+        ],
+        axis=-2,
+    )
 
 
 def roll_pitch_yaw(quaternion: Array) -> Array:
@@ -71,12 +75,14 @@ def mean_between(time: Array, values: Array, start: float, end: float) -> Array:
 
 
 def smoothed(time: Array, values: Array, window: float) -> Array:
-    """Centred moving average over ``window`` seconds; it narrows at the ends, which stay where they are."""
+    """Centred moving average over a window [s], narrower at the ends, which stay."""
     if len(time) < 3:
         return values
     n = len(time)
     index = np.arange(n)
-    half = np.minimum(round(0.5 * window / float(np.median(np.diff(time)))), np.minimum(index, n - 1 - index))
+    half = np.minimum(
+        round(0.5 * window / float(np.median(np.diff(time)))), np.minimum(index, n - 1 - index)
+    )
     running = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
     width = (2 * half + 1).reshape(-1, *(1,) * (values.ndim - 1))
     return (running[index + half + 1] - running[index - half]) / width

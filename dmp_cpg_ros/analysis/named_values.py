@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""JointState messages as one table: columns by name, rows by stamp, whoever sent them in whichever order."""
+"""JointState messages as one table: columns by name, rows by stamp."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ FIELDS = ('position', 'velocity', 'effort')
 class NamedValues:
     """Collects JointState messages and lays them out by name.
 
-    Messages of several publishers that each bear some of the names (the four legs on ``joint_targets``) are merged
-    where their stamps agree.
+    Messages of several publishers that each bear some of the names (the four legs on
+    ``joint_targets``) are merged where their stamps agree.
     """
 
     def __init__(self) -> None:
@@ -45,13 +45,21 @@ class NamedValues:
         time : ndarray (n,)
             Increasing stamps [s].
         values : dict of ndarray (n, k)
-            ``position``, ``velocity`` and ``effort``; NaN where no message held a value. Of messages with one
-            stamp and one name the last counts.
+            ``position``, ``velocity`` and ``effort``; NaN where no message held a value. Of
+            messages with one stamp and one name the last counts.
         """
         column = {name: index for index, name in enumerate(names)}
-        groups = {held: group for held, group in self._messages.items() if column.keys() & set(held)}
-        all_stamps = np.unique(np.concatenate(
-            [np.array([], dtype=np.int64), *(np.array(stamps) for stamps, _ in groups.values())]))
+        groups = {
+            held: group for held, group in self._messages.items() if column.keys() & set(held)
+        }
+        all_stamps = np.unique(
+            np.concatenate(
+                [
+                    np.array([], dtype=np.int64),
+                    *(np.array(stamps) for stamps, _ in groups.values()),
+                ]
+            )
+        )
         values = {name: np.full((len(all_stamps), len(names)), np.nan) for name in FIELDS}
         for held, (stamps, messages) in groups.items():
             rows = np.searchsorted(all_stamps, stamps)
@@ -59,7 +67,7 @@ class NamedValues:
             columns = [column[held[index]] for index in sources]
             for name in FIELDS:
                 block = _block([getattr(message, name) for message in messages], len(held))
-                values[name][np.ix_(rows, columns)] = block[:, sources]
+                values[name][rows[:, None], columns] = block[:, sources]
         return all_stamps / 1e9, values
 
 

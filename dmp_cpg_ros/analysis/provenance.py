@@ -20,8 +20,8 @@ def source_commit() -> dict[str, Any] | None:
     Returns
     -------
     dict or None
-        ``hash`` and ``changed`` (whether tracked files differ from it); None outside a checkout, where the
-        package's version has to do.
+        ``hash`` and ``changed`` (whether tracked files differ from it); None outside a checkout,
+        where the package's version has to do.
     """
     package = Path(dmp_cpg_ros.__file__).resolve().parent
     for folder in (package, _installed_from()):
@@ -47,15 +47,20 @@ def _installed_from() -> Path | None:
 
 
 def _tracks(folder: Path) -> bool:
-    """Whether git tracks the package there; an environment inside another checkout does not count."""
+    """Whether git tracks the package there, not just a folder around it."""
     return bool(_git(folder, 'ls-files', '--', '__init__.py'))
 
 
 def _git(folder: Path, *arguments: str) -> str:
     """Output of a git command, empty when it fails or there is no git."""
     try:
-        done = subprocess.run(['git', '-C', str(folder), *arguments], capture_output=True, text=True, timeout=10,
-                              check=False)
+        done = subprocess.run(
+            ['git', '-C', str(folder), *arguments],
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=False,
+        )
     except (OSError, subprocess.TimeoutExpired):
         return ''
     return done.stdout.strip() if done.returncode == 0 else ''

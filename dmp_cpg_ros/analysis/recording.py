@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The data model: one run as plain arrays, whatever it was recorded with.
 
-Times are seconds on the robot's clock, taken from message stamps. A topic that was not recorded is an array with
-no rows, so that every query works on every recording.
+Times are seconds on the robot's clock, taken from message stamps. A topic that was not recorded is
+an array with no rows, so that every query works on every recording.
 """
 
 from __future__ import annotations
@@ -194,8 +194,8 @@ class ArrivalSeries:
     time : ndarray (n,)
         Stamp of the tick [s].
     state, targets : ndarray (n,)
-        Record times [s]: of ``joint_states``, and of the last ``joint_targets`` with the same stamp (NaN
-        without). They are on whatever clock the recorder used.
+        Record times [s]: of ``joint_states``, and of the last ``joint_targets`` with the same
+        stamp (NaN without). They are on whatever clock the recorder used.
     """
 
     time: Array = field(default_factory=no_rows)
@@ -260,8 +260,18 @@ class Recording:
     @property
     def span(self) -> tuple[float, float]:
         """First and last stamp of the recorded series [s]; (0, 0) when nothing was recorded."""
-        axes = [series.time for series in (self.joints, self.canonical, self.odometry, self.reference,
-                                           self.feet, self.targets) if series.time.size]
+        axes = [
+            series.time
+            for series in (
+                self.joints,
+                self.canonical,
+                self.odometry,
+                self.reference,
+                self.feet,
+                self.targets,
+            )
+            if series.time.size
+        ]
         if not axes:
             return 0.0, 0.0
         return min(float(axis[0]) for axis in axes), max(float(axis[-1]) for axis in axes)

@@ -70,7 +70,7 @@ class StopOutcome:
         return self.measured_s > self.bound_s + 1e-9
 
 
-def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float) -> dict[str, float]:
+def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float) -> StopOutcome:
     """Standing, time to rest, slip and displacement of the recorded hold.
 
     Parameters
@@ -84,32 +84,45 @@ def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float)
 
     Returns
     -------
-    dict
-        The fields ``standing``, ``body_rest_s``, ``slip_m`` and ``displacement_m`` of StopOutcome.
+    StopOutcome
+        Only with ``standing``, ``body_rest_s``, ``slip_m`` and ``displacement_m``.
     """
     odometry = hold.odometry
     speed = np.linalg.norm(odometry.velocity_in_base, axis=1)
     time = odometry.time - odometry.time[0]
     last = time > time[-1] - STANDING_WINDOW
-    standing = bool((speed[last] < STILL_SPEED).all() and (hold.feet.force[last] > contact_force).all())
+    still, loaded = speed[last] < STILL_SPEED, hold.feet.force[last] > contact_force
     moving = np.flatnonzero(speed >= STILL_SPEED)
     rest = min(moving[-1] + 1, len(time) - 1) if moving.size else 0
-    path = odometry.position_in_world[:rest + 1, :2]
+    path = odometry.position_in_world[: rest + 1, :2]
     slip = foot_slip(_first_rows(hold, rest + 1), robot, contact_force)
-    return {'standing': standing, 'body_rest_s': float(time[rest]),
-            'slip_m': 0.0 if slip is None else float(slip.mean()),
-            'displacement_m': float(np.hypot(*(path[-1] - path[0])))}
+    return StopOutcome(
+        fell=False,
+        standing=bool(still.all() and loaded.all()),
+        body_rest_s=float(time[rest]),
+        slip_m=0.0 if slip is None else float(slip.mean()),
+        displacement_m=float(np.hypot(*(path[-1] - path[0]))),
+    )
 
 
 def _first_rows(hold: Recording, count: int) -> Recording:
     joints, odometry, feet = hold.joints, hold.odometry, hold.feet
     return Recording(
-        joints=type(joints)(joints.time[:count], joints.position[:count], joints.velocity[:count],
-                            joints.effort[:count]),
-        odometry=type(odometry)(odometry.time[:count], odometry.position_in_world[:count],
-                                odometry.quaternion[:count], odometry.velocity_in_base[:count],
-                                odometry.rate_in_base[:count]),
-        feet=type(feet)(feet.time[:count], feet.force[:count]))
+        joints=type(joints)(
+            joints.time[:count],
+            joints.position[:count],
+            joints.velocity[:count],
+            joints.effort[:count],
+        ),
+        odometry=type(odometry)(
+            odometry.time[:count],
+            odometry.position_in_world[:count],
+            odometry.quaternion[:count],
+            odometry.velocity_in_base[:count],
+            odometry.rate_in_base[:count],
+        ),
+        feet=type(feet)(feet.time[:count], feet.force[:count]),
+    )
 
 
 @dataclass(frozen=True)
@@ -143,6 +156,7 @@ class StopSummary:
 
 def summary(outcomes: Sequence[StopOutcome]) -> StopSummary:
     """Summarise outcomes; those that fell count, but have no times or lengths."""
+
     def number(name: str) -> int:
         return sum(bool(getattr(outcome, name)) for outcome in outcomes)
 
@@ -152,7 +166,15 @@ def summary(outcomes: Sequence[StopOutcome]) -> StopSummary:
         return (float(np.median(values)), float(values.max())) if values.size else (np.nan, np.nan)
 
     return StopSummary(
-        len(outcomes), number('fell'), number('standing'), number('walked_on'),
-        sum(np.isfinite(outcome.bound_s) for outcome in outcomes), number('bound_exceeded'),
-        spread('prediction_error'), spread('measured_s'), spread('body_rest_s'), spread('slip_m'),
-        spread('displacement_m'))
+        len(outcomes),
+        number('fell'),
+        number('standing'),
+        number('walked_on'),
+        sum(np.isfinite(outcome.bound_s) for outcome in outcomes),
+        number('bound_exceeded'),
+        spread('prediction_error'),
+        spread('measured_s'),
+        spread('body_rest_s'),
+        spread('slip_m'),
+        spread('displacement_m'),
+    )

@@ -15,13 +15,15 @@ import numpy as np
 
 
 def plain(value: Any) -> Any:
-    """Value as None, bool, int, float, str, list and dict only; numbers that are not finite become None."""
+    """Value in types that JSON knows; numbers that are not finite become None."""
     if isinstance(value, np.generic):
         return plain(value.item())
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return plain({field.name: getattr(value, field.name) for field in dataclasses.fields(value)})
+        return plain(
+            {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+        )
     if isinstance(value, Mapping):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, Set):

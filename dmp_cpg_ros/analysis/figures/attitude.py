@@ -13,8 +13,10 @@ from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.motion import integral, roll_pitch_yaw
 from dmp_cpg_ros.analysis.recording import Recording
 
-CAPTION = ('Roll and pitch, height and yaw of the base. The dashed lines are what is asked for: the standing height, '
-           'and the integral of the reference turn rate.')
+CAPTION = (
+    'Roll and pitch, height and yaw of the base. The dashed lines are what is asked for: the '
+    'standing height, and the integral of the reference turn rate.'
+)
 
 ROLL, PITCH, HEIGHT, YAW = '#56B4E9', '#E69F00', '#6A51A3', '#6A51A3'
 DASHED = (0, (5, 2))
@@ -34,20 +36,31 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     tilt_panel.plot(odometry.time, roll, color=ROLL, linewidth=0.9)
     tilt_panel.plot(odometry.time, pitch, color=PITCH, linewidth=0.9)
     tilt_panel.set_ylabel('tilt [°]')
-    height_panel.plot(odometry.time, 100.0 * odometry.position_in_world[:, 2], color=HEIGHT, linewidth=0.9)
+    height_panel.plot(
+        odometry.time, 100.0 * odometry.position_in_world[:, 2], color=HEIGHT, linewidth=0.9
+    )
     height_panel.set_ylabel('height [cm]')
     if context.robot is not None:
-        height_panel.axhline(100.0 * context.robot.stance_height, color=style.INK, linewidth=0.9, linestyle=DASHED)
+        height_panel.axhline(
+            100.0 * context.robot.stance_height, color=style.INK, linewidth=0.9, linestyle=DASHED
+        )
     yaw_panel.plot(odometry.time, yaw, color=YAW)
     if reference.time.size > 1:
         asked = np.rad2deg(integral(reference.time, reference.value[:, 2]))
-        yaw_panel.plot(reference.time, asked + yaw[0], color=style.INK, linewidth=0.9, linestyle=DASHED)
+        yaw_panel.plot(
+            reference.time, asked + yaw[0], color=style.INK, linewidth=0.9, linestyle=DASHED
+        )
     yaw_panel.set_ylabel('yaw [°]')
     yaw_panel.set_xlabel('time [s]')
-    figure.legend(handles=[
-        Line2D([], [], color=ROLL, label='roll'), Line2D([], [], color=PITCH, label='pitch'),
-        Line2D([], [], color=HEIGHT, label='height, yaw'),
-        Line2D([], [], color=style.INK, linestyle=DASHED, label='asked for'), *shades],
-        loc='outside upper center', ncols=6, columnspacing=1.2)
+    style.legend(
+        figure,
+        [
+            Line2D([], [], color=ROLL, label='roll'),
+            Line2D([], [], color=PITCH, label='pitch'),
+            Line2D([], [], color=HEIGHT, label='height, yaw'),
+            Line2D([], [], color=style.INK, linestyle=DASHED, label='asked for'),
+            *shades,
+        ],
+    )
     figure.align_ylabels()
     return figure

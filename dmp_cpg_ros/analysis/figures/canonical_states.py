@@ -11,8 +11,10 @@ from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_state import LEGS
 
-CAPTION = ('Canonical states across the addition and the removal of sparse inhibition. Only the inhibited leg '
-           'feels it; the coupling brings the other three to rest at their places.')
+CAPTION = (
+    'Canonical states across the addition and the removal of sparse inhibition. Only the '
+    'inhibited leg feels it; the coupling brings the other three to rest at their places.'
+)
 
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
@@ -25,7 +27,11 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     for component, panel in enumerate(axes[:, 0]):
         shades = style.shade_stops(panel, recording)
         for index, leg in enumerate(LEGS):
-            panel.plot(canonical.time[rows], canonical.x[rows, index, component], color=style.LEG_COLOURS[leg])
+            panel.plot(
+                canonical.time[rows],
+                canonical.x[rows, index, component],
+                color=style.LEG_COLOURS[leg],
+            )
         panel.set_ylabel(f'$x_{{i{component + 1}}}$ [–]')
         panel.set_ylim(-1.25 * context.radius, 1.25 * context.radius)
         style.limit_view(panel, window)

@@ -19,8 +19,11 @@ from dmp_cpg_ros.core.leg_primitive import body_scale
 from dmp_cpg_ros.core.phase import phase
 from dmp_cpg_ros.core.robot_state import LEGS
 
-CAPTION = ('Footfall diagram: bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles of '
-           'steady walking. Bottom: the first stop, at whose end all four feet stand, and the start after it.')
+CAPTION = (
+    'Footfall diagram: bars mark feet on the ground, measured (solid) over planned (pale). Top: a '
+    'few cycles of steady walking. Bottom: the first stop, at whose end all four feet stand, and '
+    'the start after it.'
+)
 
 CYCLES = 6
 """Gait cycles of steady walking that are drawn."""
@@ -38,8 +41,7 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     shades = style.shade_stops(axes[-1, 0], recording)
     axes[-1, 0].set_xlabel('time [s]')
     planned = [Patch(color='#BBBBBB', label='planned')] if context.gait is not None else []
-    figure.legend(handles=[Patch(color='#555555', label='measured'), *planned, *shades],
-                  loc='outside upper center', ncols=4)
+    style.legend(figure, [Patch(color='#555555', label='measured'), *planned, *shades])
     return figure
 
 
@@ -53,12 +55,16 @@ def steady_window(recording: Recording, cycles: int = CYCLES) -> tuple[float, fl
 
 
 def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool_] | None:
-    """Which feet the gait plans on the ground at the canonical states' times, boolean ndarray (n, 4).
+    """Feet that the gait plans on the ground at each canonical state, boolean (n, 4).
 
     While a stop or a start is under way every foot is planned where it is, and nothing is drawn.
     """
     canonical, reference = recording.canonical, recording.reference
-    if context.gait is None or context.robot is None or not (canonical.time.size and reference.time.size):
+    if (
+        context.gait is None
+        or context.robot is None
+        or not (canonical.time.size and reference.time.size)
+    ):
         return None
     scale = body_scale(context.robot)
     values = held(reference.time, reference.value, canonical.time)
@@ -67,19 +73,30 @@ def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool
     running = np.zeros(len(canonical.time), dtype=bool)
     for episode in episodes(recording, RUNNING):
         running |= (canonical.time >= episode.start) & (canonical.time < episode.end)
-    return stance & (running if recording.inhibition else True)[:, None]
+    return stance & running[:, None] if recording.inhibition else stance
 
 
-def _diagram(axes: Axes, recording: Recording, context: RunContext, window: tuple[float, float]) -> None:
+def _diagram(
+    axes: Axes, recording: Recording, context: RunContext, window: tuple[float, float]
+) -> None:
     contact = recording.feet.force > context.contact_force
     planned = planned_stance(recording, context)
     for row, leg in enumerate(LEGS):
         y = len(LEGS) - 1 - row
         if planned is not None:
-            axes.broken_barh(bars(recording.canonical.time, planned[:, row]), (y - 0.4, 0.8),
-                             facecolor=style.LEG_COLOURS[leg], alpha=0.28, linewidth=0)
-        axes.broken_barh(bars(recording.feet.time, contact[:, row]), (y - 0.22, 0.44),
-                         facecolor=style.LEG_COLOURS[leg], linewidth=0)
+            axes.broken_barh(
+                bars(recording.canonical.time, planned[:, row]),
+                (y - 0.4, 0.8),
+                facecolor=style.LEG_COLOURS[leg],
+                alpha=0.28,
+                linewidth=0,
+            )
+        axes.broken_barh(
+            bars(recording.feet.time, contact[:, row]),
+            (y - 0.22, 0.44),
+            facecolor=style.LEG_COLOURS[leg],
+            linewidth=0,
+        )
     axes.set_yticks(range(len(LEGS)), [style.LEG_NAMES[leg] for leg in reversed(LEGS)])
     axes.set_ylim(-0.6, len(LEGS) - 0.4)
     axes.grid(visible=False, axis='y')
@@ -89,5 +106,7 @@ def _diagram(axes: Axes, recording: Recording, context: RunContext, window: tupl
 def bars(time: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[tuple[float, float]]:
     """Start and length of each stretch in which a mask holds [s]."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return [(float(time[first]), float(time[min(last, len(time) - 1)] - time[first]))
-            for first, last in zip(edges[::2], edges[1::2], strict=True)]
+    return [
+        (float(time[first]), float(time[min(last, len(time) - 1)] - time[first]))
+        for first, last in zip(edges[::2], edges[1::2], strict=True)
+    ]

@@ -17,8 +17,10 @@ from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_state import LEGS
 
-CAPTION = ('Path of the base from above. Small dots are footholds, one for each stance; squares mark where the robot '
-           'stood still, arrows its heading every two seconds.')
+CAPTION = (
+    'Path of the base from above. Small dots are footholds, one for each stance; squares mark '
+    'where the robot stood still, arrows its heading every two seconds.'
+)
 
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
@@ -29,25 +31,58 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     x, y = odometry.position_in_world[:, 0], odometry.position_in_world[:, 1]
     margin = 0.4
     span_x, span_y = np.ptp(x) + 2 * margin, np.ptp(y) + 2 * margin
-    figure, axes = style.new_figure(float(np.clip((style.WIDTH - 0.7) * span_y / span_x + 0.9, 2.0, 7.0)))
+    figure, axes = style.new_figure(
+        float(np.clip((style.WIDTH - 0.7) * span_y / span_x + 0.9, 2.0, 7.0))
+    )
     panel = axes[0, 0]
     handles = [Line2D([], [], color=style.INK, label='base')]
     if context.robot is not None and _footholds(panel, recording, context):
-        handles += [Line2D([], [], color=style.LEG_COLOURS[leg], marker='.', linestyle='', label=style.LEG_NAMES[leg])
-                    for leg in LEGS]
+        handles += [
+            Line2D(
+                [],
+                [],
+                color=style.LEG_COLOURS[leg],
+                marker='.',
+                linestyle='',
+                label=style.LEG_NAMES[leg],
+            )
+            for leg in LEGS
+        ]
     panel.plot(x, y, color=style.INK, linewidth=1.3, zorder=3)
     _headings(panel, recording)
-    panel.plot(x[0], y[0], marker='o', color='white', markeredgecolor=style.INK, markersize=6, zorder=5)
+    panel.plot(
+        x[0], y[0], marker='o', color='white', markeredgecolor=style.INK, markersize=6, zorder=5
+    )
     for episode in episodes(recording, STOPPING):
         if episode.events[0].message != 'at_rest':
-            panel.plot(np.interp(episode.end, odometry.time, x), np.interp(episode.end, odometry.time, y), marker='s',
-                       color='#C00000', markersize=5, zorder=5)
-    handles += [Line2D([], [], color='white', markeredgecolor=style.INK, marker='o', linestyle='', label='begin'),
-                Line2D([], [], color='#C00000', marker='s', linestyle='', label='stop')]
-    panel.set(xlim=(x.min() - margin, x.max() + margin), ylim=(y.min() - margin, y.max() + margin),
-              xlabel='x [m]', ylabel='y [m]')
+            panel.plot(
+                np.interp(episode.end, odometry.time, x),
+                np.interp(episode.end, odometry.time, y),
+                marker='s',
+                color='#C00000',
+                markersize=5,
+                zorder=5,
+            )
+    handles += [
+        Line2D(
+            [],
+            [],
+            color='white',
+            markeredgecolor=style.INK,
+            marker='o',
+            linestyle='',
+            label='begin',
+        ),
+        Line2D([], [], color='#C00000', marker='s', linestyle='', label='stop'),
+    ]
+    panel.set(
+        xlim=(x.min() - margin, x.max() + margin),
+        ylim=(y.min() - margin, y.max() + margin),
+        xlabel='x [m]',
+        ylabel='y [m]',
+    )
     panel.set_aspect('equal')
-    figure.legend(handles=handles, loc='outside upper center', ncols=len(handles), columnspacing=1.2)
+    style.legend(figure, handles)
     return figure
 
 
@@ -55,10 +90,25 @@ def _headings(axes: Axes, recording: Recording, every: float = 2.0) -> None:
     odometry = recording.odometry
     yaw = roll_pitch_yaw(odometry.quaternion)[:, 2]
     times = np.arange(odometry.time[0] + every, odometry.time[-1], every)
-    x, y, heading = (np.interp(times, odometry.time, column)
-                     for column in (*odometry.position_in_world[:, :2].T, yaw))
-    axes.quiver(x, y, np.cos(heading), np.sin(heading), color=style.INK, angles='xy', scale_units='xy', scale=4.5,
-                width=0.0028, headwidth=5, headlength=5, headaxislength=4.5, zorder=4)
+    x, y, heading = (
+        np.interp(times, odometry.time, column)
+        for column in (*odometry.position_in_world[:, :2].T, yaw)
+    )
+    axes.quiver(
+        x,
+        y,
+        np.cos(heading),
+        np.sin(heading),
+        color=style.INK,
+        angles='xy',
+        scale_units='xy',
+        scale=4.5,
+        width=0.0028,
+        headwidth=5,
+        headlength=5,
+        headaxislength=4.5,
+        zorder=4,
+    )
 
 
 def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
@@ -69,13 +119,22 @@ def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
     R = rotations(recording.odometry.quaternion[rows[1]])
     base = recording.odometry.position_in_world[rows[1]]
     for index, leg in enumerate(context.robot.legs):
-        q = recording.joints.position[rows[0], 3 * index:3 * index + 3]
+        q = recording.joints.position[rows[0], 3 * index : 3 * index + 3]
         feet = base + np.einsum('nij,nj->ni', R, feet_in_base(leg, q))
         loaded = recording.feet.force[rows[2], index] > context.contact_force
         edges = np.flatnonzero(np.diff(np.concatenate([[0], loaded.astype(int), [0]])))
-        places = [feet[first:last, :2].mean(axis=0) for first, last in zip(edges[::2], edges[1::2], strict=True)
-                  if last - first > 5]
+        places = [
+            feet[first:last, :2].mean(axis=0)
+            for first, last in zip(edges[::2], edges[1::2], strict=True)
+            if last - first > 5
+        ]
         if places:
-            axes.plot(*np.array(places).T, color=style.LEG_COLOURS[leg.name], marker='.', markersize=3.5,
-                      linestyle='', zorder=2)
+            axes.plot(
+                *np.array(places).T,
+                color=style.LEG_COLOURS[leg.name],
+                marker='.',
+                markersize=3.5,
+                linestyle='',
+                zorder=2,
+            )
     return True

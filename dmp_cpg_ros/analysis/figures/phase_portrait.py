@@ -17,10 +17,13 @@ from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.phase import state_at
 from dmp_cpg_ros.core.robot_state import LEGS
 
-CAPTION = ('Phase portraits of the first stop. Left: the inhibited oscillator runs on its limit cycle until '
-           'inhibition is armed and it enters the region C, where it is held near its target. Middle: close-up of C; '
-           'the small distance at which it rests is the pull of the other oscillators over the gain. Right: all four '
-           'legs; dots mark where they rest, rings where their places in the gait are.')
+CAPTION = (
+    'Phase portraits of the first stop. Left: the inhibited oscillator runs on its limit cycle '
+    'until inhibition is armed and it enters the region C, where it is held near its target. '
+    'Middle: close-up of C; the small distance at which it rests is the pull of the other '
+    'oscillators over the gain. Right: all four legs; dots mark where they rest, rings where '
+    'their places in the gait are.'
+)
 
 AHEAD = 1.5
 """Time before the request that is drawn [s]."""
@@ -29,8 +32,12 @@ FREE, REQUESTED = '#C9CED6', '#B8860B'
 
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
-    """Draw the inhibited oscillator, a close-up of C, and all four; None without canonical states or a stop."""
-    stops = [episode for episode in episodes(recording, STOPPING) if episode.events[0].message != 'at_rest']
+    """Draw the first stop; None without canonical states or a stop."""
+    stops = [
+        episode
+        for episode in episodes(recording, STOPPING)
+        if episode.events[0].message != 'at_rest'
+    ]
     if not recording.canonical.time.size or not stops:
         return None
     held = LEGS.index(context.inhibition.inhibited_legs[0])
@@ -41,16 +48,21 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     r0, target = 1.25 * context.inhibition.region_radius, places[held]
     axes[0, 1].set(xlim=(target[0] - r0, target[0] + r0), ylim=(target[1] - r0, target[1] + r0))
     _all_legs(axes[0, 2], recording, context, stops[0], places)
-    for panel, title in zip(axes[0], (f'{style.LEG_NAMES[LEGS[held]]}', 'close-up of C', 'all legs'), strict=True):
+    for panel, title in zip(
+        axes[0], (f'{style.LEG_NAMES[LEGS[held]]}', 'close-up of C', 'all legs'), strict=True
+    ):
         panel.set_aspect('equal')
         panel.set_title(title)
         panel.set_xlabel('$x_{i1}$ [–]')
     axes[0, 0].set_ylabel('$x_{i2}$ [–]')
-    handles = [Line2D([], [], color=FREE, linewidth=3.2, label='free'), Line2D([], [], color=REQUESTED, label='stop requested'),
-               Line2D([], [], color=style.INK, label='inhibited'),
-               Patch(facecolor='#E8EEF6', edgecolor='#3B6EA8', label='region C'),
-               Line2D([], [], color='#C00000', marker='x', linestyle='', label='target $x_d$')]
-    figure.legend(handles=handles, loc='outside upper center', ncols=5)
+    handles = [
+        Line2D([], [], color=FREE, linewidth=3.2, label='free'),
+        Line2D([], [], color=REQUESTED, label='stop requested'),
+        Line2D([], [], color=style.INK, label='inhibited'),
+        Patch(facecolor='#E8EEF6', edgecolor='#3B6EA8', label='region C'),
+        Line2D([], [], color='#C00000', marker='x', linestyle='', label='target $x_d$'),
+    ]
+    style.legend(figure, handles)
     return figure
 
 
@@ -60,22 +72,52 @@ def _places(context: RunContext) -> np.ndarray:
 
 
 def _limit_cycle(axes: Axes, context: RunContext) -> None:
-    axes.add_patch(Circle((0.0, 0.0), context.radius, fill=False, linestyle=(0, (4, 3)), linewidth=0.8,
-                          edgecolor='#AAAAAA', zorder=1))
+    axes.add_patch(
+        Circle(
+            (0.0, 0.0),
+            context.radius,
+            fill=False,
+            linestyle=(0, (4, 3)),
+            linewidth=0.8,
+            edgecolor='#AAAAAA',
+            zorder=1,
+        )
+    )
 
 
-def _inhibited(axes: Axes, recording: Recording, context: RunContext, stop: Episode, held: int) -> None:
+def _inhibited(
+    axes: Axes, recording: Recording, context: RunContext, stop: Episode, held: int
+) -> None:
     time, x = recording.canonical.time, recording.canonical.x[:, held]
     target = _places(context)[held]
     _limit_cycle(axes, context)
-    axes.add_patch(Circle(target, context.inhibition.region_radius, facecolor='#E8EEF6', edgecolor='#3B6EA8',
-                          linewidth=0.8, zorder=1.5))
+    axes.add_patch(
+        Circle(
+            target,
+            context.inhibition.region_radius,
+            facecolor='#E8EEF6',
+            edgecolor='#3B6EA8',
+            linewidth=0.8,
+            zorder=1.5,
+        )
+    )
     captured = next((event.time for event in stop.events if event.message != 'waiting'), stop.end)
-    for start, end, colour, width in ((stop.start - AHEAD, stop.start, FREE, 3.2),
-                                      (stop.start, captured, REQUESTED, 1.3), (captured, stop.end, style.INK, 1.5)):
+    for start, end, colour, width in (
+        (stop.start - AHEAD, stop.start, FREE, 3.2),
+        (stop.start, captured, REQUESTED, 1.3),
+        (captured, stop.end, style.INK, 1.5),
+    ):
         rows = style.rows_in(time, (start, end))
         axes.plot(*x[rows].T, color=colour, linewidth=width, zorder=3)
-    axes.plot(*target, marker='x', color='#C00000', markersize=5, markeredgewidth=1.3, linestyle='', zorder=5)
+    axes.plot(
+        *target,
+        marker='x',
+        color='#C00000',
+        markersize=5,
+        markeredgewidth=1.3,
+        linestyle='',
+        zorder=5,
+    )
     rest = x[time <= stop.end]
     if len(rest):
         axes.plot(*rest[-1], marker='o', color=style.INK, markersize=3.5, zorder=4)
@@ -87,11 +129,22 @@ def _inhibited(axes: Axes, recording: Recording, context: RunContext, stop: Epis
 def _sense(axes: Axes, context: RunContext) -> None:
     """Arrow inside the limit cycle that shows the sense of rotation."""
     tail, head = (0.78 * state_at(angle, context.radius) for angle in (2.0, 2.9))
-    axes.add_patch(FancyArrowPatch(tuple(tail), tuple(head), connectionstyle='arc3,rad=-0.22', arrowstyle='-|>',
-                                   mutation_scale=8, color=style.GREY, linewidth=0.9))
+    axes.add_patch(
+        FancyArrowPatch(
+            tuple(tail),
+            tuple(head),
+            connectionstyle='arc3,rad=-0.22',
+            arrowstyle='-|>',
+            mutation_scale=8,
+            color=style.GREY,
+            linewidth=0.9,
+        )
+    )
 
 
-def _all_legs(axes: Axes, recording: Recording, context: RunContext, stop: Episode, places: np.ndarray) -> None:
+def _all_legs(
+    axes: Axes, recording: Recording, context: RunContext, stop: Episode, places: np.ndarray
+) -> None:
     time = recording.canonical.time
     rows = style.rows_in(time, (stop.start, stop.end))
     _limit_cycle(axes, context)
@@ -100,9 +153,23 @@ def _all_legs(axes: Axes, recording: Recording, context: RunContext, stop: Episo
         axes.plot(*x.T, color=style.LEG_COLOURS[leg], linewidth=0.9, alpha=0.8)
         if len(x):
             axes.plot(*x[-1], marker='o', color=style.LEG_COLOURS[leg], markersize=5, zorder=4)
-            axes.annotate(leg.upper(), x[-1], 0.62 * x[-1], color=style.LEG_COLOURS[leg], ha='center', va='center',
-                          fontweight='bold')
-        axes.plot(*places[index], marker='o', markerfacecolor='none', color=style.LEG_COLOURS[leg], markersize=8,
-                  linestyle='', zorder=3)
+            axes.annotate(
+                leg.upper(),
+                x[-1],
+                0.62 * x[-1],
+                color=style.LEG_COLOURS[leg],
+                ha='center',
+                va='center',
+                fontweight='bold',
+            )
+        axes.plot(
+            *places[index],
+            marker='o',
+            markerfacecolor='none',
+            color=style.LEG_COLOURS[leg],
+            markersize=8,
+            linestyle='',
+            zorder=3,
+        )
     reach = context.radius + context.inhibition.region_radius + 0.1
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach))

@@ -7,7 +7,7 @@ Figures are made without pyplot: nothing is global and nothing needs a screen.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -27,6 +27,9 @@ WIDTH = 7.2
 
 DPI = 200
 
+LEGEND_HEIGHT = 0.28
+"""Strip above the panels that a legend takes [inch]."""
+
 LEG_COLOURS = dict(zip(LEGS, ('#0072B2', '#D55E00', '#009E73', '#CC79A7'), strict=True))
 """Okabe & Ito's palette, which keeps its contrast with every kind of colour vision."""
 
@@ -36,26 +39,53 @@ INK, GREY, MEASURED, REFERENCE = '#222222', '#8A8A8A', '#0072B2', '#222222'
 WAITING, INHIBITED = '#F6E8B1', '#D9DEE4'
 
 _PARAMETERS: dict[str, Any] = {
-    'font.family': 'sans-serif', 'font.size': 8.5, 'axes.labelsize': 8.5, 'axes.titlesize': 8.5,
-    'legend.fontsize': 8.0, 'xtick.labelsize': 8.0, 'ytick.labelsize': 8.0, 'mathtext.fontset': 'dejavusans',
-    'axes.spines.top': False, 'axes.spines.right': False, 'axes.edgecolor': '#555555', 'axes.linewidth': 0.7,
-    'axes.labelcolor': INK, 'text.color': INK, 'xtick.color': '#555555', 'ytick.color': '#555555',
-    'xtick.labelcolor': INK, 'ytick.labelcolor': INK, 'axes.grid': True, 'grid.color': '#E4E4E4',
-    'grid.linewidth': 0.6, 'axes.axisbelow': True, 'lines.linewidth': 1.2, 'legend.frameon': False,
-    'figure.facecolor': 'white', 'axes.facecolor': 'white', 'savefig.dpi': DPI, 'figure.dpi': DPI,
-    'axes.titlelocation': 'left', 'axes.titlepad': 4.0, 'agg.path.chunksize': 10_000}
+    'font.family': 'sans-serif',
+    'font.size': 8.5,
+    'axes.labelsize': 8.5,
+    'axes.titlesize': 8.5,
+    'legend.fontsize': 8.0,
+    'xtick.labelsize': 8.0,
+    'ytick.labelsize': 8.0,
+    'mathtext.fontset': 'dejavusans',
+    'axes.spines.top': False,
+    'axes.spines.right': False,
+    'axes.edgecolor': '#555555',
+    'axes.linewidth': 0.7,
+    'axes.labelcolor': INK,
+    'text.color': INK,
+    'xtick.color': '#555555',
+    'ytick.color': '#555555',
+    'xtick.labelcolor': INK,
+    'ytick.labelcolor': INK,
+    'axes.grid': True,
+    'grid.color': '#E4E4E4',
+    'grid.linewidth': 0.6,
+    'axes.axisbelow': True,
+    'lines.linewidth': 1.2,
+    'legend.frameon': False,
+    'figure.facecolor': 'white',
+    'axes.facecolor': 'white',
+    'savefig.dpi': DPI,
+    'figure.dpi': DPI,
+    'axes.titlelocation': 'left',
+    'axes.titlepad': 4.0,
+    'agg.path.chunksize': 10_000,
+}
 
 
 @contextmanager
 def applied() -> Iterator[None]:
-    """Context in which figures are made and saved; a user's own matplotlibrc does not matter in it."""
+    """Make and save figures in this context, whatever matplotlibrc the user has."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_PARAMETERS)
+        for name, value in _PARAMETERS.items():
+            matplotlib.rcParams[name] = value
         yield
 
 
-def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
+def new_figure(
+    height: float, rows: int = 1, columns: int = 1, **options: Any
+) -> tuple[Figure, Any]:
     """Figure of page width and its axes, ndarray (rows, columns).
 
     Parameters
@@ -71,16 +101,29 @@ def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def leg_legend(figure: Figure, extra: list[Any] | None = None) -> None:
-    """Legend of the four legs, and more handles, in one row above the panels."""
+def legend(figure: Figure, handles: Sequence[Any]) -> None:
+    """Put a legend in one row above the panels."""
+    height = LEGEND_HEIGHT / figure.get_figheight()
+    figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 1.0 - height))
+    figure.legend(
+        handles=list(handles),
+        loc='upper center',
+        ncols=len(handles),
+        columnspacing=1.3,
+        handlelength=1.6,
+        handletextpad=0.5,
+        borderaxespad=0.3,
+    )
+
+
+def leg_legend(figure: Figure, extra: Sequence[Any] = ()) -> None:
+    """Legend of the four legs, and more handles."""
     lines = [Line2D([], [], color=LEG_COLOURS[leg], label=LEG_NAMES[leg]) for leg in LEGS]
-    handles = lines + (extra or [])
-    figure.legend(handles=handles, loc='outside upper center', ncols=len(handles), columnspacing=1.3,
-                  handlelength=1.5, handletextpad=0.5)
+    legend(figure, [*lines, *extra])
 
 
 def shade_stops(axes: Axes, recording: Recording) -> list[Patch]:
-    """Shade the time in which a stop is requested and in which inhibition holds; returns legend handles."""
+    """Shade requested stops and inhibition; returns handles for the legend."""
     waiting = inhibited = False
     for episode in episodes(recording, STOPPING):
         captures = [event.time for event in episode.events if event.message != 'waiting']
@@ -91,8 +134,9 @@ def shade_stops(axes: Axes, recording: Recording) -> list[Patch]:
         if episode.end > capture:
             axes.axvspan(capture, episode.end, color=INHIBITED, linewidth=0, zorder=0)
             inhibited = True
-    return ([Patch(color=WAITING, label='stop requested')] * waiting
-            + [Patch(color=INHIBITED, label='inhibited')] * inhibited)
+    return [Patch(color=WAITING, label='stop requested')] * waiting + [
+        Patch(color=INHIBITED, label='inhibited')
+    ] * inhibited
 
 
 def limit_view(axes: Axes, window: tuple[float, float]) -> None:
@@ -101,8 +145,9 @@ def limit_view(axes: Axes, window: tuple[float, float]) -> None:
     axes.margins(x=0.0)
 
 
-def stop_window(recording: Recording, before: float = 2.5, after: float = 2.5,
-                longest: float = 14.0) -> tuple[float, float]:
+def stop_window(
+    recording: Recording, before: float = 2.5, after: float = 2.5, longest: float = 14.0
+) -> tuple[float, float]:
     """Window around the first stop that was asked for, up to the walking after it [s].
 
     Without a stop it is the end of the recording.

@@ -14,9 +14,12 @@ from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.metrics.timing import ROBOT_NODE
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 
-CAPTION = ('Timing. Top: what the robot measured of itself: control rate, and the latency from a state to the last of the '
-           'four targets that answer it. Bottom, where the recording bears wall time: how far apart the states '
-           'reached the recorder, and how long after a state the last target of its tick did.')
+CAPTION = (
+    'Timing. Top: what the robot measured of itself: control rate, and the latency from a state '
+    'to the last of the four targets that answer it. Bottom, where the recording bears wall time: '
+    'how far apart the states reached the recorder, and how long after a state the last target of '
+    'its tick did.'
+)
 
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
@@ -39,13 +42,22 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
 
 def robot_history(recording: Recording) -> list[StatusEvent]:
     """Statuses of the robot that state a rate, in order."""
-    statuses = (status for name, history in recording.statuses.items() if ROBOT_NODE in name for status in history)
-    return sorted((status for status in statuses if status.number('rate_hz') is not None),
-                  key=lambda status: status.time)
+    statuses = (
+        status
+        for name, history in recording.statuses.items()
+        if ROBOT_NODE in name
+        for status in history
+    )
+    return sorted(
+        (status for status in statuses if status.number('rate_hz') is not None),
+        key=lambda status: status.time,
+    )
 
 
 def _series(history: list[StatusEvent], key: str) -> NDArray[np.float64]:
-    return np.array([np.nan if (value := status.number(key)) is None else value for status in history])
+    return np.array(
+        [np.nan if (value := status.number(key)) is None else value for status in history]
+    )
 
 
 def _rate(axes: Axes, history: list[StatusEvent]) -> None:
@@ -60,7 +72,10 @@ def _rate(axes: Axes, history: list[StatusEvent]) -> None:
 
 def _latency(axes: Axes, history: list[StatusEvent]) -> None:
     time = [status.time for status in history]
-    for key, label, colour in (('latency_ms_p99', '99 %', '#D55E00'), ('latency_ms_p50', 'median', '#0072B2')):
+    for key, label, colour in (
+        ('latency_ms_p99', '99 %', '#D55E00'),
+        ('latency_ms_p50', 'median', '#0072B2'),
+    ):
         axes.plot(time, _series(history, key), color=colour, marker='.', markersize=3, label=label)
     axes.set(xlabel='time [s]', ylabel='latency [ms]')
     axes.set_ylim(bottom=0.0)
@@ -75,5 +90,7 @@ def _histogram(axes: Axes, values: NDArray[np.float64], label: str) -> None:
     axes.hist(np.clip(values, 0.0, largest), bins=80, range=(0.0, largest), color='#0072B2')
     axes.set_yscale('log')
     axes.set(xlabel=label, ylabel='ticks')
-    axes.set_title(f'median {np.median(values):.2f} ms, 99 % {np.percentile(values, 99):.2f} ms, '
-                   f'largest {values.max():.1f} ms')
+    axes.set_title(
+        f'median {np.median(values):.2f} ms, 99 % {np.percentile(values, 99):.2f} ms, '
+        f'largest {values.max():.1f} ms'
+    )

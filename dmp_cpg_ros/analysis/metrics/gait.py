@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import (
-    MOVING, SETTLING, gait_period, running_intervals, steady_segments)
+    MOVING,
+    SETTLING,
+    gait_period,
+    running_intervals,
+    steady_segments,
+)
 from dmp_cpg_ros.analysis.motion import held, mean_between
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.leg_primitive import body_scale
@@ -27,9 +32,10 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``phase_error_rad_max``, the largest deviation of a leg from its place in the gait while walking freely and
-        settled; ``duty_factor``, the measured share of the cycle on the ground, mean of the legs, with
-        ``duty_factor_of_leg`` and the planned ``duty_factor_planned``; ``period_s``, the median gait cycle.
+        ``phase_error_rad_max``, the largest deviation of a leg from its place in the gait while
+        walking freely and settled; ``duty_factor``, the measured share of the cycle on the ground,
+        mean of the legs, with ``duty_factor_of_leg`` and the planned ``duty_factor_planned``;
+        ``period_s``, the median gait cycle.
     """
     time, errors = phase_errors(recording, context)
     settled = settled_rows(recording, time)
@@ -38,9 +44,12 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         'name': None if context.gait is None else context.gait.name,
         'phase_error_rad_max': float(np.abs(errors[settled]).max()) if settled.any() else None,
         'duty_factor': None if duty is None else float(duty.mean()),
-        'duty_factor_of_leg': None if duty is None else dict(zip(LEGS, map(float, duty), strict=True)),
+        'duty_factor_of_leg': None
+        if duty is None
+        else dict(zip(LEGS, map(float, duty), strict=True)),
         'duty_factor_planned': planned_duty_factor(recording, context),
-        'period_s': gait_period(recording)}
+        'period_s': gait_period(recording),
+    }
 
 
 def phase_errors(recording: Recording, context: RunContext) -> tuple[Array, Array]:
@@ -90,7 +99,13 @@ def planned_duty_factor(recording: Recording, context: RunContext) -> float | No
     if context.gait is None or context.robot is None or not segments:
         return None
     scale = body_scale(context.robot)
-    planned = [context.gait.duty(scale.foot_speed(*held(
-        recording.reference.time, recording.reference.value, np.array([start]))[0]), scale)
-        for start, _ in segments]
+    planned = [
+        context.gait.duty(
+            scale.foot_speed(
+                *held(recording.reference.time, recording.reference.value, np.array([start]))[0]
+            ),
+            scale,
+        )
+        for start, _ in segments
+    ]
     return float(np.average(planned, weights=[end - start for start, end in segments]))

@@ -28,26 +28,32 @@ SHORTEST_DISTANCE = 0.5
 
 
 def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
-    """Group ``robot`` of ``metrics.json``; None where a topic or the robot's description is missing.
+    """Group ``robot`` of ``metrics.json``; None where topic or description are missing.
 
     Returns
     -------
     dict
-        ``fell``; ``distance_m``, the length of the horizontal path without sway; ``yaw_drift_deg_per_10m``, the
-        size of the yaw gained on straight, steady stretches; ``cost_of_transport``, positive mechanical joint
-        work over m g distance; ``foot_slip_m``, the sum over feet and run of sliding under load, and
-        ``foot_slip_m_per_foot_and_m``.
+        ``fell``; ``distance_m``, the length of the horizontal path without sway;
+        ``yaw_drift_deg_per_10m``, the size of the yaw gained on straight, steady stretches;
+        ``cost_of_transport``, positive mechanical joint work over m g distance; ``foot_slip_m``,
+        the sum over feet and run of sliding under load, and ``foot_slip_m_per_foot_and_m``.
     """
     distance = distance_walked(recording)
-    slip = None if context.robot is None else foot_slip(recording, context.robot, context.contact_force)
+    slip = (
+        None
+        if context.robot is None
+        else foot_slip(recording, context.robot, context.contact_force)
+    )
     total = None if slip is None else float(slip.sum())
-    far = distance is not None and distance >= SHORTEST_DISTANCE
+    far = distance if distance is not None and distance >= SHORTEST_DISTANCE else None
     return {
-        'fell': fell(recording, context), 'distance_m': distance,
+        'fell': fell(recording, context),
+        'distance_m': distance,
         'yaw_drift_deg_per_10m': yaw_drift(recording),
-        'cost_of_transport': cost_of_transport(recording, context, distance) if far else None,
+        'cost_of_transport': cost_of_transport(recording, context, far),
         'foot_slip_m': total,
-        'foot_slip_m_per_foot_and_m': total / 4.0 / distance if far and total is not None else None}
+        'foot_slip_m_per_foot_and_m': total / 4.0 / far if far and total is not None else None,
+    }
 
 
 def fell(recording: Recording, context: RunContext) -> bool | None:
@@ -78,18 +84,31 @@ def yaw_drift(recording: Recording) -> float | None:
     yaw = roll_pitch_yaw(odometry.quaternion)[:, 2]
     gained = walked = 0.0
     for start, end in steady_segments(recording):
-        v_x, v_y, gamma = held(recording.reference.time, recording.reference.value, np.array([start]))[0]
+        v_x, v_y, gamma = held(
+            recording.reference.time, recording.reference.value, np.array([start])
+        )[0]
         if abs(gamma) > MOVING or np.hypot(v_x, v_y) < MOVING:
             continue
-        there = [np.array([np.interp(t, odometry.time, column) for column in odometry.position_in_world[:, :2].T])
-                 for t in (start, end)]
+        there = [
+            np.array(
+                [
+                    np.interp(t, odometry.time, column)
+                    for column in odometry.position_in_world[:, :2].T
+                ]
+            )
+            for t in (start, end)
+        ]
         walked += float(np.hypot(*(there[1] - there[0])))
-        gained += abs(float(np.interp(end, odometry.time, yaw) - np.interp(start, odometry.time, yaw)))
+        gained += abs(
+            float(np.interp(end, odometry.time, yaw) - np.interp(start, odometry.time, yaw))
+        )
     return float(np.rad2deg(gained)) * 10.0 / walked if walked >= SHORTEST_DISTANCE else None
 
 
-def cost_of_transport(recording: Recording, context: RunContext, distance: float | None) -> float | None:
-    """Positive mechanical work of all joints over m g d (Tucker 1975); no losses, no recuperation."""
+def cost_of_transport(
+    recording: Recording, context: RunContext, distance: float | None
+) -> float | None:
+    """Positive mechanical work of all joints over m g d; no losses, no recuperation."""
     joints = recording.joints
     if context.robot is None or not distance or not joints.time.size:
         return None

@@ -20,22 +20,29 @@ REST_SETTLING = 0.5
 
 
 def stop_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
-    """Group ``stop`` of ``metrics.json``: the slowest completed stop, the counts, and ``all``."""
-    entries = [_stop(recording, context, episode) for episode in episodes(recording, STOPPING)
-               if episode.events[0].message != 'at_rest']
+    """Group ``stop`` of ``metrics.json``: the slowest completed stop, and ``all``."""
+    entries = [
+        _stop(recording, context, episode)
+        for episode in episodes(recording, STOPPING)
+        if episode.events[0].message != 'at_rest'
+    ]
     return _summary(entries)
 
 
 def start_metrics(recording: Recording) -> dict[str, Any]:
-    """Group ``start`` of ``metrics.json``: the slowest completed start, the counts, and ``all``."""
+    """Group ``start`` of ``metrics.json``: the slowest completed start, and ``all``."""
     return _summary([_start(recording, episode) for episode in episodes(recording, STARTING)])
 
 
 def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
     completed = [entry for entry in entries if entry['measured_s'] is not None]
     slowest = max(completed, key=lambda entry: float(entry['measured_s']), default={})
-    return {**{key: slowest.get(key) for key in ('predicted_s', 'bound_s', 'measured_s')},
-            'count': len(entries), 'completed': len(completed), 'all': entries}
+    return {
+        **{key: slowest.get(key) for key in ('predicted_s', 'bound_s', 'measured_s')},
+        'count': len(entries),
+        'completed': len(completed),
+        'all': entries,
+    }
 
 
 def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[str, Any]:
@@ -44,13 +51,24 @@ def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[s
     if at_rest is None:
         return entry
     window = (min(at_rest.time + REST_SETTLING, episode.end), episode.end)
-    return {**entry, 'rest_s': at_rest.time, 'rest_until_s': episode.end,
-            **_body_at_rest(recording, entry['request_s'], window), **_feet_at_rest(recording, context, window)}
+    return {
+        **entry,
+        'rest_s': at_rest.time,
+        'rest_until_s': episode.end,
+        **_body_at_rest(recording, entry['request_s'], window),
+        **_feet_at_rest(recording, context, window),
+    }
 
 
 def _start(recording: Recording, episode: Episode) -> dict[str, Any]:
-    walking = next((event for event in recording.inhibition
-                    if event.time >= episode.end and event.message in RUNNING), None)
+    walking = next(
+        (
+            event
+            for event in recording.inhibition
+            if event.time >= episode.end and event.message in RUNNING
+        ),
+        None,
+    )
     interrupted = walking is None or walking.time > episode.end
     return _times(episode, None if interrupted else walking)
 
@@ -65,8 +83,12 @@ def _times(episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
     if done is not None:
         measured = done.number('measured_s')
         measured = done.time - request if measured is None else measured
-    return {'request_s': request, 'predicted_s': _first(episode, 'predicted_s'),
-            'bound_s': _first(episode, 'bound_s'), 'measured_s': measured}
+    return {
+        'request_s': request,
+        'predicted_s': _first(episode, 'predicted_s'),
+        'bound_s': _first(episode, 'bound_s'),
+        'measured_s': measured,
+    }
 
 
 def _first(episode: Episode, key: str) -> float | None:
@@ -74,7 +96,9 @@ def _first(episode: Episode, key: str) -> float | None:
     return next((number for number in numbers if number is not None), None)
 
 
-def _body_at_rest(recording: Recording, request: float, window: tuple[float, float]) -> dict[str, Any]:
+def _body_at_rest(
+    recording: Recording, request: float, window: tuple[float, float]
+) -> dict[str, Any]:
     odometry = recording.odometry
     rows = (odometry.time >= window[0]) & (odometry.time < window[1])
     if not rows.any():
@@ -84,16 +108,22 @@ def _body_at_rest(recording: Recording, request: float, window: tuple[float, flo
     moving = odometry.time[since & (speed >= STILL_SPEED)]
     still_after = float(moving[-1]) - request if moving.size else 0.0
     start, end = (odometry.position_in_world[rows_of][0, :2] for rows_of in (since, rows))
-    return {'body_speed_at_rest': float(speed[rows].max()),
-            'body_still_after_s': still_after if speed[rows][-1] < STILL_SPEED else None,
-            'displacement_m': float(np.hypot(*(end - start)))}
+    return {
+        'body_speed_at_rest': float(speed[rows].max()),
+        'body_still_after_s': still_after if speed[rows][-1] < STILL_SPEED else None,
+        'displacement_m': float(np.hypot(*(end - start))),
+    }
 
 
-def _feet_at_rest(recording: Recording, context: RunContext, window: tuple[float, float]) -> dict[str, Any]:
+def _feet_at_rest(
+    recording: Recording, context: RunContext, window: tuple[float, float]
+) -> dict[str, Any]:
     feet = recording.feet
     rows = (feet.time >= window[0]) & (feet.time < window[1])
     if not rows.any():
         return {'feet_down_at_rest': None, 'least_foot_force_n': None}
     force = feet.force[rows]
-    return {'feet_down_at_rest': bool((force > context.contact_force).all()),
-            'least_foot_force_n': float(force.min())}
+    return {
+        'feet_down_at_rest': bool((force > context.contact_force).all()),
+        'least_foot_force_n': float(force.min()),
+    }

@@ -16,8 +16,11 @@ from dmp_cpg_ros.analysis.metrics.tracking import tracking_metrics
 from dmp_cpg_ros.analysis.recording import Recording
 
 
-def compute_metrics(recording: Recording, context: RunContext | None = None,
-                    certificate: Sequence[Any] | None = None) -> dict[str, Any]:
+def compute_metrics(
+    recording: Recording,
+    context: RunContext | None = None,
+    certificate: Sequence[Any] | None = None,
+) -> dict[str, Any]:
     """Everything that a run's ``metrics.json`` holds.
 
     Parameters
@@ -36,7 +39,11 @@ def compute_metrics(recording: Recording, context: RunContext | None = None,
     """
     context = context or RunContext()
     return {
-        'robot': robot_metrics(recording, context), 'tracking': tracking_metrics(recording),
-        'gait': gait_metrics(recording, context), 'stop': stop_metrics(recording, context),
-        'start': start_metrics(recording), 'timing': timing_metrics(recording),
-        'certificate': None if certificate is None else list(certificate)}
+        'robot': robot_metrics(recording, context),
+        'tracking': tracking_metrics(recording),
+        'gait': gait_metrics(recording, context),
+        'stop': stop_metrics(recording, context),
+        'start': start_metrics(recording),
+        'timing': timing_metrics(recording),
+        'certificate': None if certificate is None else list(certificate),
+    }

@@ -13,7 +13,7 @@ KEYS = ('rate_hz', 'real_time_factor', 'latency_ms_p50', 'latency_ms_p99', 'dead
 
 
 def timing_metrics(recording: Recording, node: str = ROBOT_NODE) -> dict[str, Any]:
-    """Group ``timing`` of ``metrics.json``: the robot's last status on ``/diagnostics`` that states each key.
+    """Group ``timing`` of ``metrics.json``, as the robot stated each key last.
 
     Parameters
     ----------
@@ -22,8 +22,10 @@ def timing_metrics(recording: Recording, node: str = ROBOT_NODE) -> dict[str, An
     node : str
         Part of the status's name.
     """
-    statuses = sorted((status for name, status in recording.diagnostics.items() if node in name),
-                      key=lambda status: status.time)
+    statuses = sorted(
+        (status for name, status in recording.diagnostics.items() if node in name),
+        key=lambda status: status.time,
+    )
     metrics: dict[str, Any] = dict.fromkeys(KEYS)
     for status in statuses:
         stated = {key: status.number(key) for key in KEYS}

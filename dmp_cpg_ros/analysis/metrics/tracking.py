@@ -22,10 +22,11 @@ def tracking_metrics(recording: Recording) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``v_rmse``, ``v_y_rmse`` [m/s] and ``gamma_rmse`` [rad/s]: root mean squares over the whole run of measured
-        minus reference at every instant; with ``_cycle`` after averaging over a gait cycle, which leaves the
-        sway of every step out; ``steady``: one entry per stretch of constant reference with means over whole
-        gait cycles, and ``v_error_max``, the largest relative error of forward speed among them.
+        ``v_rmse``, ``v_y_rmse`` [m/s] and ``gamma_rmse`` [rad/s]: root mean squares over the whole
+        run of measured minus reference at every instant; with ``_cycle`` after averaging over a
+        gait cycle, which leaves the sway of every step out; ``steady``: one entry per stretch of
+        constant reference with means over whole gait cycles, and ``v_error_max``, the largest
+        relative error of forward speed among them.
     """
     names = ('v_rmse', 'v_y_rmse', 'gamma_rmse')
     metrics: dict[str, Any] = dict.fromkeys([*names, *(f'{name}_cycle' for name in names)])
@@ -45,7 +46,9 @@ def tracking_metrics(recording: Recording) -> dict[str, Any]:
 
 def body_motion(recording: Recording) -> Array:
     """Measured v_x, v_y, γ in the heading frame, ndarray (n, 3)."""
-    return np.column_stack([velocity_in_heading(recording.odometry)[:, :2], yaw_rate(recording.odometry)])
+    return np.column_stack(
+        [velocity_in_heading(recording.odometry)[:, :2], yaw_rate(recording.odometry)]
+    )
 
 
 def steady_errors(recording: Recording) -> list[dict[str, Any]]:
@@ -54,9 +57,9 @@ def steady_errors(recording: Recording) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``start_s``, ``end_s``, ``cycles``, ``v``, ``v_reference``, ``v_error`` (relative; None when the reference
-        does not go forward), ``v_y``, ``gamma``, ``gamma_reference``, ``gamma_error`` (relative, None when
-        straight).
+        ``start_s``, ``end_s``, ``cycles``, ``v``, ``v_reference``, ``v_error`` (relative; None
+        when the reference does not go forward), ``v_y``, ``gamma``, ``gamma_reference``,
+        ``gamma_error`` (relative, None when straight).
     """
     if not recording.odometry.time.size:
         return []
@@ -64,12 +67,21 @@ def steady_errors(recording: Recording) -> list[dict[str, Any]]:
     for start, end in steady_segments(recording):
         v_x, v_y, gamma = mean_between(recording.odometry.time, motion, start, end)
         reference = mean_between(recording.reference.time, recording.reference.value, start, end)
-        entries.append({
-            'start_s': start, 'end_s': end, 'cycles': round(cycle_count(recording, start, end)),
-            'v': float(v_x), 'v_reference': float(reference[0]), 'v_error': _relative(v_x, reference[0]),
-            'v_y': float(v_y), 'v_y_reference': float(reference[1]),
-            'gamma': float(gamma), 'gamma_reference': float(reference[2]),
-            'gamma_error': _relative(gamma, reference[2])})
+        entries.append(
+            {
+                'start_s': start,
+                'end_s': end,
+                'cycles': round(cycle_count(recording, start, end)),
+                'v': float(v_x),
+                'v_reference': float(reference[0]),
+                'v_error': _relative(v_x, reference[0]),
+                'v_y': float(v_y),
+                'v_y_reference': float(reference[1]),
+                'gamma': float(gamma),
+                'gamma_reference': float(reference[2]),
+                'gamma_error': _relative(gamma, reference[2]),
+            }
+        )
     return entries
 
 
