@@ -12,13 +12,17 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.foot_motion import foot_slip
 from dmp_cpg_ros.analysis.metrics.stops import STILL_SPEED
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.motion import rotations, tilt
+from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording
 from dmp_cpg_ros.core.robot_description import RobotDescription
 
 Array = NDArray[np.float64]
 
 STANDING_WINDOW = 0.5
 """Time at the end of the hold in which the robot must stand still [s]."""
+
+DECELERATION_WINDOW = 0.04
+"""Time over which the deceleration is averaged [s]."""
 
 WALKING_ERROR = 0.1
 """Share of the commanded speed by which a robot that walks on may miss it."""
@@ -44,6 +48,10 @@ class StopOutcome:
         Distance slid under load before the body was at rest, the mean over the feet [m].
     displacement_m : float
         Horizontal distance that the body moved from the request to rest [m].
+    tilt : float
+        Largest angle between the base's z and the vertical during the hold [rad].
+    deceleration : float
+        Largest horizontal acceleration of the body during the hold, over 40 ms [m/s^2].
     resumed_speed : float
         Mean forward speed after the resume [m/s].
     """
@@ -57,6 +65,8 @@ class StopOutcome:
     body_rest_s: float = float('nan')
     slip_m: float = float('nan')
     displacement_m: float = float('nan')
+    tilt: float = float('nan')
+    deceleration: float = float('nan')
     resumed_speed: float = float('nan')
 
     @property
@@ -85,7 +95,7 @@ def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float)
     Returns
     -------
     StopOutcome
-        Only with ``standing``, ``body_rest_s``, ``slip_m`` and ``displacement_m``.
+        Without what the oscillators and the resume tell.
     """
     odometry = hold.odometry
     speed = np.linalg.norm(odometry.velocity_in_base, axis=1)
@@ -102,7 +112,17 @@ def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float)
         body_rest_s=float(time[rest]),
         slip_m=0.0 if slip is None else float(slip.mean()),
         displacement_m=float(np.hypot(*(path[-1] - path[0]))),
+        tilt=float(tilt(odometry.quaternion).max()),
+        deceleration=_deceleration(odometry),
     )
+
+
+def _deceleration(odometry: OdometrySeries) -> float:
+    R_world_base = rotations(odometry.quaternion)
+    velocity = np.einsum('nij,nj->ni', R_world_base, odometry.velocity_in_base)[:, :2]
+    rows = round(DECELERATION_WINDOW / float(np.diff(odometry.time).mean()))
+    change = velocity[rows:] - velocity[:-rows]
+    return float(np.hypot(*change.T).max() / DECELERATION_WINDOW)
 
 
 def _first_rows(hold: Recording, count: int) -> Recording:
@@ -139,6 +159,10 @@ class StopSummary:
         [s]
     slip_m, displacement_m : tuple of float
         [m]
+    tilt : tuple of float
+        [rad]
+    deceleration : tuple of float
+        [m/s^2]
     """
 
     count: int
@@ -152,6 +176,8 @@ class StopSummary:
     body_rest_s: tuple[float, float]
     slip_m: tuple[float, float]
     displacement_m: tuple[float, float]
+    tilt: tuple[float, float]
+    deceleration: tuple[float, float]
 
 
 def summary(outcomes: Sequence[StopOutcome]) -> StopSummary:
@@ -177,4 +203,6 @@ def summary(outcomes: Sequence[StopOutcome]) -> StopSummary:
         spread('body_rest_s'),
         spread('slip_m'),
         spread('displacement_m'),
+        spread('tilt'),
+        spread('deceleration'),
     )

@@ -1,0 +1,183 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One stop and start of the MuJoCo robot in the plain loop, as the nodes would do in lock-step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.recording import (
+    FootForceSeries,
+    JointSeries,
+    OdometrySeries,
+    Recording,
+)
+from dmp_cpg_ros.analysis.stop_outcome import WALKING_ERROR, StopOutcome, body_at_rest
+from dmp_cpg_ros.core.gait import Gait
+from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.stop_baselines import FreezingLoop
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+
+METHODS = ('inhibition', 'freeze', 'finish_swing')
+"""Ways to stop: sparse inhibition, and the two of core/stop_baselines.py."""
+
+WALKING_BEFORE, WALKING_AFTER = 4.0, 4.0
+"""Time from the start to the first request, and from the resume to the end [s]."""
+
+SHORTEST_HOLD, LONGEST_HOLD, HOLD_AT_REST = 3.0, 12.0, 1.5
+"""The hold takes this at least and at most, and this after the oscillators are at rest [s]."""
+
+SPEED_WINDOW = 2.0
+"""Time at the end over which the resumed speed is averaged [s]."""
+
+PUSH_DURATION = 0.1
+"""Time over which the impulse of a push is spread [s]."""
+
+TimeBound = Callable[[FreezingLoop], float]
+"""Bound on the time to rest of a loop in which a stop has just been requested [s]."""
+
+
+@dataclass(frozen=True)
+class StopCase:
+    """One case of the study.
+
+    Attributes
+    ----------
+    gait : str
+        Name of the gait.
+    speed : float
+        Commanded forward speed [m/s].
+    phase : float
+        Fraction of a cycle by which the request comes later.
+    cadence : float
+        Factor on the gait's cadence.
+    leg : str
+        Leg whose oscillator is inhibited.
+    push : float
+        Lateral impulse in the instant of the request [N s].
+    method : str
+        One of ``METHODS``.
+    """
+
+    gait: str
+    speed: float
+    phase: float
+    cadence: float = 1.0
+    leg: str = 'fl'
+    push: float = 0.0
+    method: str = METHODS[0]
+
+
+def with_cadence(gait: Gait, factor: float) -> Gait:
+    """Return the gait at another cadence."""
+    return replace(gait, cadence=gait.cadence * factor)
+
+
+def run_trial(robot: MujocoRobot, case: StopCase, gait: Gait, parameters: SuiteParameters,
+              time_bound: TimeBound | None = None) -> StopOutcome:
+    """Walk, stop, hold, resume, walk on.
+
+    Parameters
+    ----------
+    robot : MujocoRobot
+        Is reset; equal calls give equal outcomes.
+    case : StopCase
+        Everything but the leg, which is in the parameters.
+    gait : Gait
+        The gait, its cadence included.
+    parameters : SuiteParameters
+        Parameters of the parts, without a timeout of the command.
+    time_bound : callable, optional
+        Guaranteed time to rest, asked right after the request.
+
+    Returns
+    -------
+    StopOutcome
+    """
+    trial = _Trial(robot, FreezingLoop(robot.description, gait, parameters))
+    trial.loop.command(case.speed)
+    omega = trial.loop.network.omega(np.array((case.speed, 0.0, 0.0)))
+    trial.walk(WALKING_BEFORE + case.phase * 2.0 * np.pi / omega)
+    if trial.fell():
+        return StopOutcome(fell=True)
+    predicted, bound, measured = trial.stop(case, time_bound)
+    if trial.fell():
+        return StopOutcome(True, predicted_s=predicted, bound_s=bound, measured_s=measured)
+    context = RunContext(robot=robot.description)
+    at_rest = body_at_rest(trial.recording(), robot.description, context.contact_force)
+    resumed = trial.resume(case)
+    return replace(at_rest, fell=trial.fell(), predicted_s=predicted, bound_s=bound,
+                   measured_s=measured, resumed_speed=resumed,
+                   walked_on=abs(resumed - case.speed) <= WALKING_ERROR * case.speed)
+
+
+class _Trial:
+    """Robot and loop, and the states since the last request."""
+
+    def __init__(self, robot: MujocoRobot, loop: FreezingLoop) -> None:
+        self.robot, self.loop = robot, loop
+        self.state: RobotState = robot.reset()
+        self.states: list[RobotState] = []
+        self.tick_s = robot.tick_ns * 1e-9
+
+    def fell(self) -> bool:
+        """Whether the robot lies on the ground."""
+        return self.robot.fallen
+
+    def walk(self, duration: float) -> None:
+        """Tick for a time [s], or until the robot falls."""
+        for _ in range(round(duration / self.tick_s)):
+            if self.fell():
+                return
+            self.state = self.robot.step(self.loop.tick(self.state).targets)
+            self.states.append(self.state)
+
+    def stop(self, case: StopCase, time_bound: TimeBound | None) -> tuple[float, float, float]:
+        """Request a stop and hold; return the predicted, bounded and measured time to rest [s]."""
+        if case.push:
+            force = np.array((0.0, case.push / PUSH_DURATION, 0.0))
+            self.robot.apply_push(force, round(PUSH_DURATION * 1e9))
+        self.states = [self.state]
+        if case.method != METHODS[0]:
+            self.loop.freeze(case.method == 'finish_swing')
+            self.walk(SHORTEST_HOLD)
+            return (np.nan,) * 3
+        predicted = self.loop.request(True)
+        bound = np.nan if time_bound is None else time_bound(self.loop)
+        held, measured = 0.0, np.inf
+        while held < LONGEST_HOLD and not self.fell() and not (
+                held >= max(SHORTEST_HOLD, measured + HOLD_AT_REST)):
+            self.walk(self.tick_s)
+            held += self.tick_s
+            if self.loop.stop.word == 'at_rest':
+                measured = self.loop.stop.measured_s
+        return predicted, bound, measured
+
+    def resume(self, case: StopCase) -> float:
+        """Walk on; return the mean forward speed at the end [m/s]."""
+        if case.method == METHODS[0]:
+            self.loop.request(False)
+        else:
+            self.loop.resume()
+        self.walk(WALKING_AFTER)
+        count = round(SPEED_WINDOW / self.tick_s)
+        return float(np.mean([state.base_velocity_in_base[0] for state in self.states[-count:]]))
+
+    def recording(self) -> Recording:
+        """States since the last request as a recording."""
+        def column(name: str) -> np.ndarray:
+            return np.array([getattr(state, name) for state in self.states])
+
+        time = column('time_ns') * 1e-9
+        return Recording(
+            joints=JointSeries(time, column('joint_position'), column('joint_velocity'),
+                               column('joint_effort')),
+            odometry=OdometrySeries(time, column('base_position_in_world'),
+                                    column('base_quaternion'), column('base_velocity_in_base'),
+                                    column('base_rate_in_base')),
+            feet=FootForceSeries(time, column('foot_force')))

@@ -1,0 +1,182 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Stops and starts the walking robot at many phases, speeds and gaits; tabulates what happened.
+
+The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
+Exit status 1 when it fell in a case that was stopped by inhibition, 2 when the arguments cannot
+be used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from functools import lru_cache, partial
+from itertools import groupby, product
+from math import pi
+from multiprocessing import Pool
+from pathlib import Path
+
+from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, summary
+from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.commands.stop_trial import METHODS, StopCase, run_trial, with_cadence
+from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.suite import Suite, load_gait, load_suite
+
+Results = list[tuple[StopCase, StopOutcome]]
+
+COLUMNS = ('gait', 'm/s', 'leg', 'cadence', 'stopped by', 'cases', 'fell', 'stood', 'walked on',
+           'prediction error %', 'over bound', 'rest s', 'body rest s', 'slip mm', 'moved m',
+           'tilt deg', 'm/s^2')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the study and print its table; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        cases = cases_of(options)
+        suite = suite_of(options.file, cases[0].leg)
+        for gait in options.gaits:
+            load_gait(gait)
+    except DmpCpgError as error:
+        print(f'study_stops: {error}', file=sys.stderr)
+        return 2
+    results = run_cases(cases, options.file, options.jobs, quiet=options.quiet)
+    print(f'{suite.file}: {len(cases)} stops; columns with two numbers are median / worst\n')
+    print(table(results))
+    for case, outcome in results:
+        if outcome.fell:
+            print(f'\nfell: {case}', end='')
+    if options.json:
+        write_json(options.json, [asdict(case) | asdict(outcome) for case, outcome in results])
+        print(f'\nwrote {options.json}')
+    return int(any(outcome.fell for case, outcome in results if case.method == METHODS[0]))
+
+
+def cases_of(options: argparse.Namespace) -> list[StopCase]:
+    """All combinations of the options, phases innermost.
+
+    Raises
+    ------
+    ParameterError
+        If there are no phases.
+    """
+    if options.phases < 1:
+        raise ParameterError(f'--phases {options.phases} must be at least 1')
+    methods = METHODS if options.baselines else METHODS[:1]
+    phases = [i / options.phases for i in range(options.phases)]
+    return [StopCase(gait, speed, phase, cadence, leg, options.push, method)
+            for gait, speed, cadence, leg, method, phase in product(
+                options.gaits, options.speeds, options.cadences, options.legs, methods, phases)]
+
+
+@lru_cache
+def suite_of(file: str | None, leg: str) -> Suite:
+    """Parameter file with one inhibited leg, and a command that needs no repetition."""
+    return load_suite(file, {'inhibited_legs': [leg], 'cmd_vel_timeout': 0.0})
+
+
+@lru_cache
+def _robot_of(robot_file: Path, tick_ns: int) -> MujocoRobot:
+    return MujocoRobot(robot_file, tick_ns)
+
+
+def run_case(case: StopCase, file: str | None) -> StopOutcome:
+    """Run one case with the robot and the parameters of a parameter file."""
+    suite = suite_of(file, case.leg)
+    robot = _robot_of(suite.robot_file, suite.tick_ns)
+    gait = with_cadence(load_gait(case.gait), case.cadence)
+    return run_trial(robot, case, gait, suite.parameters)
+
+
+def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
+              quiet: bool = True) -> Results:
+    """Run cases on several processes; the results do not depend on how many."""
+    results: Results = []
+    with Pool(jobs) as pool:
+        outcomes = pool.imap(partial(run_case, file=file), cases)
+        for case, outcome in zip(cases, outcomes, strict=True):
+            results.append((case, outcome))
+            if not quiet:
+                print(f'\r{len(results)}/{len(cases)}', end='', file=sys.stderr, flush=True)
+    if not quiet:
+        print('\r', end='', file=sys.stderr)
+    return results
+
+
+def table(results: Results) -> str:
+    """Markdown table: a row per gait, speed, cadence, leg and method, and one for each method."""
+    rows = [(*_labels(key), *_cells(summary([outcome for _, outcome in group])))
+            for key, group in groupby(results, lambda result: _key(result[0]))]
+    for method in METHODS:
+        outcomes = [outcome for case, outcome in results if case.method == method]
+        if outcomes:
+            rows.append(('all', '', '', '', method, *_cells(summary(outcomes))))
+    widths = [max(len(row[i]) for row in (COLUMNS, *rows)) for i in range(len(COLUMNS))]
+    rule = tuple('-' * width for width in widths)
+    return '\n'.join(_line(row, widths) for row in (COLUMNS, rule, *rows))
+
+
+def _key(case: StopCase) -> tuple[str, float, str, float, str]:
+    return case.gait, case.speed, case.leg, case.cadence, case.method
+
+
+def _labels(key: tuple[str, float, str, float, str]) -> tuple[str, ...]:
+    gait, speed, leg, cadence, method = key
+    return gait, f'{speed:g}', leg, f'{cadence:g}', method
+
+
+def _cells(of: StopSummary) -> tuple[str, ...]:
+    def pair(values: tuple[float, float], scale: float, digits: int) -> str:
+        if values[0] != values[0]:
+            return '-'
+        return ' / '.join(f'{scale * value:.{digits}f}' for value in values)
+
+    exceeded = f'{of.bound_exceeded}/{of.bounded}' if of.bounded else '-'
+    return (str(of.count), str(of.fell), _share(of.standing, of.count),
+            _share(of.walked_on, of.count), pair(of.prediction_error, 100.0, 1), exceeded,
+            pair(of.measured_s, 1.0, 2), pair(of.body_rest_s, 1.0, 2), pair(of.slip_m, 1e3, 1),
+            pair(of.displacement_m, 1.0, 2), pair(of.tilt, 180.0 / pi, 1),
+            pair(of.deceleration, 1.0, 1))
+
+
+def _share(part: int, whole: int) -> str:
+    return f'{100.0 * part / whole:.0f} %'
+
+
+def _line(row: Iterable[str], widths: Sequence[int]) -> str:
+    return f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='study_stops', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
+    parser.add_argument('--phases', type=int, default=16, metavar='N',
+                        help='request phases, evenly over a cycle (default: 16)')
+    parser.add_argument('--speeds', type=float, nargs='+', default=[0.2, 0.5, 0.8], metavar='V',
+                        help='commanded speeds [m/s] (default: 0.2 0.5 0.8)')
+    parser.add_argument('--gaits', nargs='+', default=['amble', 'walk', 'trot'], metavar='GAIT',
+                        help='gaits by name (default: amble walk trot)')
+    parser.add_argument('--legs', nargs='+', default=[LEGS[0]], choices=LEGS,
+                        help='legs whose oscillator is inhibited, one at a time (default: fl)')
+    parser.add_argument('--cadences', type=float, nargs='+', default=[1.0], metavar='FACTOR',
+                        help='factors on the cadence of the gait (default: 1)')
+    parser.add_argument('--push', type=float, default=0.0, metavar='IMPULSE',
+                        help='lateral impulse in the instant of the request [N s] (default: 0)')
+    parser.add_argument('--baselines', action='store_true',
+                        help='also stop by freezing all phases, and by finishing every swing')
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+                        help='processes (default: one per processor)')
+    parser.add_argument('--json', type=Path, metavar='FILE', help='write every case and outcome')
+    parser.add_argument('--quiet', action='store_true', help='show no progress')
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

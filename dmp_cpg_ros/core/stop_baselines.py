@@ -1,0 +1,86 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Two simple ways to stop a gait, to compare sparse inhibition with.
+
+- *freeze*: all phases stop at once, and every leg holds the joint targets that it has.
+- *finish swing*: a leg that stands stops at once; a leg that swings goes on to its touchdown.
+
+In both the reference is brought to zero as usual, the balance of the body works as usual, and no
+oscillator is coupled or inhibited until the gait is resumed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.phase import phase, phase_generator, state_at
+from dmp_cpg_ros.core.posture import PostureFeedback
+from dmp_cpg_ros.core.robot_state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.transformation import TransformationState
+from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
+
+Array = NDArray[np.float64]
+
+
+class FreezingLoop(WalkingLoop):
+    """A walking loop whose legs freeze when :meth:`freeze` is called; made as a WalkingLoop."""
+
+    _frozen: NDArray[np.bool_] | None = None
+
+    def freeze(self, finish_swing: bool) -> None:
+        """Stop the legs from the next tick on.
+
+        Parameters
+        ----------
+        finish_swing : bool
+            Whether a leg that swings finishes its swing before it freezes.
+        """
+        self._finish_swing, self._frozen = finish_swing, np.zeros(len(LEGS), dtype=bool)
+
+    def resume(self) -> None:
+        """Walk on from the phases and joint angles at which the legs are."""
+        self._frozen = None
+
+    def tick(self, state: RobotState) -> Tick:
+        """Run all parts on the robot's state of one tick, as :meth:`WalkingLoop.tick`."""
+        if self._frozen is None:
+            return super().tick(state)
+        dt = 0.0 if self._time_ns is None else (state.time_ns - self._time_ns) * 1e-9
+        self._time_ns = state.time_ns
+        self.stop = replace(self.stop, time_ns=state.time_ns)
+        self.r = self.reference.step(self.r, np.zeros(3), dt)
+        self._frozen = self._frozen | ~(self._finish_swing & self._swinging())
+        omega = np.where(self._frozen, 0.0, self.network.omega(self.r))
+        radius = np.hypot(self.x[:, 0], self.x[:, 1])
+        self.x = state_at(phase(self.x) + omega * dt, radius)
+        x_dot = omega[:, None] * (self.x @ phase_generator().T)
+        self.posture_state, feedback = self.posture.step(self.posture_state, state, self.x, x_dot,
+                                                         self.r, dt)
+        targets = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
+        return Tick(state.time_ns, self.r, self.x, x_dot, self.stop, feedback, JointTargets(
+            *(np.concatenate([getattr(target, name) for target in targets])
+              for name in ('position', 'velocity', 'effort'))))
+
+    def _swinging(self) -> NDArray[np.bool_]:
+        """Which legs are in the swing of their cycle, (4,)."""
+        gait, scale = self.network.gait, self.network.scale
+        duty = gait.duty(scale.foot_speed(*self.r.tolist()), scale)
+        return np.abs(gait.cycle_position(phase(self.x))) < 0.5 * (1.0 - duty)
+
+    def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
+             dt: float) -> JointTargets:
+        """Targets of one leg: those of its primitive, or those that it froze with."""
+        if self._frozen is None or not self._frozen[i]:
+            return super()._leg(i, state, x_dot, feedback, dt)
+        leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
+        position, zero = self.leg_states[i].joints.position, np.zeros(3)
+        held = TransformationState(position, zero)
+        self.leg_states[i] = replace(self.leg_states[i], joints=held)
+        measured = None
+        if leg.parameters.reading == 'torque':
+            measured = TransformationState(state.joint_position[joints],
+                                           state.joint_velocity[joints])
+        return leg.targets(self.leg_states[i], position, zero, feedback.torque[joints], measured)
