@@ -1,0 +1,105 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures where they can be drawn, a reason where they cannot."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from dmp_cpg_ros.robot.camera import Camera, open_viewer, pose_pictures
+from dmp_cpg_ros.robot.home_pose import home_joint_position
+from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.robot.mujoco_import import usable_backend
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+
+HOME = home_joint_position(load_description())
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
+# A process in which no OpenGL library can be loaded.
+WITHOUT_OPENGL = """
+import ctypes
+load = ctypes.CDLL.__init__
+def refuse(self, name, *args, **kwargs):
+    if name and any(part in str(name) for part in ('EGL', 'libGL', 'OpenGL', 'OSMesa')):
+        raise OSError(f'{name}: cannot open shared object file')
+    load(self, name, *args, **kwargs)
+ctypes.CDLL.__init__ = refuse
+import numpy as np
+from dmp_cpg_ros.robot.camera import Camera, pose_pictures
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+state = MujocoRobot().reset()
+with Camera() as camera:
+    assert camera.picture((0, 0, 0.28), (0, 0, 0, 1), state.joint_position) is None
+    assert 'no pictures' in camera.reason
+assert pose_pictures(None, [(0, 0, 0.28)], [(0, 0, 0, 1)], [state.joint_position]) == []
+"""
+
+
+@pytest.fixture(scope='module')
+def camera():
+    with Camera(width=320, height=240) as camera:
+        if camera.reason:
+            pytest.skip(camera.reason)
+        yield camera
+
+
+def test_a_picture_has_its_size_and_shows_the_robot_in_the_middle(camera):
+    picture = camera.picture((0, 0, 0.28), UPRIGHT, HOME)
+    assert picture.shape == (240, 320, 3) and picture.dtype == np.uint8
+    orange = (picture[..., 0] > 150) & (picture[..., 2] < 80)
+    rows, columns = np.nonzero(orange)
+    assert len(rows) > 50
+    assert abs(np.median(columns) - 160) < 60 and abs(np.median(rows) - 120) < 60
+
+
+def test_the_camera_follows_the_robot(camera):
+    here, there = (camera.picture((x, 0, 0.28), UPRIGHT, HOME) for x in (0.0, 4.0))
+    difference = np.abs(here.astype(int) - there.astype(int)).mean(axis=2) > 60
+    assert difference.mean() < 0.1  # the floor is periodic, so both show almost the same
+
+
+def test_recorded_poses_are_drawn_without_simulating(camera):
+    pictures = pose_pictures(None, [(0, 0, 0.28), (1, 0, 0.35)], [UPRIGHT, UPRIGHT],
+                             [HOME, np.tile((0.0, 0.2, -0.4), 4)], width=160, height=120)
+    assert [picture.shape for picture in pictures] == [(120, 160, 3)] * 2
+    assert (pictures[0] != pictures[1]).mean() > 0.02
+
+
+def test_a_closed_camera_draws_nothing():
+    camera = Camera(width=64, height=48)
+    camera.close()
+    assert camera.picture((0, 0, 0.28), UPRIGHT, HOME) is None
+    assert camera.reason
+
+
+@pytest.mark.parametrize('backend', ['egl', 'osmesa', ''])
+def test_without_opengl_the_robot_runs_and_pictures_are_left_out(backend):
+    environment = {**os.environ, 'MUJOCO_GL': backend}
+    environment.pop('DISPLAY', None)
+    environment.pop('WAYLAND_DISPLAY', None)
+    ran = subprocess.run([sys.executable, '-c', WITHOUT_OPENGL], env=environment, check=False,
+                         timeout=120, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert 'no pictures' in ran.stderr
+
+
+@pytest.mark.parametrize('wanted', ['glfw', 'disable', 'cgl'])
+def test_a_backend_that_was_chosen_is_kept(wanted):
+    assert usable_backend(wanted, has_screen=False) == wanted
+
+
+def test_with_a_screen_nothing_is_chosen():
+    assert not usable_backend('', has_screen=True)
+
+
+def test_without_a_screen_there_is_no_window(monkeypatch, caplog):
+    monkeypatch.delenv('DISPLAY', raising=False)
+    monkeypatch.delenv('WAYLAND_DISPLAY', raising=False)
+    robot = MujocoRobot()
+    assert open_viewer(robot.model, robot.data) is None
+    assert 'no screen' in caplog.text
