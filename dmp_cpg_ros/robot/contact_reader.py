@@ -7,39 +7,57 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.robot.leg_reader import foot_position
 from dmp_cpg_ros.robot.model_reader import ModelIds
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
-_OUTSIDE, _BASE, _OTHER = 5, 4, -1  # owners of geoms beside the feet 0..3
+_FOOT, _SHANK, _BASE, _OUTSIDE, _OTHER = range(5)
+
+NEAR_FOOT = 1.5  # foot radii from the foot's centre within which the lower leg's shell is its foot
 
 
 class ContactReader:
     """Reads contacts between the robot and its surroundings from MuJoCo's data."""
 
     def __init__(self, model: mujoco.MjModel, ids: ModelIds) -> None:
-        self._model = model
-        root = model.body_rootid[ids.base]
-        owner = np.full(model.ngeom, _OTHER)
-        owner[model.body_rootid[model.geom_bodyid] != root] = _OUTSIDE
-        owner[model.geom_bodyid == ids.base] = _BASE
-        for i, foot in enumerate(ids.feet):
-            owner[list(foot.geoms)] = i
-        self._owner: list[int] = owner.tolist()
+        self._model, self._feet = model, ids.feet
+        kind = np.full(model.ngeom, _OTHER)
+        leg = np.zeros(model.ngeom, dtype=int)
+        kind[model.body_rootid[model.geom_bodyid] != model.body_rootid[ids.base]] = _OUTSIDE
+        kind[model.geom_bodyid == ids.base] = _BASE
+        shanks = model.jnt_bodyid[ids.joints[2::3]]
+        for i, (foot, shank) in enumerate(zip(ids.feet, shanks, strict=True)):
+            lower_leg = np.isin(model.geom_bodyid, (shank, foot.body))
+            kind[lower_leg], leg[lower_leg] = _SHANK, i
+            kind[list(foot.geoms)] = _FOOT
+        self._kind: list[int] = kind.tolist()
+        self._leg: list[int] = leg.tolist()
         self._wrench = np.zeros(6)
 
     def foot_force(self, data: mujoco.MjData) -> NDArray[np.float64]:
-        """Return the normal force of each foot (4,), summed over its contacts [N]."""
+        """Return the normal force of each foot (4,), summed over its contacts [N].
+
+        Some models wrap the lower leg in a mesh that reaches around the foot; what touches so near
+        the foot's centre counts as the foot.
+        """
         force = [0.0, 0.0, 0.0, 0.0]
-        for i, (first, second) in enumerate(data.contact.geom.tolist()):
-            one, other = self._owner[first], self._owner[second]
-            if other == _OUTSIDE:
-                one, other = other, one
-            if one == _OUTSIDE and 0 <= other < 4:
+        for i, (geom, other) in enumerate(data.contact.geom.tolist()):
+            if self._kind[geom] == _OUTSIDE:
+                geom, other = other, geom
+            if self._kind[other] != _OUTSIDE or self._kind[geom] not in (_FOOT, _SHANK):
+                continue
+            leg = self._leg[geom]
+            if self._kind[geom] == _FOOT or self._is_near_foot(data, i, leg):
                 mujoco.mj_contactForce(self._model, data, i, self._wrench)
-                force[other] += float(self._wrench[0])
+                force[leg] += float(self._wrench[0])
         return np.array(force)
+
+    def _is_near_foot(self, data: mujoco.MjData, contact: int, leg: int) -> bool:
+        foot = self._feet[leg]
+        distance = np.linalg.norm(data.contact.pos[contact] - foot_position(data, foot))
+        return bool(distance < NEAR_FOOT * foot.radius)
 
     def base_touches(self, data: mujoco.MjData) -> bool:
         """Return whether the base body touches the surroundings."""
-        return any({self._owner[first], self._owner[second]} == {_BASE, _OUTSIDE}
+        return any({self._kind[first], self._kind[second]} == {_BASE, _OUTSIDE}
                    for first, second in data.contact.geom.tolist())
