@@ -20,6 +20,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.posture import PostureFeedback
 from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets, RobotState
 from dmp_cpg_ros.nodes.joint_state_messages import JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.message_values import Array, checked, checked_numbers, set_stamp, stamp_ns, text
@@ -29,10 +30,8 @@ BASE_FRAME, WORLD_FRAME = 'base_link', 'odom'
 CANONICAL_NAMES = tuple(f'{leg}_x{i}' for leg in LEGS for i in (1, 2))
 FOOT_NAMES = tuple(f'{leg}_foot' for leg in LEGS)
 SHIFT_NAMES = tuple(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xy')
+CORRECTION_NAMES = ('base_x', 'base_y', 'base_yaw')
 TARGET_FIELDS = ('position', 'velocity', 'effort')
-
-NO_SHIFT = np.zeros(len(SHIFT_NAMES))
-NO_TORQUE = np.zeros(len(JOINT_NAMES))
 
 
 # Robot state ------------------------------------------------------------------------------------------------
@@ -238,18 +237,19 @@ class JointTargetsReader:
 
 
 class PostureFeedbackWriter:
-    """Writes ``posture_feedback``: twelve torques, then a shift in x and y for each foot."""
+    """Writes ``posture_feedback``: twelve torques, a shift in x and y for each foot, a correction of the velocity."""
 
     def __init__(self) -> None:
         """Build the message."""
-        size = len(JOINT_NAMES) + len(SHIFT_NAMES)
-        self._writer = JointStateWriter(JOINT_NAMES + SHIFT_NAMES, TARGET_FIELDS, BASE_FRAME)
-        self._position, self._velocity, self._effort = np.zeros(size), np.zeros(size), np.zeros(size)
+        names = JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES
+        self._writer = JointStateWriter(names, TARGET_FIELDS, BASE_FRAME)
+        self._position, self._velocity, self._effort = (np.zeros(len(names)) for _ in TARGET_FIELDS)
 
-    def fill(self, time_ns: int, torque: Array, shift_in_base: Array) -> JointState:
-        """Refill with torques, ndarray (12,) [N m], and shifts, ndarray (4, 2) [m]; raises DataError."""
-        self._position[len(JOINT_NAMES):] = shift_in_base.reshape(-1)
-        self._effort[:len(JOINT_NAMES)] = torque
+    def fill(self, time_ns: int, feedback: PostureFeedback) -> JointState:
+        """Refill with a feedback; raises DataError when it is not finite."""
+        self._position[len(JOINT_NAMES):-len(CORRECTION_NAMES)] = feedback.shift_in_base.reshape(-1)
+        self._velocity[-len(CORRECTION_NAMES):] = feedback.correction
+        self._effort[:len(JOINT_NAMES)] = feedback.torque
         return self._writer.fill(time_ns, self._position, self._velocity, self._effort)
 
 
@@ -258,12 +258,13 @@ class PostureFeedbackReader:
 
     def __init__(self) -> None:
         """Prepare the order."""
-        self._reader = JointStateReader(JOINT_NAMES + SHIFT_NAMES, ('position', 'effort'))
+        self._reader = JointStateReader(JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES, TARGET_FIELDS)
 
-    def read(self, message: JointState) -> tuple[Array, Array]:
-        """Torques, ndarray (12,) [N m], and foot shifts, ndarray (4, 2) [m]; raises DataError."""
-        position, effort = self._reader.read(message)
-        return effort[:len(JOINT_NAMES)], position[len(JOINT_NAMES):].reshape(len(LEGS), 2)
+    def read(self, message: JointState) -> PostureFeedback:
+        """Read the feedback; raises DataError."""
+        position, velocity, effort = self._reader.read(message)
+        shift = position[len(JOINT_NAMES):-len(CORRECTION_NAMES)].reshape(len(LEGS), 2)
+        return PostureFeedback(effort[:len(JOINT_NAMES)], shift, velocity[-len(CORRECTION_NAMES):])
 
 
 # Inhibition state -------------------------------------------------------------------------------------------

@@ -8,13 +8,14 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import FrameType
 
 import rclpy
 from rclpy.context import Context
 from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.task import Future
@@ -30,6 +31,8 @@ FOREVER_S = 1e6
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
+
+_ARGUMENT_ERRORS = (rclpy_implementation.RCLInvalidROSArgsError, rclpy_implementation.UnknownROSArgsError)
 
 
 def make_executor(kind: str, context: Context | None = None) -> Executor:
@@ -112,41 +115,52 @@ def run_node(node_class: type[ManagedNode], arguments: Sequence[str] | None = No
         return OK
     # rclpy's own handler ends the context; Python's would raise KeyboardInterrupt inside a callback.
     signal.signal(signal.SIGINT, _ignore)
-    node: ManagedNode | None = None
-    initialised = False
+    nodes: list[ManagedNode] = []
     try:
-        unknown = remove_ros_args([node_class.KIND, *arguments])[1:]
-        if unknown:
-            raise ParameterError(f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
-        rclpy.init(args=[node_class.KIND, *arguments])
-        initialised = True
-        node = node_class(node_class.default_name(arguments))
-        node.start()
-        spin(node, node.parameters_of(NodeParameters).executor)
-        return OK
+        status = _guarded(node_class, lambda: _run(node_class, arguments, nodes))
+        return max(status, _guarded(node_class, lambda: _end(nodes)))
+    finally:
+        rclpy.try_shutdown()
+
+
+def _run(node_class: type[ManagedNode], arguments: list[str], nodes: list[ManagedNode]) -> None:
+    unknown = remove_ros_args([node_class.KIND, *arguments])[1:]
+    if unknown:
+        raise ParameterError(f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
+    rclpy.init(args=[node_class.KIND, *arguments])
+    try:
+        nodes.append(node_class(node_class.default_name(arguments)))
+        nodes[0].start()
+        spin(nodes, nodes[0].parameters_of(NodeParameters).executor)
     except ExternalShutdownException:
+        return
+    except DmpCpgError:
+        raise
+    except Exception:
+        # A signal that ends the context while a call is under way makes that call fail.
+        if rclpy.ok():
+            raise
+
+
+def _end(nodes: list[ManagedNode]) -> None:
+    for node in nodes:
+        try:
+            node.close()
+        finally:
+            node.destroy_node()
+
+
+def _guarded(node_class: type[ManagedNode], body: Callable[[], None]) -> int:
+    """Run a body; what it raises becomes a message and an exit status."""
+    try:
+        body()
         return OK
-    except (ParameterError, MissingFileError, ParameterException) as error:
+    except (ParameterError, MissingFileError, ParameterException, *_ARGUMENT_ERRORS) as error:
         return _failed(node_class, str(error), BAD_INPUT)
     except DmpCpgError as error:
         return _failed(node_class, str(error), FAILED)
-    except Exception as error:
-        if initialised and not rclpy.ok():
-            return OK
-        if type(error).__name__ in ('RCLInvalidROSArgsError', 'UnknownROSArgsError'):
-            return _failed(node_class, str(error), BAD_INPUT)
+    except Exception:
         return _failed(node_class, traceback.format_exc(), FAILED)
-    finally:
-        _end(node)
-
-
-def _end(node: ManagedNode | None) -> None:
-    try:
-        if node is not None:
-            node.close()
-            node.destroy_node()
-    finally:
-        rclpy.try_shutdown()
 
 
 def _failed(node_class: type[ManagedNode], message: str, status: int) -> int:

@@ -14,7 +14,7 @@ two ticks apart in lock-step; their depth bounds how far a late node works throu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -68,6 +68,8 @@ class Interface:
     publishers, subscribers : tuple of str
         Kinds of nodes that write and read it; of a service: that serve and call it. The recorder reads every
         topic and is named nowhere; ``user`` stands for whoever is outside the suite.
+    sometimes : tuple of str
+        Of the subscribers: those that read it with some parameters only.
     latched : bool
         Whether a late reader gets the last message (transient local, depth 1).
     service : bool
@@ -81,6 +83,7 @@ class Interface:
     subscribers: tuple[str, ...]
     latched: bool = False
     service: bool = False
+    sometimes: tuple[str, ...] = ()
 
     @property
     def publisher_qos(self) -> QoSProfile:
@@ -113,7 +116,7 @@ def expected_count(kinds: tuple[str, ...] | list[str]) -> int:
 
 TOPICS: tuple[Interface, ...] = (
     Interface('cmd_vel', Twist, 'commanded speed and turn rate (TwistStamped with stamped_cmd_vel)',
-              ('user',), ('reference_filter',)),
+              ('user',), ('reference_filter', 'inhibition')),
     Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z', ('reference_filter',),
               ('canonical_oscillators', 'leg_transformation', 'inhibition', 'posture_control')),
     Interface('canonical_state', JointState, 'oscillators: position = x, velocity = its rate',
@@ -123,7 +126,8 @@ TOPICS: tuple[Interface, ...] = (
     Interface('joint_targets', JointState, 'targets of the three joints of one leg', ('leg_transformation',),
               ('mujoco_robot',)),
     Interface('joint_states', JointState, 'measured joints; the tick of the suite', ('mujoco_robot',),
-              ('reference_filter', 'leg_transformation', 'posture_control')),
+              ('reference_filter', 'leg_transformation', 'posture_control'),
+              sometimes=('leg_transformation',)),
     Interface('imu', Imu, 'inertial measurement in base_link', ('mujoco_robot',), ()),
     Interface('odom', Odometry, 'pose and twist of base_link in odom', ('mujoco_robot',), ('posture_control',)),
     Interface('foot_contacts', JointState, 'effort = normal force of each foot', ('mujoco_robot',),
@@ -181,11 +185,10 @@ def served_by(kind: str) -> tuple[Interface, ...]:
 
 
 def readers_of(topic: Interface) -> tuple[str, ...]:
-    """Kinds of nodes of the suite that read a topic, the recorder included."""
-    readers = tuple(kind for kind in SUITE if kind in topic.subscribers)
-    return readers + ('bag_recorder',)
+    """Kinds of nodes of the suite that always read a topic, the recorder included."""
+    always = (kind for kind in topic.subscribers if kind in SUITE and kind not in topic.sometimes)
+    return (*always, 'bag_recorder')
 
 
-STAMPED_CMD_VEL = Interface('cmd_vel', TwistStamped, 'commanded speed and turn rate', ('user',),
-                            ('reference_filter',))
+STAMPED_CMD_VEL = replace(INTERFACES['cmd_vel'], type=TwistStamped)
 """``cmd_vel`` with parameter ``stamped_cmd_vel:=true``."""

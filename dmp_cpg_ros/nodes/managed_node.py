@@ -17,13 +17,14 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.nodes.diagnostics import NodeHealth
-from dmp_cpg_ros.nodes.interfaces import Interface, interface
+from dmp_cpg_ros.nodes.interfaces import Interface, interface, readers_of
 from dmp_cpg_ros.nodes.readiness import missing_connections
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters, ParameterTable, declare, plain
 from dmp_cpg_ros.nodes.tick_inputs import TickInputs, drain
@@ -109,6 +110,10 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]
         """Values that the node adds to its diagnostics."""
         return {}
 
+    def readers(self, topic: Interface) -> tuple[str, ...]:
+        """Kinds of nodes that read one of this node's topics, for :meth:`missing`."""
+        return readers_of(topic)
+
     # For nodes -----------------------------------------------------------------------------------------------
 
     @classmethod
@@ -134,7 +139,7 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]
         return publisher
 
     def listen(self, topic: str | Interface, callback: Callable[[Any], None], *, command: bool = False,
-               raw: bool = False) -> Subscription:
+               raw: bool = False, qos: QoSProfile | None = None) -> Subscription:
         """Create a subscription whose callback runs while the node is active.
 
         A :class:`~dmp_cpg_ros.core.errors.DataError` that the callback raises drops the message: it is counted,
@@ -150,10 +155,12 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]
             Whether the queue is emptied at the start of every tick.
         raw : bool
             Whether the callback takes serialized bytes.
+        qos : QoSProfile, optional
+            Default: the profile of the interface for the suite's nodes.
         """
         topic = topic if isinstance(topic, Interface) else interface(topic)
         subscription = self.create_subscription(topic.type, topic.name, self._guarded(topic, callback),
-                                                topic.reader_qos, raw=raw)
+                                                qos or topic.reader_qos, raw=raw)
         self._entities.append(subscription)
         self._inputs.append((topic, subscription))
         if command:
@@ -212,7 +219,8 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]
 
     def missing(self) -> list[str]:
         """List connections with the expected nodes that do not stand yet; empty when all do."""
-        return missing_connections(self, self.KIND, self._outputs, self._inputs,
+        outputs = [(topic, self.readers(topic), publisher) for topic, publisher in self._outputs]
+        return missing_connections(self, self.KIND, outputs, self._inputs,
                                    self.parameters_of(NodeParameters).expected_nodes)
 
     def start(self) -> None:

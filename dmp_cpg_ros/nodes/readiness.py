@@ -17,10 +17,11 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
 
-from dmp_cpg_ros.nodes.interfaces import INSTANCES, Interface, readers_of
+from dmp_cpg_ros.nodes.interfaces import INSTANCES, Interface
 
 
-def missing_connections(node: Node, kind: str, outputs: Sequence[tuple[Interface, Publisher]],
+def missing_connections(node: Node, kind: str,
+                        outputs: Sequence[tuple[Interface, Sequence[str], Publisher]],
                         inputs: Sequence[tuple[Interface, Subscription]],
                         expected: Collection[str]) -> list[str]:
     """List what is missing.
@@ -31,8 +32,10 @@ def missing_connections(node: Node, kind: str, outputs: Sequence[tuple[Interface
         The node.
     kind : str
         Its kind.
-    outputs, inputs : sequences of pairs
-        Its publishers and subscriptions with their interfaces.
+    outputs : sequence of (Interface, sequence of str, Publisher)
+        Its publishers and the kinds of nodes that read them.
+    inputs : sequence of (Interface, Subscription)
+        Its subscriptions.
     expected : collection of str
         Kinds of nodes that take part; others are not waited for.
 
@@ -42,9 +45,9 @@ def missing_connections(node: Node, kind: str, outputs: Sequence[tuple[Interface
         One text per missing connection.
     """
     missing: list[str] = []
-    for topic, publisher in outputs:
+    for topic, readers, publisher in outputs:
         ends = node.get_subscriptions_info_by_topic(publisher.topic_name)
-        absent = _absent(ends, readers_of(topic), kind, expected)
+        absent = _absent(ends, readers, kind, expected)
         missing += [f'{topic.name} is not read by {name}' for name in absent]
         known = sum(_compatible(publisher.qos_profile, end.qos_profile) for end in ends)
         if not absent and publisher.get_subscription_count() < known:

@@ -1,0 +1,119 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The node that records the suite's topics into a rosbag2 folder."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rclpy.clock import Clock, ClockType
+from rclpy.timer import Timer
+
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.nodes.bag_writing import STORAGES, BagWriter
+from dmp_cpg_ros.nodes.executors import run_node
+from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL, TOPICS, Interface, interface
+from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.tick_inputs import drain
+
+ALL = 'all'
+
+CLOCK_TOPICS = ('/clock', 'joint_states', 'imu', 'odom', 'foot_contacts')
+"""Topics whose stamps are the robot's clock, because the robot itself writes them."""
+
+TICK_TOPIC = 'joint_states'
+
+
+@dataclass(frozen=True)
+class RecorderParameters(Parameters):
+    """Parameters of the recorder."""
+
+    output: str = parameter('bag', 'folder of the recording; must not exist yet')
+    storage: str = parameter('mcap', 'kind of file; only mcap survives a killed recorder', choices=STORAGES)
+    topics: tuple[str, ...] = parameter((ALL,), 'topics to record', choices=(
+        ALL, *(topic.name for topic in TOPICS)))
+    flush_period: float = parameter(0.25, 'time between flushes; what is older survives a killed recorder',
+                                    unit='s', minimum=0.02, maximum=60.0)
+    stamped_cmd_vel: bool = parameter(False, 'whether cmd_vel is TwistStamped')
+
+
+class BagRecorder(ManagedNode):
+    """Records the suite's topics into a rosbag2 folder (MCAP or SQLite), bytes as received.
+
+    It records while it is active. The bag is opened when the node is configured and completed when it is cleaned up
+    or its process ends; a killed recorder leaves a bag that `analyze` can rescue.
+    """
+
+    KIND = 'bag_recorder'
+    PARAMETER_SETS = (RecorderParameters,)
+
+    def configure(self) -> None:
+        """Open the bag and subscribe."""
+        parameters = self.parameters_of(RecorderParameters)
+        self._bag = BagWriter(Path(parameters.output).expanduser(), parameters.storage)
+        self._subscriptions_drained_at_end = [
+            self._record(self._offered(topic, parameters)) for topic in TOPICS
+            if ALL in parameters.topics or topic.name in parameters.topics]
+        self._started = time.monotonic()
+        # The wall clock drives only how much a kill may cost.
+        self._flush_timer: Timer = self.create_timer(parameters.flush_period, self._bag.flush,
+                                                     clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def deactivate(self) -> None:
+        """Take what has arrived."""
+        self.active = True
+        for subscription in self._subscriptions_drained_at_end:
+            drain(subscription)
+        self.active = False
+        self._bag.flush()
+
+    def cleanup(self) -> None:
+        """Complete the bag."""
+        self.destroy_timer(self._flush_timer)
+        self._subscriptions_drained_at_end = []
+        self._bag.close()
+        self.get_logger().info(f"{sum(self._bag.counts.values())} messages in '{self._bag.folder}'")
+
+    def diagnostic_values(self) -> Mapping[str, Any]:
+        """Messages per topic, messages on disk, seconds of wall time."""
+        if not hasattr(self, '_bag'):
+            return {}
+        values: dict[str, Any] = {f'messages.{topic}': count for topic, count in self._bag.counts.items()}
+        values |= {'messages': sum(self._bag.counts.values()), 'messages_on_disk': self._bag.flushed,
+                   'wall_s': time.monotonic() - self._started}
+        return values
+
+    def _offered(self, topic: Interface, parameters: RecorderParameters) -> Interface:
+        return STAMPED_CMD_VEL if parameters.stamped_cmd_vel and topic.name == 'cmd_vel' else topic
+
+    def _record(self, topic: Interface) -> Any:
+        """Subscribe to a topic; the writer needs the full name that only the subscription knows."""
+        writers: list[Callable[[bytes], None]] = []
+        is_tick = topic.name == TICK_TOPIC
+
+        def receive(data: bytes) -> None:
+            writers[0](data)
+            if is_tick:
+                self.begin_tick(self._bag.newest_ns or 0)
+                self.end_tick()
+
+        subscription = self.listen(topic, receive, raw=True, qos=topic.recorder_qos)
+        fields = topic.type.get_fields_and_field_types()
+        writers.append(self._bag.add_topic(
+            subscription.topic_name, topic.type_name, topic.publisher_qos,
+            stamped='header' in fields or topic.type is interface('/clock').type, clock=topic.name in CLOCK_TOPICS))
+        return subscription
+
+
+def main() -> int:
+    """Run the recorder; returns the exit status."""
+    return run_node(BagRecorder)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
