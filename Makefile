@@ -7,7 +7,8 @@
 VENV := $(CURDIR)/.venv
 BIN := $(VENV)/bin
 
-# Arguments to pass on, e.g. make test PYTEST_ARGS='-k certificate -x'
+# Arguments to pass on, e.g. make test PYTEST_ARGS='-k certificate -x'. pytest runs in test/, where
+# Python finds the installed package and not the sources.
 WALK_ARGS ?=
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
@@ -43,6 +44,10 @@ else
   VENV_FLAGS :=
   ROS_WHEELS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
   unexport PYTHONPATH
+  ifneq ($(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
+    # Left by another environment with the wheels, whose libraries are not those of .venv.
+    unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH
+  endif
 endif
 
 # pip builds in .venv, not in the sources, where a stale build folder would be packed again.
@@ -72,15 +77,15 @@ demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ 
 	$(BIN)/walk $(WALK_ARGS)
 
 test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
-	$(BIN)/pytest $(PYTEST_ARGS)
+	cd test && $(BIN)/python -m pytest $(PYTEST_ARGS)
 
 bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
 	$(BIN)/python -m dmp_cpg_ros.commands.bench $(BENCH_ARGS)
 
 lint: $(INSTALLED) ## ruff, mypy and the rules for package.xml
-	$(BIN)/ruff check
-	$(BIN)/mypy
-	$(BIN)/pytest --quiet test/test_packaging.py -k package_xml
+	$(BIN)/python -m ruff check
+	$(BIN)/python -m mypy
+	cd test && $(BIN)/python -m pytest --quiet test_packaging.py -k package_xml
 
 install: $(INSTALLED) ## make .venv and install the package into it
 
