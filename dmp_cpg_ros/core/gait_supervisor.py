@@ -100,7 +100,7 @@ class GaitSupervisor:
         """At rest, or free when ``start_inhibited`` is false."""
         stopped = self.parameters.start_inhibited
         return SupervisorState(time_ns, 'at_rest' if stopped else 'free', stopped, True, time_ns, stopped,
-                               np.zeros(4) if stopped else np.ones(4))
+                               np.zeros(4) if stopped else np.ones(4), measured_s=0.0)
 
     def inhibition(self, state: SupervisorState) -> Inhibition:
         """Inhibition that the canonical system applies at the tick after ``state``."""

@@ -80,6 +80,7 @@ class Inhibition:
         return np.where(inside, self.gains, 0.0)
 
 
-def no_inhibition(size: int = len(LEGS)) -> Inhibition:
-    """The absence of inhibition on ``size`` oscillators."""
-    return Inhibition(False, np.zeros(size), 0.0)
+def initial_inhibition(parameters: InhibitionParameters) -> Inhibition:
+    """Inhibition before the first request: armed when the gait starts at rest."""
+    stopped = parameters.start_inhibited
+    return Inhibition(stopped, parameters.armed_gains * float(stopped), parameters.region_radius)

@@ -129,9 +129,9 @@ class PostureController:
         self.torque_limit = np.array([leg.torque_limit for leg in description.legs])
         self.inertia = np.diag(description.base_inertia).copy()
 
-    def initial_state(self, activity: Array) -> PostureState:
-        """State of a robot that is put down, with the legs' swing activity (4,)."""
-        return PostureState(activity, np.zeros(2), 0.0, float('nan'))
+    def initial_state(self) -> PostureState:
+        """State of a robot that stands."""
+        return PostureState(np.zeros(len(self.kinematics)), np.zeros(2), 0.0, float('nan'))
 
     def step(self, memory: PostureState, state: RobotState, x: Array, x_dot: Array, r: Array,
              dt: float) -> tuple[PostureState, PostureFeedback]:

@@ -88,7 +88,8 @@ class RobotParameters(Parameters):
                              choices=('mujoco', 'perfect_tracking'))
     reading: str = parameter('kinematic', 'whether joints follow targets or receive torques only',
                              choices=('kinematic', 'torque'))
-    gated: bool = parameter(False, 'whether ticks wait for ~/advance_until (lock-step only)')
+    gated: bool = parameter(False, 'whether the robot waits for mujoco_robot/advance_until: for each tick in '
+                            'lock-step, to begin in real time')
     seed: int = parameter(0, 'seed of the initial spread', minimum=0)
     initial_spread: float = parameter(0.0, 'joints start at the home pose plus a uniform draw from plus or minus '
                                       'this', unit='rad', minimum=0.0, maximum=0.3)

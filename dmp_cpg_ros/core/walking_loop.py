@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.gait_network import GaitNetwork
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
-from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.inhibition import InhibitionParameters, initial_inhibition
 from dmp_cpg_ros.core.leg_primitive import LegPrimitive, LegState, body_scale
 from dmp_cpg_ros.core.posture import PostureController, PostureFeedback
 from dmp_cpg_ros.core.reference import CommandGate, ReferenceSystem
@@ -83,7 +83,7 @@ class WalkingLoop:
         self.inhibition = self.supervisor.inhibition(self.stop)
         self.r = np.zeros(3)
         self.x = initial_canonical_state(self.network, p.inhibition)
-        self.posture_state = self.posture.initial_state(self.stop.activity)
+        self.posture_state = self.posture.initial_state()
         self.leg_states: list[LegState] = [leg.initial_state() for leg in self.legs]
         self._time_ns: int | None = None
         self._dt = 0.004
@@ -141,6 +141,5 @@ class WalkingLoop:
 
 def initial_canonical_state(network: GaitNetwork, parameters: InhibitionParameters) -> Array:
     """States (4, 2) at which the oscillators start: at rest under inhibition, or in their places."""
-    if not parameters.start_inhibited:
-        return network.locked_state()
-    return network.rest_state(Inhibition(True, parameters.armed_gains, parameters.region_radius))
+    return network.rest_state(initial_inhibition(parameters)) if parameters.start_inhibited else (
+        network.locked_state())

@@ -1,0 +1,78 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``canonical_oscillators``: the coupled Andronov-Hopf network, inhibited where its state is in the region C."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
+from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
+from dmp_cpg_ros.core.walking_loop import initial_canonical_state
+from dmp_cpg_ros.nodes.conversions import (
+    CanonicalStateWriter,
+    InhibitionMessage,
+    header_ns,
+    read_inhibition_state,
+    read_reference,
+)
+from dmp_cpg_ros.nodes.executors import run_node
+from dmp_cpg_ros.nodes.gait_setup import network_of
+from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+
+
+class CanonicalOscillators(ManagedNode):
+    """Advances the four coupled oscillators with the robot's clock."""
+
+    KIND = 'canonical_oscillators'
+    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+
+    def configure(self) -> None:
+        """Build the network at its initial state and its topics."""
+        inhibition = self.parameters_of(InhibitionParameters)
+        self._network = network_of(self)
+        self._x, self._last_ns = initial_canonical_state(self._network, inhibition), -1
+        self._inhibition = initial_inhibition(inhibition)
+        self._writer, self._publisher = CanonicalStateWriter(), self.publisher('canonical_state')
+        self._ticks = self.match(('reference',), 'reference', delayed=('inhibition_state',),
+                                 lock_step=self.parameters_of(LockStepParameters).lock_step)
+        self.listen('reference', lambda message: self._ticks.add(
+            'reference', header_ns(message), read_reference(message)))
+        self.listen('inhibition_state', lambda message: self._ticks.add(
+            'inhibition_state', header_ns(message), inhibition_from(read_inhibition_state(message))))
+
+    def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
+        """Advance the oscillators to the stamp of the reference."""
+        dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
+        self._last_ns = stamp_ns
+        self._inhibition = values['inhibition_state'] or self._inhibition
+        r = values['reference']
+        if dt > 0.0:
+            self._x = self._network.step(self._x, r, self._inhibition, dt)
+        x_dot = self._network.rate(self._x, r, self._inhibition)
+        self._publisher.publish(self._writer.fill(stamp_ns, self._x, x_dot))
+
+    def diagnostic_values(self) -> Mapping[str, Any]:
+        """Phase error of the legs [rad]."""
+        return {'phase_error_rad': float(np.abs(self._network.phase_errors(self._x)).max())}
+
+
+def inhibition_from(message: InhibitionMessage) -> Inhibition:
+    """Inhibition that ``inhibition_state`` announces; raises DataError for numbers that are not finite."""
+    gains = np.array([message.number(f'gain_{leg}') for leg in LEGS])
+    return Inhibition(message.flag('requested'), gains, message.number('region_radius'))
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(CanonicalOscillators)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

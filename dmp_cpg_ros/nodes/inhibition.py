@@ -1,0 +1,138 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``inhibition``: the service that stops and starts the gait, and the state of the stop."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor
+from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.leg_primitive import LegParameters
+from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters, TickParameters
+from dmp_cpg_ros.nodes.conversions import (
+    CanonicalStateReader,
+    InhibitionStateWriter,
+    header_ns,
+    read_reference,
+    read_twist,
+)
+from dmp_cpg_ros.nodes.executors import run_node
+from dmp_cpg_ros.nodes.gait_setup import network_of
+from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
+from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+
+
+class InhibitionNode(ManagedNode):
+    """Stops and starts the gait on request, says when it will be at rest, and watches that it is."""
+
+    KIND = 'inhibition'
+    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    CHANGEABLE = ('auto_inhibit', 'auto_delay', 'capture_speed', 'inhibited_legs')
+
+    def configure(self) -> None:
+        """Build the supervisor and its topics and service."""
+        parameters, reference = self.parameters_of(InhibitionParameters), self.parameters_of(ReferenceParameters)
+        self._supervisor = GaitSupervisor(parameters, network_of(self),
+                                          self.parameters_of(LegParameters).activity_rate)
+        self._gate, self._reference = CommandGate(reference), ReferenceSystem(reference)
+        self._state = self._supervisor.initial_state()
+        self._acting = self._supervisor.inhibition(self._state)
+        self._x: Any = None
+        self._r = np.zeros(3)
+        self._predicted = self._bound = float('nan')
+        self._lock_step = self.parameters_of(LockStepParameters).lock_step
+        self._writer, self._publisher = InhibitionStateWriter(), self.publisher('inhibition_state')
+        self._ticks = self.match(('canonical_state', 'reference'), 'canonical_state', lock_step=self._lock_step)
+        canonical = CanonicalStateReader()
+        self.listen('canonical_state', lambda message: self._ticks.add(
+            'canonical_state', header_ns(message), canonical.read(message)))
+        self.listen('reference', lambda message: self._ticks.add(
+            'reference', header_ns(message), read_reference(message)))
+        if self.parameters_of(CommandParameters).stamped_cmd_vel:
+            self.listen(STAMPED_CMD_VEL, lambda message: self._gate.accept(*read_twist(message.twist)), command=True)
+        else:
+            self.listen('cmd_vel', lambda message: self._gate.accept(*read_twist(message)), command=True)
+        self.serve('inhibit', self._answer_inhibit)
+
+    def activate(self) -> None:
+        """Tell late joiners the state from the start; in lock-step the first tick does."""
+        if not self._lock_step:
+            self._publish()
+
+    def on_parameters(self) -> None:
+        """Take over what may change while walking."""
+        self._supervisor.parameters = self.parameters_of(InhibitionParameters)
+
+    def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
+        """Advance the state of the stop to the stamp of the canonical state."""
+        (self._x, x_dot), self._r = values['canonical_state'], values['reference']
+        before, published = self._state, self._acting
+        self._state = self._supervisor.step(before, stamp_ns, self._x, x_dot, self._r, self._gate.at(stamp_ns))
+        self._acting = self._supervisor.inhibition(self._state)
+        if self._state.requested != before.requested:
+            self._predict(published)
+        if self._lock_step or self._changed(before):
+            self._publish()
+
+    def diagnostic_values(self) -> Mapping[str, Any]:
+        """State of the stop."""
+        return {'inhibition': self._state.word, 'requested': self._state.requested, 'command': self._gate.at(self._state.time_ns)}
+
+    def _changed(self, before: Any) -> bool:
+        now = self._state
+        return (now.word, now.requested, now.armed, now.automatic, now.request_ns) != (
+            before.word, before.requested, before.armed, before.automatic, before.request_ns)
+
+    def _answer_inhibit(self, request: Any, response: Any) -> Any:
+        """Take a request; the answer says when it will be fulfilled. It acts from the next tick on."""
+        verb = 'at rest' if request.data else 'walking'
+        if not self.active:
+            response.success, response.message = False, f'inhibition is {self.state_label}, not active'
+            return response
+        if self._x is None:
+            response.success = False
+            response.message = 'no canonical_state and reference yet; is canonical_oscillators running?'
+            return response
+        already = request.data == self._state.requested
+        self._state = self._supervisor.request(self._state, request.data)
+        response.success = True
+        if already:
+            response.message = f'already {self._state.word}'
+            return response
+        self._predict(self._acting)
+        when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
+        response.message = f'{verb} {when}'
+        return response
+
+    def _predict(self, published: Inhibition) -> None:
+        """Look ahead to the rest or the walk that was just requested."""
+        tick_s = self.parameters_of(TickParameters).tick_ns * 1e-9
+        self._predicted = predict(self._supervisor, self._reference, self._state, published, self._x, self._r,
+                                  self._gate.at(self._state.time_ns), tick_s)
+
+    def _publish(self) -> None:
+        state, acting = self._state, self._acting
+        values: dict[str, Any] = {'requested': state.requested, 'armed': state.armed, 'automatic': state.automatic}
+        values.update((f'gain_{leg}', gain) for leg, gain in zip(LEGS, acting.gains.tolist(), strict=True))
+        values.update(region_radius=acting.region_radius, request_stamp=state.request_ns * 1e-9,
+                      predicted_s=self._predicted, bound_s=self._bound, measured_s=state.measured_s)
+        self._publisher.publish(self._writer.fill(state.time_ns, state.word, values))
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(InhibitionNode)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

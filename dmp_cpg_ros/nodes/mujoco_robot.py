@@ -1,0 +1,192 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``mujoco_robot``: the robot. In real time it keeps the wall clock's pace; in lock-step it waits for every target."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rosgraph_msgs.msg import Clock as ClockMessage
+
+from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.suite_parameters import (
+    NODE_PARAMETERS,
+    RobotFileParameters,
+    RobotParameters,
+    TickParameters,
+)
+from dmp_cpg_ros.nodes.conversions import JointTargetsReader, RobotStateWriter, header_ns
+from dmp_cpg_ros.nodes.executors import run_node
+from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.message_values import set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.robot_timing import RobotTiming
+from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.robot.home_pose import home_joint_position
+from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
+from dmp_cpg_ros.robot.port import Robot
+from dmp_cpg_ros.robot.target_guard import TargetGuard
+
+READY_PERIOD_S = 0.05
+"""How often a lock-step robot without a gate asks whether its partners are there [s]."""
+
+STATE_TOPICS = ('/clock', 'imu', 'odom', 'foot_contacts', 'joint_states')
+"""What the robot publishes at every tick, the tick itself last."""
+
+
+class MujocoRobotNode(ManagedNode):
+    """Publishes the robot's state at every control tick and moves its joints to their targets."""
+
+    KIND = 'mujoco_robot'
+    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+
+    def configure(self) -> None:
+        """Stand the robot up and create its topics."""
+        self._parameters = self.parameters_of(RobotParameters)
+        self._lock_step = self.parameters_of(LockStepParameters).lock_step
+        self._tick_ns = self.parameters_of(TickParameters).tick_ns
+        self._robot = self._make_robot()
+        stand = home_joint_position(self._robot.description)
+        self._guard = TargetGuard(stand, round(self._parameters.target_timeout * 1e9))
+        self._timing, self._writer, self._reader = RobotTiming(), RobotStateWriter(), JointTargetsReader()
+        self._state: RobotState = self._robot.reset()
+        self._fell, self._holding, self._open_until = False, True, -1
+        self._publishers = [self.publisher(name) for name in STATE_TOPICS]
+        self.listen('joint_targets', self._on_targets)
+        if self._parameters.gated:
+            self._held = self.publisher(f'{self.KIND}/holding_at')
+            self.listen(f'{self.KIND}/advance_until', self._on_advance)
+        self._viewer: Any = None
+        if self._parameters.viewer and self._parameters.physics == 'mujoco':
+            from dmp_cpg_ros.robot.camera import open_viewer
+            self._viewer = open_viewer(self._robot.model, self._robot.data)  # type: ignore[attr-defined]
+
+    def activate(self) -> None:
+        """Begin with the first tick: at the gate, or as soon as there is somebody to tell."""
+        self._timer: Any = None
+        if self._parameters.gated:
+            self._hold()
+        elif self._lock_step:
+            self._timer = self.create_timer(READY_PERIOD_S, self._start_when_connected,
+                                            clock=Clock(clock_type=ClockType.STEADY_TIME))
+        else:
+            self._start_real_time()
+
+    def deactivate(self) -> None:
+        """Stop the clock; the robot stays where it is."""
+        if self._timer is not None:
+            self.destroy_timer(self._timer)
+            self._timer = None
+
+    def cleanup(self) -> None:
+        """Release the robot."""
+        self._robot.close()
+        if self._viewer is not None:
+            self._viewer.close()
+
+    def diagnostic_values(self) -> Mapping[str, Any]:
+        """Timing, and whether the robot has fallen or stands by itself."""
+        return {**self._timing.values(), 'fell': self._fell, 'time_s': self._state.time_ns * 1e-9,
+                'silent_legs': ' '.join(self._guard.silent(self._state.time_ns)) or 'none'}
+
+    # The tick ------------------------------------------------------------------------------------------------
+
+    def _publish_state(self) -> None:
+        stamp = self._state.time_ns
+        self._holding = False
+        self.begin_tick(stamp)
+        writer = self._writer
+        writer.fill(self._state)
+        messages = (writer.clock, writer.imu, writer.odom, writer.foot_contacts, writer.joint_states)
+        self._timing.published(stamp)
+        for publisher, message in zip(self._publishers, messages, strict=True):
+            publisher.publish(message)
+        self.end_tick()
+
+    def _step(self) -> None:
+        """Move the robot by one tick under the targets that are there."""
+        now = self._state.time_ns
+        targets = self._guard.targets(now, self._state.joint_position)
+        silent = self._guard.silent(now)
+        if silent and any(self._guard.stamps):
+            self.warn('silent', f"no targets from {', '.join(silent)} for {self._parameters.target_timeout} s: "
+                      'the robot holds a stand by itself', error=True)
+        elif not silent:
+            self.clear('silent')
+        self._state = self._robot.step(targets)
+        if not self._fell and getattr(self._robot, 'fallen', False):
+            self._fell = True
+            self.warn('fell', f'the robot fell at {self._state.time_ns * 1e-9:.3f} s', error=True)
+        if self._viewer is not None and self._viewer.is_running():
+            self._viewer.sync()
+
+    def _on_targets(self, message: Any) -> None:
+        leg, targets = self._reader.read(message)
+        stamp = header_ns(message)
+        self._guard.accept(leg, stamp, targets)
+        self._timing.arrived(stamp)
+        if self._lock_step and not self._holding and stamp == self._state.time_ns and all(
+                known == stamp for known in self._guard.stamps):
+            self._step()
+            self._hold()
+
+    # Lock-step -----------------------------------------------------------------------------------------------
+
+    def _start_when_connected(self) -> None:
+        if not self.missing():
+            self.deactivate()
+            self._publish_state()
+
+    def _hold(self) -> None:
+        """Publish the state, or wait at the gate until it may be published."""
+        if not self._parameters.gated or self._open_until >= self._state.time_ns:
+            self._publish_state()
+            return
+        self._holding = True
+        message = ClockMessage()
+        set_stamp(message.clock, self._state.time_ns)
+        self._held.publish(message)
+
+    def _on_advance(self, message: ClockMessage) -> None:
+        self._open_until = max(self._open_until, stamp_ns(message.clock))
+        if self._holding and self._open_until >= self._state.time_ns:
+            if self._lock_step:
+                self._publish_state()
+            else:
+                self._holding = False
+                self._start_real_time()
+
+    # Real time -----------------------------------------------------------------------------------------------
+
+    def _start_real_time(self) -> None:
+        self._publish_state()
+        self._timer = self.create_timer(self._tick_ns * 1e-9, self._on_timer,
+                                        clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _on_timer(self) -> None:
+        self._timing.deadline(self._state.time_ns)
+        self._step()
+        self._publish_state()
+
+    # Inside --------------------------------------------------------------------------------------------------
+
+    def _make_robot(self) -> Robot:
+        p, file = self._parameters, find_config(self.parameters_of(RobotFileParameters).robot)
+        if p.physics == 'perfect_tracking':
+            return PerfectTrackingRobot(load_description(file), self._tick_ns)
+        from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+        return MujocoRobot(file, self._tick_ns, p.seed, p.initial_spread)
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(MujocoRobotNode)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,70 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``posture_control``: virtual-model feedback torques and foot placement from the body's state."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+from dmp_cpg_ros.core.posture import PostureController, PostureParameters
+from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
+from dmp_cpg_ros.nodes.conversions import (
+    CanonicalStateReader,
+    FootContactsReader,
+    JointsReader,
+    PostureFeedbackWriter,
+    header_ns,
+    read_odom,
+    read_reference,
+    robot_state,
+)
+from dmp_cpg_ros.nodes.executors import run_node
+from dmp_cpg_ros.nodes.gait_setup import description_of, gait_of
+from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+
+
+class PostureControl(ManagedNode):
+    """Balances the body: torques for the stance legs, placement for the swinging feet."""
+
+    KIND = 'posture_control'
+    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    CHANGEABLE = tuple(PostureParameters.__dataclass_fields__)
+
+    def configure(self) -> None:
+        """Build the controller and its topics."""
+        self._controller = PostureController(description_of(self), gait_of(self),
+                                             self.parameters_of(PostureParameters))
+        self._memory, self._last_ns = self._controller.initial_state(), -1
+        self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
+        self._ticks = self.match(
+            ('joint_states', 'odom', 'foot_contacts', 'reference', 'canonical_state'), 'canonical_state',
+            lock_step=self.parameters_of(LockStepParameters).lock_step)
+        canonical, joints, feet = CanonicalStateReader(), JointsReader(), FootContactsReader()
+        for name, read in (('joint_states', joints.read), ('odom', read_odom), ('foot_contacts', feet.read),
+                           ('reference', read_reference), ('canonical_state', canonical.read)):
+            self.listen(name, lambda message, name=name, read=read: self._ticks.add(
+                name, header_ns(message), read(message)))
+
+    def on_parameters(self) -> None:
+        """Take over the gains."""
+        self._controller.parameters = self.parameters_of(PostureParameters)
+
+    def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
+        """Compute the feedback for the stamp of the canonical state."""
+        dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
+        self._last_ns = stamp_ns
+        state = robot_state(stamp_ns, values['joint_states'], values['odom'], values['foot_contacts'])
+        x, x_dot = values['canonical_state']
+        self._memory, feedback = self._controller.step(self._memory, state, x, x_dot, values['reference'], dt)
+        self._publisher.publish(self._writer.fill(stamp_ns, feedback))
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(PostureControl)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

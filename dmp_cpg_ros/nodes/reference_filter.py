@@ -1,0 +1,69 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``reference_filter``: cmd_vel → v, γ through the first-order reference system."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters
+from dmp_cpg_ros.nodes.conversions import ReferenceWriter, header_ns, read_inhibition_state, read_twist
+from dmp_cpg_ros.nodes.executors import run_node
+from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
+from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+
+
+class ReferenceFilter(ManagedNode):
+    """Filters the commanded velocity; brings it to zero when cmd_vel falls silent or a stop is requested."""
+
+    KIND = 'reference_filter'
+    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    CHANGEABLE = ('alpha_r', 'max_speed', 'max_lateral_speed', 'max_turn_rate', 'cmd_vel_timeout')
+
+    def configure(self) -> None:
+        """Build the filter and its topics."""
+        self._gate = CommandGate(self.parameters_of(ReferenceParameters))
+        self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
+        self._r, self._last_ns, self._requested = np.zeros(3), -1, False
+        self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
+        self._ticks = self.match(('joint_states',), 'joint_states', delayed=('inhibition_state',),
+                                 lock_step=self.parameters_of(LockStepParameters).lock_step)
+        self.listen('joint_states', lambda message: self._ticks.add('joint_states', header_ns(message), None))
+        self.listen('inhibition_state', lambda message: self._ticks.add(
+            'inhibition_state', header_ns(message), read_inhibition_state(message).flag('requested')))
+        if self.parameters_of(CommandParameters).stamped_cmd_vel:
+            self.listen(STAMPED_CMD_VEL, lambda message: self._gate.accept(*read_twist(message.twist)), command=True)
+        else:
+            self.listen('cmd_vel', lambda message: self._gate.accept(*read_twist(message)), command=True)
+
+    def on_parameters(self) -> None:
+        """Take over limits and rates."""
+        self._gate.parameters = self._system.parameters = self.parameters_of(ReferenceParameters)
+
+    def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
+        """Advance the filter to the stamp of the robot's state."""
+        dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
+        self._last_ns = stamp_ns
+        command, self._requested = self._gate.at(stamp_ns), bool(values['inhibition_state'])
+        r_ext = np.zeros(3) if self._requested else np.array(command)
+        self._r = self._system.step(self._r, r_ext, dt)
+        self._publisher.publish(self._writer.fill(stamp_ns, self._r))
+
+    def diagnostic_values(self) -> Mapping[str, Any]:
+        """Reference and whether a stop holds it at zero."""
+        return {'v_x': self._r[0], 'v_y': self._r[1], 'gamma': self._r[2], 'stopping': self._requested}
+
+
+def main() -> int:
+    """Run the node."""
+    return run_node(ReferenceFilter)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
