@@ -1,3 +1,3 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Movement primitives: discrete and rhythmic, their learning, and their scaling in space and time."""
+"""Movement primitives: discrete and rhythmic, how they are learned and scaled."""

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Normalised basis functions of the forcing terms: Gaussian (discrete) and von Mises (rhythmic).
 
-Both classes return Φ_i/Σ_j Φ_j. The largest exponent is subtracted before the exponential is taken, so the
-quotient stays defined where every Φ_i underflows.
+Both classes return Φ_i/Σ_j Φ_j. The largest exponent is subtracted before the exponential is
+taken, so the quotient stays defined where every Φ_i underflows.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 class GaussianBases:
     """Φ_i(x) = exp(−(x − c_i)²/(2σ_i²)) of the discrete forcing function.
 
-    The paper prints σ₁ for every basis; x falls exponentially, so with one width either the first bases leave
-    gaps or the last ones coincide. One width per basis is what Ijspeert et al. (2013) use, and what is used
-    here; equal entries in ``widths`` give the printed form.
+    The paper prints σ₁ for every basis; x falls exponentially, so with one width either the first
+    bases leave gaps or the last ones coincide. One width per basis is what Ijspeert et al. (2013)
+    use, and what is used here; equal entries in ``widths`` give the printed form.
 
     Attributes
     ----------
@@ -47,7 +47,9 @@ class GaussianBases:
         _check(self)
 
     @classmethod
-    def evenly_in_time(cls, count: int, decay: float, duration: float, overlap: float = 0.6) -> GaussianBases:
+    def evenly_in_time(
+        cls, count: int, decay: float, duration: float, overlap: float = 0.6
+    ) -> GaussianBases:
         """Bases whose centres are reached at evenly spaced times.
 
         Parameters
@@ -103,8 +105,8 @@ class GaussianBases:
 class VonMisesBases:
     """Φ_i(φ) = exp((cos(φ − φ_i) − 1)/(2σ_i²)) of the rhythmic forcing function.
 
-    The paper prints σ₁ for every basis and uses the clockwise angle θ = −φ; since the cosine is even, bases at
-    φ_i here are bases at θ_i = −φ_i there.
+    The paper prints σ₁ for every basis and uses the clockwise angle θ = −φ; since the cosine is
+    even, bases at φ_i here are bases at θ_i = −φ_i there.
 
     Attributes
     ----------
@@ -183,8 +185,10 @@ def _check(bases: GaussianBases | VonMisesBases) -> None:
         object.__setattr__(bases, name, np.array(getattr(bases, name), dtype=float))
     centres, widths = bases.centres, bases.widths
     if centres.ndim != 1 or centres.shape != widths.shape or not centres.size:
-        raise ParameterError(f'centres and widths must be two lists of the same length, at least 1; they have '
-                             f'shapes {centres.shape} and {widths.shape}')
+        raise ParameterError(
+            f'centres and widths must be two lists of the same length, at least 1; they have '
+            f'shapes {centres.shape} and {widths.shape}'
+        )
     if not (np.all(np.isfinite(centres)) and np.all(np.isfinite(widths)) and np.all(widths > 0.0)):
         raise ParameterError('centres must be finite and widths positive and finite')
 

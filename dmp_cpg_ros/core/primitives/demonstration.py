@@ -49,7 +49,8 @@ class Demonstration:
     Raises
     ------
     DataError
-        If there are fewer than 8 samples, times do not increase, shapes differ or a value is not finite.
+        If there are fewer than 8 samples, times do not increase, shapes differ or a value is not
+        finite.
     """
 
     times: Array
@@ -62,14 +63,18 @@ class Demonstration:
         """Validate and convert."""
         times = np.array(self.times, dtype=float)
         if times.ndim != 1 or len(times) < 8:
-            raise DataError(f'a demonstration needs at least 8 samples in one list of times, not shape {times.shape}')
+            raise DataError(
+                f'a demonstration needs one list of at least 8 times, not shape {times.shape}'
+            )
         if not np.all(np.isfinite(times)):
             raise DataError('times of a demonstration must be finite')
         steps = np.diff(times)
         if not np.all(steps > 0.0):
             bad = int(np.argmax(steps <= 0.0))
-            raise DataError(f'times of a demonstration must increase; sample {bad + 1} at {times[bad + 1]} s follows '
-                            f'{times[bad]} s')
+            raise DataError(
+                f'times of a demonstration must increase; sample {bad + 1} at {times[bad + 1]} s '
+                f'follows {times[bad]} s'
+            )
         object.__setattr__(self, 'times', times)
         for name in ('positions', 'velocities', 'accelerations'):
             values = getattr(self, name)
@@ -78,7 +83,9 @@ class Demonstration:
         for name in ('velocities', 'accelerations'):
             values = getattr(self, name)
             if values is not None and values.shape != self.positions.shape:
-                raise DataError(f'{name} have shape {values.shape}, positions {self.positions.shape}')
+                raise DataError(
+                    f'{name} have shape {values.shape}, positions {self.positions.shape}'
+                )
         if self.names and len(self.names) != self.dofs:
             raise DataError(f'{len(self.names)} names do not match {self.dofs} degrees of freedom')
 
@@ -92,13 +99,12 @@ class Demonstration:
         """Time from the first to the last sample [s]."""
         return float(self.times[-1] - self.times[0])
 
-    def with_derivatives(self) -> Demonstration:
-        """Fill in missing velocities and accelerations with :func:`derivatives`.
+    def all_derivatives(self) -> tuple[Array, Array, Array]:
+        """Positions, velocities and accelerations, by :func:`derivatives` where not recorded.
 
         Returns
         -------
-        Demonstration
-            With all three.
+        positions, velocities, accelerations : ndarray (m, n)
         """
         velocities, accelerations = self.velocities, self.accelerations
         if velocities is None:
@@ -106,15 +112,26 @@ class Demonstration:
             accelerations = second if accelerations is None else accelerations
         elif accelerations is None:
             accelerations = derivatives(self.times, velocities)[0]
-        return Demonstration(self.times, self.positions, velocities, accelerations, self.names)
+        return self.positions, velocities, accelerations
+
+    def with_derivatives(self) -> Demonstration:
+        """Fill in missing velocities and accelerations.
+
+        Returns
+        -------
+        Demonstration
+            With all three.
+        """
+        return Demonstration(self.times, *self.all_derivatives(), self.names)
 
 
-def derivatives(times: ArrayLike, values: ArrayLike, half_window: int = 3,
-                degree: int = 4) -> tuple[Array, Array]:
+def derivatives(
+    times: ArrayLike, values: ArrayLike, half_window: int = 3, degree: int = 4
+) -> tuple[Array, Array]:
     """First and second derivative of sampled data by local polynomials (Savitzky & Golay 1964).
 
-    Works for uneven spacing; at the ends the window is one-sided. On smooth data the errors fall with the
-    powers ``degree`` and ``degree − 1`` of the spacing.
+    Works for uneven spacing; at the ends the window is one-sided. On smooth data the errors fall
+    with the powers ``degree`` and ``degree − 1`` of the spacing.
 
     Parameters
     ----------
@@ -140,14 +157,17 @@ def derivatives(times: ArrayLike, values: ArrayLike, half_window: int = 3,
     times, values = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
     width = 2 * half_window + 1
     if not 2 <= degree < width or width > len(times):
-        raise ParameterError(f'derivatives need 2 <= degree < window <= samples; they are {degree}, {width} and '
-                             f'{len(times)}')
+        raise ParameterError(
+            f'derivatives need 2 <= degree < window <= samples; they are {degree}, {width} and '
+            f'{len(times)}'
+        )
     starts = np.clip(np.arange(len(times)) - half_window, 0, len(times) - width)
-    window = starts[:, None] + np.arange(width)                                       # (m, width)
+    window = starts[:, None] + np.arange(width)  # (m, width)
     offsets = times[window] - times[:, None]
     scale = np.abs(offsets).max(axis=1)
-    powers = (offsets / scale[:, None])[..., None] ** np.arange(degree + 1)           # (m, width, degree + 1)
-    fitted = np.linalg.pinv(powers) @ values[window]                                  # (m, degree + 1, n)
+    unit = (offsets / scale[:, None])[..., None]
+    powers = unit ** np.arange(degree + 1)  # (m, width, degree + 1)
+    fitted = np.linalg.pinv(powers) @ values[window]
     return fitted[:, 1] / scale[:, None], 2.0 * fitted[:, 2] / scale[:, None] ** 2
 
 
@@ -161,7 +181,9 @@ def vector(values: ArrayLike, length: int, name: str) -> Array:
     """
     result = np.atleast_1d(np.array(values, dtype=float))
     if result.shape != (length,) or not np.all(np.isfinite(result)):
-        raise ParameterError(f'{name} must be {length} finite number(s), not {np.asarray(values).tolist()}')
+        raise ParameterError(
+            f'{name} must be {length} finite number(s), not {np.asarray(values).tolist()}'
+        )
     return result
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Discrete primitives: point-to-point movements on an exponential phase (paper eqs. p2p_trans, p2p_phase)."""
+"""Discrete primitives: movements to a goal on an exponential phase (eqs. p2p_trans, p2p_phase)."""
 
 from __future__ import annotations
 
@@ -14,49 +14,11 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.primitives.basis import GaussianBases
 from dmp_cpg_ros.core.primitives.demonstration import Trajectory, columns, vector
 from dmp_cpg_ros.core.primitives.goal_filter import FirstOrderFilter
+from dmp_cpg_ros.core.primitives.states import DiscreteInput, DiscreteState
 from dmp_cpg_ros.core.primitives.time_scaling import Form, TimeScaling
 from dmp_cpg_ros.core.primitives.transformation import SpringDamper
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class DiscreteInput:
-    """What may change while the movement runs; held during a step.
-
-    Attributes
-    ----------
-    goal : ndarray (n,)
-        External goal g_ext.
-    tau : float
-        Commanded τ_ext > 0; 2 makes the movement twice as slow.
-    """
-
-    goal: Array
-    tau: float = 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class DiscreteState:
-    """State of reference, canonical and transformation system.
-
-    Attributes
-    ----------
-    position, velocity : ndarray (n,)
-        y and ẏ, in the demonstration's unit and per second.
-    x : float
-        Phase, 1 at the start, falling to 0.
-    goal : ndarray (n,)
-        Filtered goal g.
-    tau : float
-        Filtered τ.
-    """
-
-    position: Array
-    velocity: Array
-    x: float
-    goal: Array
-    tau: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,17 +68,19 @@ class DiscretePrimitive:
         """Validate; scalars of the transformation are spread over the degrees of freedom."""
         weights = np.array(self.weights, dtype=float)
         if weights.ndim != 2 or len(weights) != self.bases.count:
-            raise ParameterError(f'weights must have shape ({self.bases.count}, n), not {weights.shape}')
+            raise ParameterError(
+                f'weights must have shape ({self.bases.count}, n), not {weights.shape}'
+            )
         if not np.all(np.isfinite(weights)):
             raise ParameterError('weights must be finite')
         dofs = weights.shape[1]
         object.__setattr__(self, 'weights', weights)
         object.__setattr__(self, 'start', vector(self.start, dofs, 'start'))
         object.__setattr__(self, 'goal', vector(self.goal, dofs, 'goal'))
-        object.__setattr__(self, 'start_velocity', columns(self.start_velocity, dofs, 'start_velocity'))
-        spring = self.transformation
-        object.__setattr__(self, 'transformation', SpringDamper(
-            columns(spring.stiffness, dofs, 'stiffness'), columns(spring.damping, dofs, 'damping'), spring.form))
+        object.__setattr__(
+            self, 'start_velocity', columns(self.start_velocity, dofs, 'start_velocity')
+        )
+        object.__setattr__(self, 'transformation', self.transformation.spread(dofs))
         for name in ('phase_decay', 'duration'):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
@@ -158,14 +122,20 @@ class DiscretePrimitive:
         """The demonstration's goal at τ = 1."""
         return DiscreteInput(self.goal)
 
-    def initial_state(self, position: ArrayLike | None = None, velocity: ArrayLike | None = None,
-                      goal: ArrayLike | None = None, tau: float = 1.0) -> DiscreteState:
+    def initial_state(
+        self,
+        position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        goal: ArrayLike | None = None,
+        tau: float = 1.0,
+    ) -> DiscreteState:
         """State at the start of a movement, with filters at rest.
 
         Parameters
         ----------
         position, velocity, goal : array_like (n,), optional
-            y and g (the demonstration's without) and ẏ (the start velocity, adapted to τ, without).
+            y and g (the demonstration's without) and ẏ (the start velocity, adapted to τ,
+            without).
         tau : float
             τ at the start.
 
@@ -184,13 +154,17 @@ class DiscretePrimitive:
         usual = np.asarray(self.start_velocity) / (tau if self.form == 'scaled' else 1.0)
         return DiscreteState(
             self.start if position is None else vector(position, n, 'position'),
-            usual if velocity is None else vector(velocity, n, 'velocity'), 1.0,
-            self.goal if goal is None else vector(goal, n, 'goal'), float(tau))
+            usual if velocity is None else vector(velocity, n, 'velocity'),
+            1.0,
+            self.goal if goal is None else vector(goal, n, 'goal'),
+            float(tau),
+        )
 
     def step(self, state: DiscreteState, command: DiscreteInput, dt: float) -> DiscreteState:
         """Advance by one step with the input held.
 
-        Phase and filters are exact; the transformation is of fourth order (see ``SpringDamper.step``).
+        Phase and filters are exact; the transformation is of fourth order (see
+        ``SpringDamper.step``).
 
         Parameters
         ----------
@@ -212,10 +186,11 @@ class DiscretePrimitive:
         """
         goal_filter, scaling = self._filters
         grid = scaling.grid(state.tau, command.tau, dt, 3, self.form)
-        x = state.x * np.exp(-self.phase_decay * grid.scaled)                         # (3,)
-        goals = goal_filter.at(state.goal, command.goal, grid.elapsed)                # (3, n)
+        x = state.x * np.exp(-self.phase_decay * grid.scaled)  # (3,)
+        goals = goal_filter.at(state.goal, command.goal, grid.elapsed)  # (3, n)
         position, velocity = self.transformation.step(
-            state.position, state.velocity, goals, self.forcing(x), grid)
+            state.position, state.velocity, goals, self.forcing(x), grid
+        )
         return DiscreteState(position, velocity, float(x[-1]), goals[-1], float(grid.tau[-1]))
 
     def acceleration(self, state: DiscreteState, command: DiscreteInput) -> Array:
@@ -232,11 +207,20 @@ class DiscretePrimitive:
         ndarray (n,)
         """
         return self.transformation.acceleration(
-            state.position, state.velocity, state.goal, self.forcing(state.x), state.tau,
-            self.tau_rate * (command.tau - state.tau))
+            state.position,
+            state.velocity,
+            state.goal,
+            self.forcing(state.x),
+            state.tau,
+            self.tau_rate * (command.tau - state.tau),
+        )
 
-    def rollout(self, times: ArrayLike, command: DiscreteInput | None = None,
-                state: DiscreteState | None = None) -> Trajectory:
+    def rollout(
+        self,
+        times: ArrayLike,
+        command: DiscreteInput | None = None,
+        state: DiscreteState | None = None,
+    ) -> Trajectory:
         """Run the primitive with a constant input.
 
         Parameters
@@ -258,5 +242,9 @@ class DiscretePrimitive:
         states = [state]
         for dt in np.diff(times):
             states.append(self.step(states[-1], command, float(dt)))
-        return Trajectory(times, np.array([s.position for s in states]), np.array([s.velocity for s in states]),
-                          np.array([self.acceleration(s, command) for s in states]))
+        return Trajectory(
+            times,
+            np.array([s.position for s in states]),
+            np.array([s.velocity for s in states]),
+            np.array([self.acceleration(s, command) for s in states]),
+        )

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""First-order reference filters (paper eq. p2p_filter): the goal, the centre, the amplitude and τ."""
+"""First-order reference filters (eq. p2p_filter) on goal, centre, amplitude and τ."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ Array = NDArray[np.float64]
 class FirstOrderFilter:
     """ṙ = α (r_ext − r), the reference system of a primitive, contracting with rate α.
 
-    The step is the exact solution for a command that is held during the step; it has no stability limit.
-    The filter runs in real time, not in scaled time, as the paper prints it (Ijspeert et al. 2013 slow it
-    with τ).
+    The step is the exact solution for a command that is held during the step; it has no stability
+    limit. The filter runs in real time, not in scaled time, as the paper prints it (Ijspeert et
+    al. 2013 slow it with τ).
 
     Attributes
     ----------
@@ -30,7 +30,8 @@ class FirstOrderFilter:
     Raises
     ------
     ParameterError
-        If the rate is not a positive finite number: a filter that follows at once would make velocities jump.
+        If the rate is not a positive finite number: a filter that follows at once would make
+        velocities jump.
     """
 
     rate: float
@@ -38,7 +39,9 @@ class FirstOrderFilter:
     def __post_init__(self) -> None:
         """Validate."""
         if not (np.isfinite(self.rate) and self.rate > 0.0):
-            raise ParameterError(f'filter rate = {self.rate!r} 1/s must be a positive finite number')
+            raise ParameterError(
+                f'filter rate = {self.rate!r} 1/s must be a positive finite number'
+            )
 
     def at(self, value: ArrayLike, command: ArrayLike, elapsed: ArrayLike) -> Array:
         """Filtered value some time after the start of a step.
@@ -57,7 +60,9 @@ class FirstOrderFilter:
         """
         value, command = np.asarray(value, dtype=float), np.asarray(command, dtype=float)
         elapsed = np.asarray(elapsed, dtype=float)
-        decay = np.exp(-self.rate * elapsed).reshape(elapsed.shape + (1,) * max(value.ndim, command.ndim))
+        decay = np.exp(-self.rate * elapsed).reshape(
+            elapsed.shape + (1,) * max(value.ndim, command.ndim)
+        )
         return command + (value - command) * decay
 
     def step(self, value: ArrayLike, command: ArrayLike, dt: float) -> Array:

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Movements that forces of known time course cause through a spring-damper; the regressors of learning."""
+"""Movements that known forces cause through a spring-damper; the regressors of learning."""
 
 from __future__ import annotations
 
@@ -9,13 +9,18 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.primitives.transformation import quadratic_drive_step, spring_exponential
+from dmp_cpg_ros.core.primitives.spring_solution import quadratic_drive_step, spring_exponential
 
 Array = NDArray[np.float64]
 
 
-def transient_responses(stiffness: float, damping: float, times: Array, force: Callable[[Array], Array],
-                        longest_step: float) -> tuple[Array, Array]:
+def transient_responses(
+    stiffness: float,
+    damping: float,
+    times: Array,
+    force: Callable[[Array], Array],
+    longest_step: float,
+) -> tuple[Array, Array]:
     """Responses y'' = u_i(s) − k y − b y' from rest, and the two free movements.
 
     Parameters
@@ -36,17 +41,23 @@ def transient_responses(stiffness: float, damping: float, times: Array, force: C
     free : ndarray (3, m, 2)
         The same of the free movements from (y, y') = (1, 0) and (0, 1).
     """
-    parts = np.ceil(np.diff(times) / longest_step - 1e-9).astype(int).clip(1)         # steps per interval
+    parts = np.ceil(np.diff(times) / longest_step - 1e-9).astype(int).clip(1)  # steps per interval
     lengths = np.repeat(np.diff(times) / parts, parts)
     ends = np.cumsum(parts)
-    begins = np.repeat(times[:-1], parts) + lengths * (np.arange(len(lengths)) - np.repeat(ends - parts, parts))
+    begins = np.repeat(times[:-1], parts) + lengths * (
+        np.arange(len(lengths)) - np.repeat(ends - parts, parts)
+    )
     first = force(begins)
     last = np.concatenate([first[1:], force(times[-1:])])
-    drives = np.stack([first, force(begins + 0.5 * lengths), last])                    # (3, q, p)
-    E = spring_exponential(stiffness, damping, lengths)                               # (2, 2, q)
+    drives = np.stack([first, force(begins + 0.5 * lengths), last])  # (3, q, p)
+    E = spring_exponential(stiffness, damping, lengths)  # (2, 2, q)
     rest = np.zeros(1)
-    pushes = np.stack(quadratic_drive_step(stiffness, damping, E[..., None], rest, rest, drives, lengths[:, None]),
-                      axis=1)                                                         # (q, 2, p)
+    pushes = np.stack(
+        quadratic_drive_step(
+            stiffness, damping, E[..., None], rest, rest, drives, lengths[:, None]
+        ),
+        axis=1,
+    )  # (q, 2, p)
     states = np.empty((len(times), 2, pushes.shape[2] + 2))
     state = np.hstack([np.zeros((2, pushes.shape[2])), np.eye(2)])
     states[0] = state
@@ -65,11 +76,18 @@ def transient_responses(stiffness: float, damping: float, times: Array, force: C
     return everything[..., :-2], everything[..., -2:]
 
 
-def periodic_responses(stiffness: float, damping: float, omega: float, force: Callable[[Array], Array],
-                       phases: Array, harmonics: int) -> Array:
+def periodic_responses(
+    stiffness: float,
+    damping: float,
+    omega: float,
+    force: Callable[[Array], Array],
+    phases: Array,
+    harmonics: int,
+) -> Array:
     """Steady responses to forces that are periodic functions of the phase φ = ωs.
 
-    Each Fourier coefficient is divided by k − (mω)² + i b mω, so the result is exact up to the truncation.
+    Each Fourier coefficient is divided by k − (mω)² + i b mω, so the result is exact up to the
+    truncation.
 
     Parameters
     ----------
@@ -88,9 +106,11 @@ def periodic_responses(stiffness: float, damping: float, omega: float, force: Ca
         Position, velocity and acceleration (derivatives by s).
     """
     count = 4 * harmonics
-    coefficients = np.fft.rfft(force(2.0 * np.pi * np.arange(count) / count), axis=0)[:harmonics + 1] / count
+    coefficients = (
+        np.fft.rfft(force(2.0 * np.pi * np.arange(count) / count), axis=0)[: harmonics + 1] / count
+    )
     coefficients[1:] *= 2.0
     rate = 1j * omega * np.arange(harmonics + 1)[:, None]
     coefficients = coefficients / (stiffness + damping * rate + rate**2)
-    waves = np.exp(1j * np.outer(phases, np.arange(harmonics + 1)))                   # (m, harmonics + 1)
+    waves = np.exp(1j * np.outer(phases, np.arange(harmonics + 1)))  # (m, harmonics + 1)
     return np.stack([(waves @ (coefficients * rate**order)).real for order in range(3)])

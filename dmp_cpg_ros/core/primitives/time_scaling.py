@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Temporal scaling τ(t): scaled time s with ds/dt = 1/τ(t) (paper eq. differ, left-hand side).
 
-Everything that runs on a canonical system runs in s. When τ follows a first-order filter, s(t) has a closed
-form, so a change of speed costs no accuracy and makes no velocity jump.
+Everything that runs on a canonical system runs in s. When τ follows a first-order filter, s(t) has
+a closed form, so a change of speed costs no accuracy and makes no velocity jump.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class TimeScaling:
             [s]
         """
         elapsed = np.asarray(elapsed, dtype=float)
-        change = (command - tau) / tau * -np.expm1(-self.rate * elapsed)             # τ(t)/τ(0) − 1
+        change = (command - tau) / tau * -np.expm1(-self.rate * elapsed)  # τ(t)/τ(0) − 1
         return (elapsed + np.log1p(change) / self.rate) / command
 
     def real_time(self, tau: float, command: float, scaled: ArrayLike) -> Array:
@@ -161,7 +161,10 @@ class TimeScaling:
             taus = self.tau_at(tau, command, elapsed)
         else:
             elapsed = fraction * dt
-            scaled, taus = self.scaled_time(tau, command, elapsed), self.tau_at(tau, command, elapsed)
+            scaled, taus = (
+                self.scaled_time(tau, command, elapsed),
+                self.tau_at(tau, command, elapsed),
+            )
         if form == 'scaled':
             return StepGrid(elapsed, scaled, taus, float(scaled[-1]), np.ones(count))
         return StepGrid(elapsed, scaled, taus, dt, 1.0 / taus)
@@ -170,8 +173,8 @@ class TimeScaling:
 def scaled_times(times: ArrayLike, tau: Callable[[float], float]) -> Array:
     """Scaled time along a given profile τ(t), by 5-point Gauss quadrature between the samples.
 
-    A primitive in scaled form follows the same path for every τ(t): its position at time t is the position of
-    the unscaled one at ``scaled_times(...)``, its velocity is divided by τ(t).
+    A primitive in scaled form follows the same path for every τ(t): its position at time t is the
+    position of the unscaled one at ``scaled_times(...)``, its velocity is divided by τ(t).
 
     Parameters
     ----------
@@ -183,7 +186,8 @@ def scaled_times(times: ArrayLike, tau: Callable[[float], float]) -> Array:
     Returns
     -------
     ndarray (m,)
-        s at the sample times, 0 at the first [s]; the error falls with the 10th power of the spacing.
+        s at the sample times, 0 at the first [s]; the error falls with the 10th power of the
+        spacing.
 
     Raises
     ------
@@ -195,7 +199,7 @@ def scaled_times(times: ArrayLike, tau: Callable[[float], float]) -> Array:
     if times.ndim != 1 or not np.all(steps > 0.0):
         raise ParameterError('times must be one increasing sequence')
     middles = 0.5 * (times[1:] + times[:-1])
-    nodes = middles[:, None] + 0.5 * steps[:, None] * _GAUSS_NODES                    # (m - 1, 5)
+    nodes = middles[:, None] + 0.5 * steps[:, None] * _GAUSS_NODES  # (m - 1, 5)
     values = np.array([tau(float(t)) for t in nodes.ravel()], dtype=float).reshape(nodes.shape)
     if not np.all(np.isfinite(values)) or not np.all(values > 0.0):
         raise ParameterError('tau(t) must be positive and finite at all times')

@@ -1,16 +1,18 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The transformation system: a spring-damper towards the goal, driven by the forcing function (eq. p2p_trans).
+"""The transformation system: a spring-damper that the forcing function drives (eq. p2p_trans).
 
 Two readings of the paper's τ are kept apart by ``form``:
 
-``'scaled'`` (the default): the state is (y, z), τẏ = z, τż = k(g − y) − b z + f. This is the paper's own rule of
-scaling in time (eq. differ) applied to the first-order form, and eq. 2.1 of Ijspeert et al. (2013). In second
-order it reads τ²ÿ = k(g − y) − bτẏ + f for constant τ: the path stays the same, only the speed changes.
+``'scaled'`` (the default): the state is (y, z), τẏ = z, τż = k(g − y) − b z + f. This is the
+paper's own rule of scaling in time (eq. differ) applied to the first-order form, and eq. 2.1 of
+Ijspeert et al. (2013). In second order it reads τ²ÿ = k(g − y) − bτẏ + f for constant τ: the path
+stays the same, only the speed changes.
 
-``'printed'``: τÿ = k(g − y) − bẏ + f, word for word. For constant τ that is the scaled form with stiffness τk and
-force τf, so τ acts as an inertia: the natural frequency is √(k/τ), the damping ratio b/(2√(kτ)) moves with τ, and
-a movement replayed at τ ≠ 1 takes another path. At τ = 1 the two forms are one.
+``'printed'``: τÿ = k(g − y) − bẏ + f, word for word. For constant τ that is the scaled form with
+stiffness τk and force τf, so τ acts as an inertia: the natural frequency is √(k/τ), the damping
+ratio b/(2√(kτ)) moves with τ, and a movement replayed at τ ≠ 1 takes another path. At τ = 1 the
+two forms are one.
 """
 
 from __future__ import annotations
@@ -21,6 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.primitives.demonstration import columns
+from dmp_cpg_ros.core.primitives.spring_solution import quadratic_drive_step, spring_exponential
 from dmp_cpg_ros.core.primitives.time_scaling import Form, StepGrid
 
 Array = NDArray[np.float64]
@@ -56,15 +60,63 @@ class SpringDamper:
         for name in ('stiffness', 'damping'):
             values = np.atleast_1d(np.array(getattr(self, name), dtype=float))
             if values.ndim != 1 or not np.all(np.isfinite(values)) or not np.all(values > 0.0):
-                raise ParameterError(f'{name} must be positive finite numbers, not {values.tolist()}')
+                raise ParameterError(
+                    f'{name} must be positive finite numbers, not {values.tolist()}'
+                )
             object.__setattr__(self, name, values)
         if self.stiffness.shape != self.damping.shape:
-            raise ParameterError(f'{len(self.stiffness)} stiffnesses do not match {len(self.damping)} dampings')
+            raise ParameterError(
+                f'{len(self.stiffness)} stiffnesses do not match {len(self.damping)} dampings'
+            )
         if self.form not in FORMS:
-            raise ParameterError(f"form must be one of {', '.join(FORMS)}, not {self.form!r}")
+            raise ParameterError(f'form must be one of {", ".join(FORMS)}, not {self.form!r}')
 
-    def acceleration(self, position: Array, velocity: Array, goal: Array, force: Array,
-                     tau: ArrayLike = 1.0, tau_rate: ArrayLike = 0.0) -> Array:
+    def spread(self, dofs: int) -> SpringDamper:
+        """The same with one entry per degree of freedom; one number serves for all.
+
+        Parameters
+        ----------
+        dofs : int
+            Number of degrees of freedom.
+
+        Returns
+        -------
+        SpringDamper
+
+        Raises
+        ------
+        ParameterError
+            If there is neither one entry nor one per degree of freedom.
+        """
+        return SpringDamper(
+            columns(self.stiffness, dofs, 'stiffness'),
+            columns(self.damping, dofs, 'damping'),
+            self.form,
+        )
+
+    def groups(self) -> list[tuple[float, float, NDArray[np.int_]]]:
+        """Degrees of freedom that share their gains.
+
+        Returns
+        -------
+        list of (float, float, ndarray of int)
+            k, b and the indices of the degrees of freedom.
+        """
+        pairs = np.stack([self.stiffness, self.damping], axis=1)
+        return [
+            (float(k), float(b), np.flatnonzero(np.all(pairs == (k, b), axis=1)))
+            for k, b in np.unique(pairs, axis=0)
+        ]
+
+    def acceleration(
+        self,
+        position: Array,
+        velocity: Array,
+        goal: Array,
+        force: Array,
+        tau: ArrayLike = 1.0,
+        tau_rate: ArrayLike = 0.0,
+    ) -> Array:
         """Acceleration ÿ of the continuous system.
 
         Parameters
@@ -78,15 +130,24 @@ class SpringDamper:
         -------
         ndarray (..., n)
         """
-        tau, tau_rate = np.asarray(tau, dtype=float)[..., None], np.asarray(tau_rate, dtype=float)[..., None]
+        tau, tau_rate = (
+            np.asarray(tau, dtype=float)[..., None],
+            np.asarray(tau_rate, dtype=float)[..., None],
+        )
         spring = self.stiffness * (goal - position) + force
         if self.form == 'printed':
             return (spring - self.damping * velocity) / tau
         return spring / tau**2 - (self.damping + tau_rate) * velocity / tau
 
-    def required_force(self, position: Array, velocity: Array, acceleration: Array, goal: Array,
-                       tau: ArrayLike = 1.0) -> Array:
-        """Force f that makes the system follow a movement at constant τ, the target of the regression.
+    def required_force(
+        self,
+        position: Array,
+        velocity: Array,
+        acceleration: Array,
+        goal: Array,
+        tau: ArrayLike = 1.0,
+    ) -> Array:
+        """Force f that makes the system follow a movement at constant τ.
 
         Parameters
         ----------
@@ -105,13 +166,15 @@ class SpringDamper:
             return tau * acceleration + self.damping * velocity - spring
         return tau**2 * acceleration + tau * self.damping * velocity - spring
 
-    def step(self, position: Array, velocity: Array, goals: Array, forces: Array,
-             grid: StepGrid) -> tuple[Array, Array]:
+    def step(
+        self, position: Array, velocity: Array, goals: Array, forces: Array, grid: StepGrid
+    ) -> tuple[Array, Array]:
         """Advance by one step; fourth order in both forms.
 
-        The scaled form is solved exactly for the quadratic through the drive k g + f at the nodes, so it has no
-        stability limit and keeps an equilibrium exactly. The printed form has no constant matrix when τ varies;
-        it takes one Runge-Kutta step, stable for √(k/τ) dt and (b/τ) dt up to about 2.7.
+        The scaled form is solved exactly for the quadratic through the drive k g + f at the nodes,
+        so it has no stability limit and keeps an equilibrium exactly. The printed form has no
+        constant matrix when τ varies; it takes one Runge-Kutta step, stable for √(k/τ) dt and
+        (b/τ) dt up to about 2.7.
 
         Parameters
         ----------
@@ -133,8 +196,10 @@ class SpringDamper:
         y, z = self.advance_scaled(position, grid.tau[0] * velocity, drives, grid.length)
         return y, z / grid.tau[-1]
 
-    def advance_scaled(self, y: Array, z: Array, drives: Array, length: float) -> tuple[Array, Array]:
-        """Solve y' = z, z' = u(s) − k y − b z for the quadratic u through three evenly spaced values.
+    def advance_scaled(
+        self, y: Array, z: Array, drives: Array, length: float
+    ) -> tuple[Array, Array]:
+        """Solve y' = z, z' = u(s) − k y − b z for the quadratic u through three even nodes.
 
         Parameters
         ----------
@@ -153,7 +218,7 @@ class SpringDamper:
         return quadratic_drive_step(k, b, self.propagator(length), y, z, drives, length)
 
     def propagator(self, length: float) -> Array:
-        """exp(A s) of A = [[0, 1], [−k, −b]], in closed form for every damping ratio.
+        """Exponential exp(A s) of A = [[0, 1], [−k, −b]], in closed form for every damping ratio.
 
         Parameters
         ----------
@@ -168,10 +233,14 @@ class SpringDamper:
         if E is None:
             if len(self._propagators) > 256:
                 self._propagators.clear()
-            E = self._propagators[length] = spring_exponential(self.stiffness, self.damping, length)
+            E = self._propagators[length] = spring_exponential(
+                self.stiffness, self.damping, length
+            )
         return E
 
-    def _runge_kutta(self, y: Array, v: Array, drives: Array, grid: StepGrid) -> tuple[Array, Array]:
+    def _runge_kutta(
+        self, y: Array, v: Array, drives: Array, grid: StepGrid
+    ) -> tuple[Array, Array]:
         """One step of the classical fourth-order method on the printed form."""
         k, b, h = self.stiffness, self.damping, grid.length
         first, middle, last = drives
@@ -183,13 +252,16 @@ class SpringDamper:
         a_3 = (middle - k * (y + 0.5 * h * v_2) - b * v_3) / tau_m
         v_4 = v + h * a_3
         a_4 = (last - k * (y + h * v_3) - b * v_4) / tau_1
-        return y + h / 6.0 * (v + 2.0 * v_2 + 2.0 * v_3 + v_4), v + h / 6.0 * (a_1 + 2.0 * a_2 + 2.0 * a_3 + a_4)
+        return y + h / 6.0 * (v + 2.0 * v_2 + 2.0 * v_3 + v_4), v + h / 6.0 * (
+            a_1 + 2.0 * a_2 + 2.0 * a_3 + a_4
+        )
 
 
 def default_gains(duration: float) -> tuple[float, float]:
     """Critically damped gains that settle within a movement of the given duration.
 
-    b = 25/T, k = b²/4: the constants of Ijspeert et al. (2013) for a movement of T seconds at τ = 1.
+    b = 25/T, k = b²/4: the constants of Ijspeert et al. (2013) for a movement of T seconds at τ =
+    1.
 
     Parameters
     ----------
@@ -203,58 +275,3 @@ def default_gains(duration: float) -> tuple[float, float]:
     """
     damping = 25.0 / duration
     return 0.25 * damping**2, damping
-
-
-def quadratic_drive_step(k: ArrayLike, b: ArrayLike, propagator: Array, y: Array, z: Array, drives: Array,
-                         length: ArrayLike) -> tuple[Array, Array]:
-    """Exact solution of y' = z, z' = u(s) − k y − b z for a quadratic u; all arguments broadcast.
-
-    Parameters
-    ----------
-    k, b : array_like (...)
-        Stiffness and damping.
-    propagator : ndarray (2, 2, ...)
-        :func:`spring_exponential` of the same k, b and length.
-    y, z : ndarray (...)
-        State at s = 0.
-    drives : ndarray (3, ...)
-        u at 0, length/2 and length.
-    length : array_like (...)
-        Length of the step [s].
-
-    Returns
-    -------
-    y, z : ndarray (...)
-    """
-    first, middle, last = drives
-    u2 = 2.0 * (first - 2.0 * middle + last) / length**2
-    u1 = (4.0 * middle - 3.0 * first - last) / length
-    a2 = u2 / k                                         # particular solution a0 + a1 s + a2 s²
-    a1 = (u1 - 2.0 * b * a2) / k
-    a0 = (first - b * a1 - 2.0 * a2) / k
-    y, z = y - a0, z - a1
-    return (propagator[0, 0] * y + propagator[0, 1] * z + a0 + length * (a1 + length * a2),
-            propagator[1, 0] * y + propagator[1, 1] * z + a1 + 2.0 * length * a2)
-
-
-def spring_exponential(k: ArrayLike, b: ArrayLike, length: ArrayLike) -> Array:
-    """exp of [[0, 1], [−k, −b]] times s, as e^{−μs}(C I + S (A + μ I)) with μ = b/2; arguments broadcast.
-
-    Parameters
-    ----------
-    k, b, length : array_like (...)
-        Stiffness, damping and s.
-
-    Returns
-    -------
-    ndarray (2, 2, ...)
-    """
-    k, length = np.asarray(k, dtype=float), np.asarray(length, dtype=float)
-    mu = 0.5 * np.asarray(b, dtype=float)
-    root = np.sqrt((mu * mu - k).astype(complex)) * length                            # imaginary: oscillating
-    grow, fall = np.exp(root - mu * length), np.exp(-root - mu * length)
-    C = (0.5 * (grow + fall)).real
-    small = np.abs(root) < 1e-3
-    series = np.exp(-mu * length) * (1.0 + (root * root).real / 6.0)
-    S = length * np.where(small, series, (0.5 * (grow - fall) / np.where(small, 1.0, root)).real)
-    return np.array([[C + mu * S, S], [-k * S, C - mu * S]])

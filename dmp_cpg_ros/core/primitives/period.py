@@ -1,0 +1,194 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Period of a recorded rhythm, and the phase by which one recording leads another."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+
+Array = NDArray[np.float64]
+
+_HARMONICS = 8
+_COARSE_SAMPLES = 600
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+
+
+def find_period(
+    demonstration: Demonstration, shortest: float | None = None, longest: float | None = None
+) -> float:
+    """Period that explains all degrees of freedom best.
+
+    Peaks of the summed power spectrum and their subharmonics are candidates. Each is refined by
+    the least-squares fit of a Fourier series, which needs neither a whole number of cycles nor
+    even sampling. Of the periods that fit about as well as the best, the shortest is taken:
+    multiples of a period fit as well as it does.
+
+    Parameters
+    ----------
+    demonstration : Demonstration
+        At least about one and a half cycles.
+    shortest, longest : float, optional
+        Limits of the period [s]; four samples and two thirds of the recording without.
+
+    Returns
+    -------
+    float
+        [s]
+
+    Raises
+    ------
+    DataError
+        If nothing moves, the limits leave nothing, or no period explains half of the variance.
+    """
+    times, values = demonstration.times - demonstration.times[0], demonstration.positions
+    spread = values.std(axis=0)
+    moving = spread > 1e-9 * max(float(spread.max()), np.finfo(float).tiny)
+    if not np.any(moving) or not float(spread.max()) > 1e-12 * (1.0 + float(np.abs(values).max())):
+        raise DataError('the demonstration has no period: nothing moves')
+    values = (values[:, moving] - values[:, moving].mean(axis=0)) / spread[moving]
+    span = float(times[-1])
+    low = 1.0 / (longest or span / 1.5)
+    high = 1.0 / (shortest or 4.0 * span / (len(times) - 1))
+    if not 0.0 < low < high:
+        raise DataError(
+            f'periods from {1.0 / high:g} s to {1.0 / low:g} s: there is none to look for'
+        )
+    thin = slice(None, None, max(1, len(times) // _COARSE_SAMPLES))
+    coarse = {
+        f: _best_nearby(times[thin], values[thin], f, 0.6 / span, low, high)
+        for f in _candidates(times, values, low, high)
+    }
+    if not coarse:
+        raise DataError(
+            f'no period between {1.0 / high:g} s and {1.0 / low:g} s shows in the demonstration'
+        )
+    least = min(error for _, error in coarse.values())
+    refined = [
+        _refined(times, values, f, 0.06 / span)
+        for f, error in coarse.values()
+        if error < 3.0 * least + 0.01
+    ]
+    least = min(error for _, error in refined)
+    if least > 0.5:
+        raise DataError(
+            f'no period between {1.0 / high:g} s and {1.0 / low:g} s explains half of the '
+            f'variance; the best leaves {100.0 * least:.0f} % unexplained; give the period'
+        )
+    return float(1.0 / max(f for f, error in refined if error <= 1.1 * least + 1e-6))
+
+
+def fourier_series(times: ArrayLike, values: ArrayLike, omega: float, harmonics: int) -> Array:
+    """Least-squares Fourier coefficients: values(t) ≈ Re Σ_m c_m e^{i m ω t}.
+
+    Parameters
+    ----------
+    times : array_like (m,)
+        [s]
+    values : array_like (m, n)
+    omega : float
+        [rad/s]
+    harmonics : int
+        Highest harmonic; reduced when there are too few samples for it.
+
+    Returns
+    -------
+    ndarray (harmonics + 1, n) of complex
+        c_0 is the mean of the cycle.
+    """
+    times, values = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
+    used = max(1, min(harmonics, (len(times) - 1) // 3))
+    design = _design(times, omega / (2.0 * np.pi), used)
+    solved = np.linalg.lstsq(design, values, rcond=1e-10)[0]
+    coefficients = np.zeros((harmonics + 1, values.shape[1]), complex)
+    coefficients[0] = solved[0]
+    coefficients[1 : used + 1] = solved[1 : used + 1] - 1j * solved[used + 1 :]
+    return coefficients
+
+
+def phase_lead(reference: Array, other: Array) -> float:
+    """Phase by which one cycle leads another, from the maximum of their correlation.
+
+    Parameters
+    ----------
+    reference, other : ndarray (harmonics + 1, n) of complex
+        Fourier coefficients of the two cycles.
+
+    Returns
+    -------
+    float
+        δ in [−π, π) with other(φ) ≈ reference(φ + δ) [rad].
+    """
+    product = np.sum(np.conj(reference[1:]) * other[1:], axis=1)
+    orders = np.arange(1, len(product) + 1)
+    grid = np.linspace(-np.pi, np.pi, 32 * len(product) + 32, endpoint=False)
+    delta = grid[np.argmax((np.exp(-1j * np.outer(grid, orders)) @ product).real)]
+    for _ in range(20):  # Newton on the correlation
+        wave = np.exp(-1j * delta * orders) * product
+        slope, curvature = np.sum(orders * wave.imag), -np.sum(orders**2 * wave.real)
+        if not curvature < 0.0:
+            break
+        delta -= slope / curvature
+    return float((delta + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def _candidates(times: Array, values: Array, low: float, high: float) -> list[float]:
+    """Frequencies of spectral peaks, their fractions and multiples, within the limits [1/s]."""
+    even = np.linspace(0.0, times[-1], len(times))
+    resampled = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
+    window = np.hanning(len(even) + 2)[1:-1, None]
+    size = 8 * len(even)
+    power = np.sum(np.abs(np.fft.rfft(window * resampled, size, axis=0)) ** 2, axis=1)
+    frequency = np.arange(len(power)) * (len(even) - 1) / (size * times[-1])
+    peaks = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
+    peaks = peaks[power[peaks] > 1e-4 * power.max()]
+    strongest = peaks[np.argsort(power[peaks])[::-1][:5]]
+    found: list[float] = [low] if low * times[-1] > 0.9 else []
+    for f in (float(frequency[p] / m) for m in range(1, 5) for p in strongest):
+        if low <= f <= high and all(abs(f - other) > 0.05 / times[-1] for other in found):
+            found.append(f)
+    return found
+
+
+def _design(times: Array, frequency: float, harmonics: int) -> Array:
+    angles = 2.0 * np.pi * frequency * np.outer(times, np.arange(1, harmonics + 1))
+    return np.hstack([np.ones((len(times), 1)), np.cos(angles), np.sin(angles)])
+
+
+def _unexplained(times: Array, values: Array, frequency: float) -> float:
+    """Share of the variance that a Fourier series of this frequency leaves."""
+    nyquist = 0.45 * (len(times) - 1) / times[-1]
+    harmonics = int(max(1, min(_HARMONICS, nyquist // frequency, (len(times) - 1) // 4)))
+    q = np.linalg.qr(_design(times, frequency, harmonics))[0]
+    rest = values - q @ (q.T @ values)
+    return float(np.sum(rest**2) / np.sum(values**2))
+
+
+def _best_nearby(
+    times: Array, values: Array, frequency: float, reach: float, low: float, high: float
+) -> tuple[float, float]:
+    grid = np.linspace(max(low, frequency - reach), min(high, frequency + reach), 21)
+    errors = [_unexplained(times, values, float(f)) for f in grid]
+    best = int(np.argmin(errors))
+    return float(grid[best]), errors[best]
+
+
+def _refined(times: Array, values: Array, frequency: float, reach: float) -> tuple[float, float]:
+    """Golden-section search for the frequency of the best fit within the reach on both sides."""
+    left, right = frequency - reach, frequency + reach
+    inner = [right - _GOLDEN * (right - left), left + _GOLDEN * (right - left)]
+    errors = [_unexplained(times, values, f) for f in inner]
+    while right - left > 1e-9 * frequency:
+        if errors[0] < errors[1]:
+            right, inner[1], errors[1] = inner[1], inner[0], errors[0]
+            inner[0] = right - _GOLDEN * (right - left)
+            errors[0] = _unexplained(times, values, inner[0])
+        else:
+            left, inner[0], errors[0] = inner[0], inner[1], errors[1]
+            inner[1] = left + _GOLDEN * (right - left)
+            errors[1] = _unexplained(times, values, inner[1])
+    best = int(np.argmin(errors))
+    return inner[best], errors[best]
