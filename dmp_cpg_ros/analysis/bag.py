@@ -83,8 +83,7 @@ def _rescued(folder: Path, damage: DataError) -> Path:
         from dmp_cpg_ros.analysis.rescue import rescue
     except ImportError as error:
         raise DataError(f"{damage}; rescuing it needs the package '{error.name}'") from error
-    rescued = rescue(folder)
-    return Path(rescued) if rescued is not None else folder
+    return rescue(folder)
 
 
 def _storage_files(folder: Path) -> list[Path]:

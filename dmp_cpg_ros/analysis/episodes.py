@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 from dmp_cpg_ros.core.phase import phase
 
@@ -119,10 +120,9 @@ def steady_segments(recording: Recording) -> list[tuple[float, float]]:
     running = np.zeros(len(time), dtype=bool)
     for start, end in running_intervals(recording):
         running |= (time >= start) & (time < end)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], (steady & running).astype(int), [0]])))
     segments = []
-    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
-        start, end = float(time[first]) + SETTLING, float(time[last])
+    for first, past in stretches(steady & running):
+        start, end = float(time[first]) + SETTLING, float(time[past - 1])
         if recording.canonical.time.size and end > start:
             cycles = cycle_starts(recording, start, end)
             start, end = (float(cycles[0]), float(cycles[-1])) if cycles.size else (start, start)

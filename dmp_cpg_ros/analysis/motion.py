@@ -94,3 +94,9 @@ def common_rows(*times: Array) -> list[NDArray[np.int64]]:
     for time in times[1:]:
         common = np.intersect1d(common, time)
     return [np.searchsorted(time, common) for time in times]
+
+
+def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Stretches in which a mask (n,) holds: their first rows and the rows past their last."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return [(int(first), int(past)) for first, past in zip(edges[::2], edges[1::2], strict=True)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import RUNNING, episodes, gait_period, steady_segments
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.motion import held
+from dmp_cpg_ros.analysis.motion import held, stretches
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.leg_primitive import body_scale
 from dmp_cpg_ros.core.phase import phase
@@ -105,8 +105,7 @@ def _diagram(
 
 def bars(time: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[tuple[float, float]]:
     """Start and length of each stretch in which a mask holds [s]."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     return [
-        (float(time[first]), float(time[min(last, len(time) - 1)] - time[first]))
-        for first, last in zip(edges[::2], edges[1::2], strict=True)
+        (float(time[first]), float(time[min(past, len(time) - 1)] - time[first]))
+        for first, past in stretches(mask)
     ]

@@ -13,7 +13,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import STOPPING, episodes
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.foot_motion import feet_in_base
-from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations
+from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations, stretches
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_state import LEGS
 
@@ -21,6 +21,9 @@ CAPTION = (
     'Path of the base from above. Small dots are footholds, one for each stance; squares mark '
     'where the robot stood still, arrows its heading every two seconds.'
 )
+
+FEWEST_SAMPLES = 5
+"""Shorter contacts are no footholds."""
 
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
@@ -122,11 +125,10 @@ def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
         q = recording.joints.position[rows[0], 3 * index : 3 * index + 3]
         feet = base + np.einsum('nij,nj->ni', R, feet_in_base(leg, q))
         loaded = recording.feet.force[rows[2], index] > context.contact_force
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], loaded.astype(int), [0]])))
         places = [
-            feet[first:last, :2].mean(axis=0)
-            for first, last in zip(edges[::2], edges[1::2], strict=True)
-            if last - first > 5
+            feet[first:past, :2].mean(axis=0)
+            for first, past in stretches(loaded)
+            if past - first > FEWEST_SAMPLES
         ]
         if places:
             axes.plot(

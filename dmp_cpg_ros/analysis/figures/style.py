@@ -38,7 +38,7 @@ LEG_NAMES = dict(zip(LEGS, ('front left', 'front right', 'rear left', 'rear righ
 INK, GREY, MEASURED, REFERENCE = '#222222', '#8A8A8A', '#0072B2', '#222222'
 WAITING, INHIBITED = '#F6E8B1', '#D9DEE4'
 
-_PARAMETERS: dict[str, Any] = {
+_PARAMETERS: Any = {
     'font.family': 'sans-serif',
     'font.size': 8.5,
     'axes.labelsize': 8.5,
@@ -78,8 +78,7 @@ def applied() -> Iterator[None]:
     """Make and save figures in this context, whatever matplotlibrc the user has."""
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
-        for name, value in _PARAMETERS.items():
-            matplotlib.rcParams[name] = value
+        matplotlib.rcParams.update(_PARAMETERS)
         yield
 
 
@@ -104,7 +103,7 @@ def new_figure(
 def legend(figure: Figure, handles: Sequence[Any]) -> None:
     """Put a legend in one row above the panels."""
     height = LEGEND_HEIGHT / figure.get_figheight()
-    figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 1.0 - height))
+    figure.set_layout_engine('constrained', rect=(0.0, 0.0, 1.0, 1.0 - height))
     figure.legend(
         handles=list(handles),
         loc='upper center',

@@ -1,0 +1,142 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of the robot at telling moments of a run.
+
+Who draws is handed in: this layer knows poses, the robot's layer knows how the robot looks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib import image
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.episodes import MOVING, STOPPING, episodes, steady_segments
+from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
+from dmp_cpg_ros.analysis.recording import Recording
+
+Array = NDArray[np.float64]
+
+Draw = Callable[[Array, Array, Array], Sequence[NDArray[np.uint8]]]
+"""From base positions (n, 3), quaternions (n, 4), joint positions (n, 12) to pictures, or none."""
+
+FEWEST_SAMPLES = 3
+"""Shorter losses of contact are no swings."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A time that is worth a picture.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, without ending.
+    caption : str
+        What it shows.
+    time : float
+        [s]
+    """
+
+    name: str
+    caption: str
+    time: float
+
+
+def moments(recording: Recording, context: RunContext) -> list[Moment]:
+    """Walking straight on with a foot in the air, at rest, turning; those that happened."""
+    found = []
+    segments = steady_segments(recording)
+    for start, end in segments:
+        if abs(_reference(recording, start)[2]) < MOVING:
+            time = _foot_in_the_air(recording, context, start, end)
+            v = _reference(recording, start)[0]
+            found.append(Moment('walking', f'Walking at {v:.2f} m/s (t = {time:.2f} s)', time))
+            break
+    for episode in episodes(recording, STOPPING):
+        if episode.events[0].message != 'at_rest' and episode.events[-1].message == 'at_rest':
+            time = 0.5 * (episode.events[-1].time + episode.end)
+            found.append(Moment('at_rest', f'At rest under inhibition (t = {time:.2f} s)', time))
+            break
+    rates = [_reference(recording, start)[2] for start, _ in segments]
+    fastest = int(np.argmax(np.abs(rates))) if rates else 0
+    if rates and abs(rates[fastest]) >= MOVING:
+        time = _foot_in_the_air(recording, context, *segments[fastest])
+        gamma = rates[fastest]
+        found.append(Moment('turning', f'Turning at {gamma:.2f} rad/s (t = {time:.2f} s)', time))
+    return found
+
+
+def write_pictures(
+    recording: Recording, context: RunContext, folder: Path, draw: Draw
+) -> dict[str, tuple[Path, str]]:
+    """Draw the moments of a run and write ``NAME.png``.
+
+    Parameters
+    ----------
+    recording : Recording
+        Needs joints and odometry.
+    context : RunContext
+        What is known besides.
+    folder : Path
+        Made when missing.
+    draw : callable
+        Draws poses; an empty answer means that nothing can be drawn here.
+
+    Returns
+    -------
+    dict of str to (Path, str)
+        File and caption by name; empty without pictures.
+    """
+    if not (recording.joints.time.size and recording.odometry.time.size):
+        return {}
+    chosen = moments(recording, context)
+    poses = [_pose(recording, moment.time) for moment in chosen]
+    if not poses:
+        return {}
+    pictures = draw(*(np.array(part) for part in zip(*poses, strict=True)))
+    folder.mkdir(parents=True, exist_ok=True)
+    written = {}
+    for moment, picture in zip(chosen, pictures, strict=False):
+        path = folder / f'{moment.name}.png'
+        image.imsave(path, picture)
+        written[moment.name] = (path, moment.caption)
+    return written
+
+
+def _reference(recording: Recording, time: float) -> Array:
+    return held(recording.reference.time, recording.reference.value, np.array([time]))[0]
+
+
+def _pose(recording: Recording, time: float) -> tuple[Array, Array, Array]:
+    """Pose at a time, turned to face along x so that every picture is taken from the same side."""
+    odometry, joints = recording.odometry, recording.joints
+    row = min(int(np.searchsorted(odometry.time, time)), len(odometry.time) - 1)
+    quaternion = odometry.quaternion[row : row + 1]
+    yaw = float(roll_pitch_yaw(quaternion)[0, 2])
+    x, y, z, w = quaternion[0]
+    s, c = np.sin(-0.5 * yaw), np.cos(-0.5 * yaw)
+    turned = np.array([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
+    position = odometry.position_in_world[row] * np.array([0.0, 0.0, 1.0])
+    return position, turned, held(joints.time, joints.position, np.array([time]))[0]
+
+
+def _foot_in_the_air(recording: Recording, context: RunContext, start: float, end: float) -> float:
+    """Middle of a swing of the front left foot near the middle of an interval [s]."""
+    middle = 0.5 * (start + end)
+    feet = recording.feet
+    if not feet.time.size:
+        return middle
+    inside = (feet.time >= start) & (feet.time <= end)
+    swings = stretches(inside & (feet.force[:, 0] <= context.contact_force))
+    middles = [
+        float(feet.time[(first + past) // 2])
+        for first, past in swings
+        if past - first > FEWEST_SAMPLES
+    ]
+    return min(middles, key=lambda time: abs(time - middle), default=middle)

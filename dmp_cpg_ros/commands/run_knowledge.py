@@ -1,0 +1,114 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the parameters of a run tell about it: the robot, the gait, the inhibition.
+
+The analysis itself knows neither MuJoCo nor configuration files; here both are read for it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis.context import RunContext, find_parameter
+from dmp_cpg_ros.analysis.pictures import Draw
+from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.gait import Gait
+from dmp_cpg_ros.core.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.suite import load_gait
+
+Array = NDArray[np.float64]
+
+_log = logging.getLogger(__name__)
+
+
+def run_context(
+    parameters: Mapping[str, Any] | None, robot_file: Path | str | None = None
+) -> tuple[RunContext, Path | None]:
+    """Find out what walked.
+
+    Parameters
+    ----------
+    parameters : mapping or None
+        Parameters of the nodes, nested as they like.
+    robot_file : path-like, optional
+        Overrides the robot that the parameters name.
+
+    Returns
+    -------
+    context : RunContext
+        Without robot or gait where the parameters name a file that is not here; a warning says so.
+    robot_path : Path or None
+        The robot's file, None for the package's own.
+
+    Raises
+    ------
+    MissingFileError, ParameterError
+        If ``robot_file`` cannot be used.
+    """
+    robot, path = _robot(robot_file, find_parameter(parameters, 'robot'))
+    radius = float(find_parameter(parameters, 'radius', 1.0))
+    return RunContext(robot, _gait(parameters), _inhibition(parameters), radius), path
+
+
+def picture_taker(robot_path: Path | None) -> Draw:
+    """Return a function that draws poses of a robot, or says why it cannot and draws nothing."""
+
+    def draw(positions: Array, quaternions: Array, joints: Array) -> Sequence[Any]:
+        try:
+            from dmp_cpg_ros.robot.camera import pose_pictures
+
+            return pose_pictures(robot_path, positions, quaternions, joints)
+        except (DmpCpgError, ImportError, AttributeError, OSError, RuntimeError) as error:
+            _log.warning('no pictures: %s', error)
+            return []
+
+    return draw
+
+
+def _robot(
+    robot_file: Path | str | None, named: str | None
+) -> tuple[RobotDescription | None, Path | None]:
+    """Read the robot that walked; one that only a parameter names may be missing here."""
+    try:
+        from dmp_cpg_ros.robot.model_reader import load_description
+
+        name = robot_file or named
+        path = None if name is None else find_config(name)
+        return load_description(path), path
+    except (DmpCpgError, ImportError) as error:
+        if robot_file is not None:
+            raise
+        _log.warning("what needs the robot's geometry is left out: %s", error)
+        return None, None
+
+
+def _gait(parameters: Mapping[str, Any] | None) -> Gait | None:
+    name = find_parameter(parameters, 'gait')
+    if name is None:
+        return None
+    try:
+        return load_gait(name, find_parameter(parameters, 'gaits_file', 'gaits.yaml'))
+    except DmpCpgError as error:
+        _log.warning('phase offsets are taken from the recording: %s', error)
+        return None
+
+
+def _inhibition(parameters: Mapping[str, Any] | None) -> InhibitionParameters:
+    names = [field.name for field in dataclasses.fields(InhibitionParameters)]
+    values = {name: find_parameter(parameters, name) for name in names}
+    try:
+        return InhibitionParameters.from_mapping(
+            {name: value for name, value in values.items() if value is not None}
+        )
+    except DmpCpgError as error:
+        _log.warning('the region C is drawn with default parameters: %s', error)
+        return InhibitionParameters()
