@@ -33,6 +33,7 @@ EXECUTABLES = {
     'certify': 'dmp_cpg_ros.commands.certify:main',
     'analyze': 'dmp_cpg_ros.commands.analyze:main',
     'learn': 'dmp_cpg_ros.commands.learn:main',
+    'study_stops': 'dmp_cpg_ros.commands.study_stops:main',
 }
 
 WRAPPER = """\
@@ -116,7 +117,6 @@ setup(
         'mcap>=1.1',
         'PyYAML>=6.0',
         'matplotlib>=3.6',
-        'pillow>=9.1',
     ],
     extras_require={
         'test': ['pytest>=7', 'hypothesis>=6.90', 'ruff>=0.9', 'mypy>=1.9', 'types-PyYAML'],

@@ -16,7 +16,7 @@ MESSAGES = {'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'lifecycle
             'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs'}
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', *MESSAGES}
 RECORDS = {'rosbags', 'mcap'}
-FIGURES = {'matplotlib', 'PIL'}
+FIGURES = {'matplotlib'}
 EVERYTHING = {'numpy', 'yaml', 'mujoco', *ROS, *RECORDS, *FIGURES}
 
 # layer: (own layers below it, packages of others); the standard library is everyone's.
@@ -24,10 +24,12 @@ LAYERS = {
     'core': (set(), {'numpy'}),
     'configuration': ({'core'}, {'yaml'}),
     'suite': ({'core', 'configuration'}, set()),
-    'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml', 'PIL'}),
+    'primitive_files': ({'core', 'configuration'}, {'numpy', 'yaml'}),
+    'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml'}),
     'nodes': ({'core', 'configuration', 'suite', 'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
     'analysis': ({'core', 'configuration', 'suite'}, {'numpy', *RECORDS, *FIGURES}),
-    'commands': ({'core', 'configuration', 'suite', 'robot', 'nodes', 'analysis'}, EVERYTHING),
+    'commands': ({'core', 'configuration', 'suite', 'primitive_files', 'robot', 'nodes',
+                  'analysis'}, EVERYTHING),
     'models': (set(), set()),
     '': (set(), set()),  # the package itself: its version
 }
@@ -75,7 +77,7 @@ def test_no_import_runs_in_a_circle() -> None:
 
 @pytest.mark.parametrize(('layers', 'unwanted'), [
     (['core'], EVERYTHING - {'numpy'}),
-    (['configuration', 'models', 'analysis'], ROS | {'mujoco'}),
+    (['configuration', 'suite', 'primitive_files', 'models', 'analysis'], ROS | {'mujoco'}),
     (['robot'], ROS | RECORDS),
 ])
 def test_importing_a_layer_loads_nothing_that_it_must_do_without(

@@ -28,7 +28,6 @@ DEPENDENCIES = {
     'mcap': ('mcap-ros2-support', 'mcap'),
     'PyYAML': ('python3-yaml', 'yaml'),
     'matplotlib': ('python3-matplotlib', 'matplotlib'),
-    'pillow': ('python3-pil', 'PIL'),
 }
 TEST_DEPENDENCIES = {
     'pytest': 'python3-pytest',
