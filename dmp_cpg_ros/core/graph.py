@@ -9,7 +9,7 @@ An edge (i, j) means that oscillator i feels K_ij (R(φ_ij) x_j − x_i), with �
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,9 +59,7 @@ class CouplingGraph:
                 f'phases ({self.size},), not {self.gains.shape} and {self.phases.shape}')
         if not (np.all(np.isfinite(self.gains)) and np.all(np.isfinite(self.phases))):
             raise ParameterError('coupling gains and phase offsets must be finite')
-        for i, j in self.edges:
-            if not (0 <= i < self.size and 0 <= j < self.size and i != j):
-                raise ParameterError(f'edge ({i}, {j}) is not between two of the nodes 0 to {self.size - 1}')
+        _check_edges(self.edges, self.size)
         symmetric = 0.5 * (self.gains + np.swapaxes(self.gains, 1, 2))
         for edge, smallest in zip(self.edges, np.linalg.eigvalsh(symmetric)[:, 0], strict=True):
             if smallest <= 0.0:
@@ -167,9 +165,12 @@ def phases_from_offsets(size: int, offsets: dict[tuple[int, int], float]) -> Arr
     Raises
     ------
     ParameterError
-        If the offsets around a loop do not add up to a multiple of 2π (the loop is named), or a node
-        is not connected.
+        If the offsets around a loop do not add up to a multiple of 2π (the loop is named), a node is
+        not connected, an edge names a node that is not there, or an offset is not finite.
     """
+    _check_edges(offsets, size)
+    if not np.all(np.isfinite(list(offsets.values()))):
+        raise ParameterError('phase offsets must be finite')
     neighbours: dict[int, list[tuple[int, float]]] = {i: [] for i in range(size)}
     for (i, j), offset in offsets.items():
         neighbours[j].append((i, offset))
@@ -191,6 +192,12 @@ def phases_from_offsets(size: int, offsets: dict[tuple[int, int], float]) -> Arr
     if missing:
         raise ParameterError(f'nodes {missing} are not connected to node 0')
     return np.array([phases[i] for i in range(size)])
+
+
+def _check_edges(edges: Iterable[tuple[int, int]], size: int) -> None:
+    for i, j in edges:
+        if not (0 <= i < size and 0 <= j < size and i != j):
+            raise ParameterError(f'edge ({i}, {j}) is not between two of the nodes 0 to {size - 1}')
 
 
 def _loop_through(parent: dict[int, int], i: int, j: int) -> list[int]:

@@ -1,0 +1,140 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Coupling graphs: Laplacians with known spectra, phase offsets, errors that name what is wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.graph import (
+    CouplingGraph,
+    graph_from_edges,
+    phases_from_offsets,
+    topology,
+)
+from dmp_cpg_ros.core.phase import state_at, wrapped
+
+NAMES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
+
+
+def laplacian_spectrum(name: str, size: int) -> np.ndarray:
+    """Eigenvalues of the scalar Laplacian, from textbooks on spectral graph theory."""
+    k = np.arange(size)
+    if name == 'all_to_all':
+        return np.array([0.0] + [float(size)] * (size - 1))
+    if name == 'ring':
+        return np.sort(2.0 - 2.0 * np.cos(2.0 * np.pi * k / size))
+    if name == 'path':
+        return np.sort(2.0 - 2.0 * np.cos(np.pi * k / size))
+    return np.array([0.0] + [1.0] * (size - 2) + [float(size)])
+
+
+@pytest.mark.parametrize('name', NAMES[:4])
+@given(size=st.integers(3, 8), gain=st.floats(0.1, 100.0))
+def test_block_laplacians_have_the_textbook_spectrum_twice(
+        name: str, size: int, gain: float) -> None:
+    L = graph_from_edges(size, topology(name, size), gain).block_laplacian()
+    assert np.allclose(L, L.T)
+    expected = np.repeat(gain * laplacian_spectrum(name, size), 2)
+    assert np.allclose(np.linalg.eigvalsh(L), expected, atol=1e-9 * gain * size)
+
+
+@given(size=st.integers(2, 8), gain=st.floats(0.1, 100.0))
+def test_in_the_directed_ring_everyone_follows_the_one_before(size: int, gain: float) -> None:
+    L = graph_from_edges(size, topology('directed_ring', size), gain).block_laplacian()
+    shift = np.roll(np.eye(size), 1, axis=0)
+    assert np.allclose(L, gain * np.kron(np.eye(size) - shift, np.eye(2)))
+
+
+@pytest.mark.parametrize('name', NAMES)
+@given(data=st.data())
+def test_locked_states_feel_no_coupling(name: str, data: st.DataObject) -> None:
+    size = data.draw(st.integers(2, 6))
+    phases = np.array(data.draw(st.lists(st.floats(-7.0, 7.0), min_size=size, max_size=size)))
+    K = np.array([[2.0, 1.5], [-1.0, 3.0]])  # not symmetric; its symmetric part is positive
+    graph = graph_from_edges(size, topology(name, size), K, phases)
+    locked = state_at(phases + data.draw(st.floats(-4.0, 4.0)))
+    assert np.allclose(graph.coupling_matrix() @ locked.ravel(), 0.0, atol=1e-9)
+
+
+@given(seed=st.integers(0, 1000))
+def test_turning_each_node_into_its_place_gives_the_block_laplacian(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    graph = graph_from_edges(4, topology('ring', 4), 3.0, rng.uniform(-3.0, 3.0, 4))
+    y = rng.normal(size=(4, 2))
+    turn = [np.array([[np.cos(p), np.sin(p)], [-np.sin(p), np.cos(p)]]) for p in graph.phases]
+    x = np.array([R @ v for R, v in zip(turn, y, strict=True)])
+    back = (graph.coupling_matrix() @ x.ravel()).reshape(4, 2)
+    seen = np.array([R.T @ v for R, v in zip(turn, back, strict=True)])
+    assert np.allclose(seen.ravel(), -graph.block_laplacian() @ y.ravel())
+
+
+@given(seed=st.integers(0, 1000), size=st.integers(2, 7))
+def test_phases_are_found_from_consistent_offsets(seed: int, size: int) -> None:
+    rng = np.random.default_rng(seed)
+    phases = rng.uniform(-3.0, 3.0, size)
+    edges = {(i, int(rng.integers(i))) for i in range(1, size)}
+    edges |= {tuple(map(int, rng.choice(size, 2, replace=False))) for _ in range(size)}
+    offsets = {(i, j): phases[i] - phases[j] + 2.0 * np.pi * rng.integers(-1, 2) for i, j in edges}
+    found = phases_from_offsets(size, offsets)
+    assert np.allclose(wrapped(found - (phases - phases[0])), 0.0, atol=1e-9)
+
+
+def test_offsets_that_disagree_name_their_loop() -> None:
+    offsets = {(1, 0): 0.5, (2, 1): 0.5, (3, 2): 0.5, (4, 3): 0.5, (4, 1): 1.0}
+    with pytest.raises(ParameterError) as raised:
+        phases_from_offsets(5, offsets)
+    named = str(raised.value).split('loop ')[1].split(' add')[0]
+    loop = [int(word) for word in named.split(' - ')]
+    assert loop[0] == loop[-1] and set(loop) == {1, 2, 3, 4} and len(loop) == 5
+    steps = list(zip(loop[:-1], loop[1:], strict=True))
+    assert all((a, b) in offsets or (b, a) in offsets for a, b in steps)
+
+
+def test_offsets_of_both_directions_must_be_opposite() -> None:
+    assert np.allclose(phases_from_offsets(2, {(1, 0): 0.3, (0, 1): -0.3}), [0.0, 0.3])
+    with pytest.raises(ParameterError, match='loop'):
+        phases_from_offsets(2, {(1, 0): 0.3, (0, 1): 0.3})
+
+
+def test_nodes_that_nobody_reaches_are_named() -> None:
+    with pytest.raises(ParameterError, match=r'\[2, 3\] are not connected'):
+        phases_from_offsets(4, {(1, 0): 0.0, (3, 2): 0.0})
+
+
+@pytest.mark.parametrize('edge', [(0, 9), (-1, 0), (1, 1)])
+def test_offsets_of_impossible_edges_are_refused(edge: tuple[int, int]) -> None:
+    with pytest.raises(ParameterError, match='nodes 0 to 1'):
+        phases_from_offsets(2, {(1, 0): 0.0, edge: 0.1})
+
+
+def test_offsets_must_be_finite() -> None:
+    with pytest.raises(ParameterError, match='finite'):
+        phases_from_offsets(2, {(1, 0): np.nan})
+
+
+@pytest.mark.parametrize(('edges', 'gain', 'words'), [
+    (((0, 4),), 1.0, 'nodes 0 to 3'),
+    (((2, 2),), 1.0, 'edge \\(2, 2\\)'),
+    (((0, 1),), 0.0, 'positive definite'),
+    (((0, 1),), np.diag([1.0, -0.1]), 'smallest eigenvalue is -0.1'),
+    (((0, 1),), np.nan, 'finite'),
+])
+def test_impossible_graphs_are_refused(
+        edges: tuple[tuple[int, int], ...], gain: float | np.ndarray, words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        graph_from_edges(4, edges, gain)
+
+
+def test_shapes_must_fit() -> None:
+    with pytest.raises(ParameterError, match='need gains'):
+        CouplingGraph(2, ((0, 1),), np.eye(2), np.zeros(2))
+
+
+def test_an_unknown_topology_lists_the_known_ones() -> None:
+    with pytest.raises(ParameterError, match='all_to_all, ring, path, star, directed_ring'):
+        topology('tree', 4)
