@@ -74,7 +74,8 @@ class CouplingGraph:
         -------
         ndarray (2N, 2N)
         """
-        return self._block_matrix(lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j])))
+        return self._block_matrix(
+            self.gains, lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j])))
 
     def block_laplacian(self) -> Array:
         """Block Laplacian L in the co-rotated coordinates, where locked states are equal.
@@ -82,17 +83,21 @@ class CouplingGraph:
         Returns
         -------
         ndarray (2N, 2N)
-            Σ over edges of K_ij at (i, i) and −K_ij at (i, j).
+            Σ over edges of K̃_ij at (i, i) and −K̃_ij at (i, j), with K̃_ij = R(φ_i)ᵀ K_ij R(φ_i) the gain as the
+            locked coordinates x̃_i = R(φ_i)ᵀ x_i see it; K̃ = K for every K = a I + b S, such as k I.
         """
-        return -self._block_matrix(lambda i, j: np.eye(2))
+        turns = [phase_rotation(float(phi)) for phi in self.phases]
+        turned = np.array([turns[i].T @ gain @ turns[i]
+                           for (i, _), gain in zip(self.edges, self.gains, strict=True)])
+        return -self._block_matrix(turned.reshape(-1, 2, 2), lambda i, j: np.eye(2))
 
     def with_phases(self, phases: Array) -> CouplingGraph:
         """Return the same couplings locked at other phases."""
         return CouplingGraph(self.size, self.edges, self.gains, np.asarray(phases, dtype=float))
 
-    def _block_matrix(self, seen_from: Callable[[int, int], Array]) -> Array:
+    def _block_matrix(self, gains: Array, seen_from: Callable[[int, int], Array]) -> Array:
         matrix = np.zeros((2 * self.size, 2 * self.size))
-        for (i, j), gain in zip(self.edges, self.gains, strict=True):
+        for (i, j), gain in zip(self.edges, gains, strict=True):
             matrix[2 * i:2 * i + 2, 2 * i:2 * i + 2] -= gain
             matrix[2 * i:2 * i + 2, 2 * j:2 * j + 2] += gain @ seen_from(i, j)
         return matrix
