@@ -44,7 +44,8 @@ def facts(metrics: Mapping[str, Any], lock_step: bool | None = None) -> list[Fac
     metrics : mapping
         As from :func:`~dmp_cpg_ros.analysis.metrics.summary.compute_metrics`.
     lock_step : bool, optional
-        Whether the run was in lock-step, where nothing is demanded of the wall clock.
+        Whether the run was in lock-step; a run that is known not to have been has to keep wall
+        time.
 
     Returns
     -------
@@ -91,7 +92,8 @@ def _stops(metrics: Mapping[str, Any]) -> list[Fact]:
             found.append(Fact(f'Every {word} {end}', f'{done} of {count}', done == count))
             found.extend(_predictions(entries, 'rest' if word == 'stop' else 'walking'))
     stops = metrics['stop']['all']
-    speeds = [entry['body_speed_at_rest'] for entry in stops if entry.get('body_speed_at_rest')]
+    speeds = [entry.get('body_speed_at_rest_m_s') for entry in stops]
+    speeds = [speed for speed in speeds if speed is not None]
     if speeds:
         finding = f'at most {1e3 * max(speeds):.2g} mm/s'
         found.append(Fact('The body stood still at rest', finding, max(speeds) < STILL_SPEED))
@@ -128,13 +130,14 @@ def _timing(metrics: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
     rate = _number(timing['rate_hz'], '{:.0f} Hz')
     if lock_step:
         return [Fact('Speed of the lock-step run', f'{factor:.2f} × real time, {rate}', None)]
+    kept = None if lock_step is None else factor >= REAL_TIME_FACTOR
     latency = _number(timing['latency_ms_p50'], 'median {:.2f} ms')
-    late = _number(timing['latency_ms_p99'], '99 % {:.2f} ms')
+    late = _number(timing['latency_ms_p99'], '99% {:.2f} ms')
     return [
         Fact(
             'The suite kept wall time',
             f'real-time factor {factor:.3f}, {rate}',
-            factor >= REAL_TIME_FACTOR,
+            kept,
         ),
         Fact('Latency from state to last target', f'{latency}, {late}', None),
     ]

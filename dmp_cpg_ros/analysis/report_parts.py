@@ -14,6 +14,9 @@ from dmp_cpg_ros.analysis.facts import Fact
 
 MARKS = {True: ('good', '✓ holds'), False: ('bad', '✗ does not hold'), None: ('none', '–')}
 
+UNITS = {'_m_s': 'm/s', '_s': 's', '_m': 'm', '_n': 'N'}
+"""Endings of keys that name a unit."""
+
 
 def data_uri(png: Path) -> str:
     """PNG file as a URI that carries the picture itself."""
@@ -22,9 +25,10 @@ def data_uri(png: Path) -> str:
 
 def figure(png: Path, title: str, caption: str = '') -> str:
     """Picture with title and caption."""
+    words = f'<b>{escape(title)}.</b> {escape(caption)}' if caption else escape(title)
     return (
         f'<figure><img alt="{escape(title)}" src="{data_uri(png)}">'
-        f'<figcaption><b>{escape(title)}.</b> {escape(caption)}</figcaption></figure>'
+        f'<figcaption>{words}</figcaption></figure>'
     )
 
 
@@ -62,7 +66,15 @@ def record_table(records: Sequence[Mapping[str, Any]]) -> str:
         if all(_is_number(record.get(key)) for record in records)
     ]
     rows = ([text(record.get(key)) for key in keys] for record in records)
-    return table([key.replace('_', ' ') for key in keys], rows, numbers)
+    return table([label(key) for key in keys], rows, numbers)
+
+
+def label(key: str) -> str:
+    """Name of a number as a heading: ``body_still_after_s`` is ``body still after [s]``."""
+    for ending, unit in UNITS.items():
+        if key.endswith(ending):
+            return f'{key[: -len(ending)]} [{unit}]'.replace('_', ' ')
+    return key.replace('_', ' ')
 
 
 def text(value: Any) -> str:

@@ -12,8 +12,8 @@ from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_state import LEGS
 
 CAPTION = (
-    'Canonical states across the addition and the removal of sparse inhibition. Only the '
-    'inhibited leg feels it; the coupling brings the other three to rest at their places.'
+    'The four oscillators across the addition and the removal of sparse inhibition. Only the '
+    'inhibited leg feels it; the coupling brings the other three to rest near their places.'
 )
 
 

@@ -20,9 +20,9 @@ from dmp_cpg_ros.core.phase import phase
 from dmp_cpg_ros.core.robot_state import LEGS
 
 CAPTION = (
-    'Footfall diagram: bars mark feet on the ground, measured (solid) over planned (pale). Top: a '
-    'few cycles of steady walking. Bottom: the first stop, at whose end all four feet stand, and '
-    'the start after it.'
+    'Bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles of '
+    'steady walking. Bottom: the first stop, at whose end all four feet stand, and the start '
+    'after it.'
 )
 
 CYCLES = 6

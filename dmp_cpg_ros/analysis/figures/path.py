@@ -18,8 +18,8 @@ from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_state import LEGS
 
 CAPTION = (
-    'Path of the base from above. Small dots are footholds, one for each stance; squares mark '
-    'where the robot stood still, arrows its heading every two seconds.'
+    'The base from above. Small dots are footholds, one for each stance; squares mark where the '
+    'robot stood still, arrows its heading every two seconds.'
 )
 
 FEWEST_SAMPLES = 5

@@ -18,11 +18,11 @@ from dmp_cpg_ros.core.phase import state_at
 from dmp_cpg_ros.core.robot_state import LEGS
 
 CAPTION = (
-    'Phase portraits of the first stop. Left: the inhibited oscillator runs on its limit cycle '
-    'until inhibition is armed and it enters the region C, where it is held near its target. '
-    'Middle: close-up of C; the small distance at which it rests is the pull of the other '
-    'oscillators over the gain. Right: all four legs; dots mark where they rest, rings where '
-    'their places in the gait are.'
+    'The first stop in the plane of the oscillators. Left: the inhibited oscillator runs on its '
+    'limit cycle until inhibition is armed and it enters the region C, where it is held near its '
+    'target. Middle: close-up of C; the small distance at which it rests is the pull of the other '
+    'oscillators over the gain. Right: all four legs; dots mark where they rest, rings their '
+    'places in the gait.'
 )
 
 AHEAD = 1.5

@@ -16,9 +16,9 @@ from dmp_cpg_ros.analysis.motion import smoothed
 from dmp_cpg_ros.analysis.recording import Recording
 
 CAPTION = (
-    'Speed and turn rate of the base: as commanded, as filtered by the reference system, and as '
-    'measured; the pale line is every sample, the bold one the mean over a gait cycle. While a '
-    'stop is requested the reference goes to zero whatever the command.'
+    'As commanded, as filtered by the reference system, and as measured; the pale line is every '
+    'sample, the bold one the mean over a gait cycle. While a stop is requested the reference '
+    'goes to zero whatever the command.'
 )
 
 PANELS = (

@@ -12,9 +12,8 @@ from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS
 
 CAPTION = (
-    'Target kinematics of the hips and the knees across a stop by sparse inhibition and the start '
-    'after it. One oscillator is inhibited; the targets of all legs come to rest without a kick, '
-    'and resume.'
+    'Targets of the hips and the knees across a stop by sparse inhibition and the start after it. '
+    'One oscillator is inhibited; the targets of all legs come to rest without a kick, and resume.'
 )
 
 

@@ -15,10 +15,9 @@ from dmp_cpg_ros.analysis.metrics.timing import ROBOT_NODE
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 
 CAPTION = (
-    'Timing. Top: what the robot measured of itself: control rate, and the latency from a state '
-    'to the last of the four targets that answer it. Bottom, where the recording bears wall time: '
-    'how far apart the states reached the recorder, and how long after a state the last target of '
-    'its tick did.'
+    'Top: what the robot measured of itself, control rate and latency from a state to the last of '
+    'the four targets that answer it. Bottom, where the recording bears wall time: how far apart '
+    'the states reached the recorder, and how long after a state the last target of its tick did.'
 )
 
 
@@ -73,7 +72,7 @@ def _rate(axes: Axes, history: list[StatusEvent]) -> None:
 def _latency(axes: Axes, history: list[StatusEvent]) -> None:
     time = [status.time for status in history]
     for key, label, colour in (
-        ('latency_ms_p99', '99 %', '#D55E00'),
+        ('latency_ms_p99', '99%', '#D55E00'),
         ('latency_ms_p50', 'median', '#0072B2'),
     ):
         axes.plot(time, _series(history, key), color=colour, marker='.', markersize=3, label=label)
@@ -91,6 +90,6 @@ def _histogram(axes: Axes, values: NDArray[np.float64], label: str) -> None:
     axes.set_yscale('log')
     axes.set(xlabel=label, ylabel='ticks')
     axes.set_title(
-        f'median {np.median(values):.2f} ms, 99 % {np.percentile(values, 99):.2f} ms, '
+        f'median {np.median(values):.2f} ms, 99% {np.percentile(values, 99):.2f} ms, '
         f'largest {values.max():.1f} ms'
     )

@@ -15,9 +15,9 @@ from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS
 
 CAPTION = (
-    'Joint torques. Left: three cycles of steady walking; grey lines are the limits where they '
-    'are in view. Right: the whole run as share of the limit: bars reach to the 99th percentile, '
-    'ticks mark the largest value.'
+    'Left: three cycles of steady walking; grey lines are the limits where they are in view. '
+    'Right: the whole run as share of the limit; bars reach to the 99th percentile, ticks mark '
+    'the largest value.'
 )
 
 

@@ -102,14 +102,14 @@ def _body_at_rest(
     odometry = recording.odometry
     rows = (odometry.time >= window[0]) & (odometry.time < window[1])
     if not rows.any():
-        return {'body_speed_at_rest': None, 'body_still_after_s': None, 'displacement_m': None}
+        return {'body_speed_at_rest_m_s': None, 'body_still_after_s': None, 'displacement_m': None}
     speed = np.linalg.norm(odometry.velocity_in_base, axis=1)
     since = (odometry.time >= request) & (odometry.time < window[1])
     moving = odometry.time[since & (speed >= STILL_SPEED)]
     still_after = float(moving[-1]) - request if moving.size else 0.0
     start, end = (odometry.position_in_world[rows_of][0, :2] for rows_of in (since, rows))
     return {
-        'body_speed_at_rest': float(speed[rows].max()),
+        'body_speed_at_rest_m_s': float(speed[rows].max()),
         'body_still_after_s': still_after if speed[rows][-1] < STILL_SPEED else None,
         'displacement_m': float(np.hypot(*(end - start))),
     }
