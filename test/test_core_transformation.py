@@ -1,0 +1,139 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Transformation and reference systems, swing activity: exact steps, contraction, limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.swing_activity import activity_step
+from dmp_cpg_ros.core.transformation import TransformationState, TransformationSystem
+
+vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
+durations = st.floats(1e-4, 0.1)
+MS = 1_000_000
+
+
+@given(k=st.floats(10.0, 1e4), b=st.floats(1.0, 300.0), theta=vectors, theta_dot=vectors,
+       goal=vectors, goal_velocity=vectors, dt=durations)
+def test_two_half_steps_along_a_moving_goal_are_one_step(
+        k: float, b: float, theta: np.ndarray, theta_dot: np.ndarray, goal: np.ndarray,
+        goal_velocity: np.ndarray, dt: float) -> None:
+    of = TransformationSystem(k, b, np.ones(3))
+    start = TransformationState(theta, theta_dot)
+    once = of.step(start, goal, goal_velocity, dt)
+    half = of.step(start, goal - 0.5 * dt * goal_velocity, goal_velocity, 0.5 * dt)
+    twice = of.step(half, goal, goal_velocity, 0.5 * dt)
+    assert np.allclose(once.position, twice.position, atol=1e-8)
+    assert np.allclose(once.velocity, twice.velocity, atol=1e-6)
+
+
+@given(k=st.floats(10.0, 1e4), b=st.floats(1.0, 300.0), theta=vectors, theta_dot=vectors,
+       goal=vectors, goal_velocity=vectors)
+def test_the_step_starts_with_the_acceleration_of_the_paper(
+        k: float, b: float, theta: np.ndarray, theta_dot: np.ndarray, goal: np.ndarray,
+        goal_velocity: np.ndarray) -> None:
+    of, h = TransformationSystem(k, b, np.ones(3)), 1e-7
+    start = TransformationState(theta, theta_dot)
+    rate = (of.step(start, goal, goal_velocity, h).velocity - theta_dot) / h
+    expected = k * (goal - theta) + b * (goal_velocity - theta_dot)
+    assert np.allclose(of.acceleration(theta, theta_dot, goal, goal_velocity), expected)
+    assert np.allclose(rate, expected, rtol=1e-3, atol=1e-3 * k)
+
+
+def test_two_states_under_the_same_goals_converge_to_one_another() -> None:
+    of, rng = TransformationSystem(6400.0, 160.0, np.ones(3)), np.random.default_rng(0)
+    a = TransformationState(np.ones(3), np.zeros(3))
+    b = TransformationState(-np.ones(3), np.full(3, 10.0))
+    for _ in range(100):
+        goal, goal_velocity = rng.normal(size=3), rng.normal(size=3)
+        a, b = (of.step(state, goal, goal_velocity, 0.004) for state in (a, b))
+    assert np.abs(a.position - b.position).max() < 1e-9
+
+
+@given(theta=vectors, feedback=vectors)
+def test_torque_is_inertia_times_acceleration_plus_feedback(
+        theta: np.ndarray, feedback: np.ndarray) -> None:
+    J = np.array([0.1, 0.2, 0.3])
+    torque = TransformationSystem(1.0, 1.0, J).torque(theta, feedback)
+    assert np.allclose(torque, J * theta + feedback)
+
+
+@given(alpha=st.floats(0.1, 50.0), r=vectors, r_ext=vectors, a=durations, b=durations)
+def test_reference_steps_add_up_exactly(
+        alpha: float, r: np.ndarray, r_ext: np.ndarray, a: float, b: float) -> None:
+    of = ReferenceSystem(ReferenceParameters(alpha_r=alpha))
+    assert np.allclose(of.step(of.step(r, r_ext, a), r_ext, b), of.step(r, r_ext, a + b))
+    slope = (of.step(r, r_ext, 1e-7) - r) / 1e-7
+    assert np.allclose(slope, alpha * (r_ext - r), rtol=1e-4, atol=1e-4 * alpha)
+
+
+@given(commands=st.tuples(*[st.floats(-100.0, 100.0)] * 3))
+def test_commands_are_limited_to_their_ranges(commands: tuple[float, float, float]) -> None:
+    p = ReferenceParameters()
+    gate = CommandGate(p)
+    gate.accept(*commands)
+    limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
+    for given_, acting, limit in zip(commands, gate.at(0), limits, strict=True):
+        assert abs(acting) <= limit
+        assert acting == given_ or abs(given_) > limit
+
+
+def test_a_command_acts_until_its_timeout_and_then_is_zero() -> None:
+    gate = CommandGate(ReferenceParameters(cmd_vel_timeout=0.5))
+    assert gate.at(0) == (0.0, 0.0, 0.0)
+    gate.accept(0.5, 0.1, 0.2)
+    assert gate.at(100 * MS) == (0.5, 0.1, 0.2)
+    assert gate.at(600 * MS) == (0.5, 0.1, 0.2)
+    assert gate.at(601 * MS) == (0.0, 0.0, 0.0)
+    gate.accept(0.3, 0.0, 0.0)
+    assert gate.at(700 * MS) == (0.3, 0.0, 0.0)
+    assert gate.at(1199 * MS) == (0.3, 0.0, 0.0)
+
+
+def test_without_a_timeout_a_command_stays() -> None:
+    gate = CommandGate(ReferenceParameters(cmd_vel_timeout=0.0))
+    gate.accept(0.5, 0.0, 0.0)
+    gate.at(0)
+    assert gate.at(10**13) == (0.5, 0.0, 0.0)
+
+
+def test_a_command_does_not_outlive_its_timeout_when_the_clock_starts_again() -> None:
+    gate = CommandGate(ReferenceParameters(cmd_vel_timeout=0.5))
+    gate.accept(0.5, 0.0, 0.0)
+    gate.at(10_000 * MS)
+    assert gate.at(4 * MS) == (0.5, 0.0, 0.0)
+    assert gate.at(505 * MS) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize('position', range(3))
+@pytest.mark.parametrize('value', [np.nan, np.inf, -np.inf])
+def test_a_command_that_is_not_finite_changes_nothing(position: int, value: float) -> None:
+    gate, bad = CommandGate(ReferenceParameters(cmd_vel_timeout=0.5)), [0.1, 0.1, 0.1]
+    gate.accept(0.5, 0.0, 0.0)
+    gate.at(0)
+    bad[position] = value
+    with pytest.raises(DataError, match='finite'):
+        gate.accept(*bad)
+    assert gate.at(400 * MS) == (0.5, 0.0, 0.0)
+    assert gate.at(501 * MS) == (0.0, 0.0, 0.0)  # nor does it keep the old one alive
+
+
+@given(activity=st.floats(0.0, 1.0), phase_rate=st.floats(-50.0, 50.0), omega=st.floats(1.0, 30.0),
+       rate=st.floats(0.1, 100.0), dt=st.floats(0.0, 1.0))
+def test_swing_activity_stays_between_rest_and_full_swing(
+        activity: float, phase_rate: float, omega: float, rate: float, dt: float) -> None:
+    following = float(activity_step(activity, phase_rate, omega, rate, dt))
+    assert 0.0 <= following <= 1.0
+    halves = activity_step(activity_step(activity, phase_rate, omega, rate, 0.5 * dt),
+                           phase_rate, omega, rate, 0.5 * dt)
+    assert following == pytest.approx(float(halves))
+    if phase_rate >= omega:
+        assert following >= activity - 1e-12
+    if phase_rate <= 0.0:
+        assert following <= activity + 1e-12
