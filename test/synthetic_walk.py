@@ -110,7 +110,8 @@ class SyntheticWalk:
         """The gait that is prescribed."""
         return amble(self.duty_factor)
 
-    def _walking(self) -> Array:
+    def walking(self) -> Array:
+        """Whether the oscillators turn, boolean ndarray (n,)."""
         t = self.time
         return (t >= self.walk_s) & (
             (t < self.stop_s + self.time_to_rest_s) | (t >= self.release_s)
@@ -128,7 +129,7 @@ class SyntheticWalk:
 
     def phases(self) -> Array:
         """Oscillator phases, ndarray (n, 4)."""
-        omega = 2.0 * np.pi * self.cadence_hz * self._walking()
+        omega = 2.0 * np.pi * self.cadence_hz * self.walking()
         phi = np.concatenate([[0.0], np.cumsum(omega)[:-1]]) / self.rate_hz
         return phi[:, None] + self.gait.phases + self.phase_offset_error
 
@@ -145,12 +146,12 @@ class SyntheticWalk:
     def stance(self) -> Array:
         """Whether each foot stands, boolean ndarray (n, 4)."""
         position = np.abs(self.gait.cycle_position(self.phases()))
-        return (position >= 0.5 * (1.0 - self.duty_factor)) | ~self._walking()[:, None]
+        return (position >= 0.5 * (1.0 - self.duty_factor)) | ~self.walking()[:, None]
 
     def feet_in_world(self) -> Array:
         """Feet that stay where they were put (but for the slip), ndarray (n, 4, 3)."""
         position, yaw, _ = self.body()
-        stance, walking = self.stance(), self._walking()
+        stance, walking = self.stance(), self.walking()
         home = np.array(
             [
                 [leg.hip_in_base[0], leg.hip_in_base[1] + leg.hip_offset[1], -HEIGHT]

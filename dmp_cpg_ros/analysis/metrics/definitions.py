@@ -11,7 +11,7 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
     ),
     'robot.distance_m': (
         'm',
-        'length of the horizontal path of the base, its sway averaged out over 1 s',
+        'length of the horizontal path of the base, its sway averaged out',
     ),
     'robot.yaw_drift_deg_per_10m': (
         '°/10 m',

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import MOVING, steady_segments
+from dmp_cpg_ros.analysis.episodes import MOVING, gait_period, steady_segments
 from dmp_cpg_ros.analysis.foot_motion import foot_slip
 from dmp_cpg_ros.analysis.motion import held, integral, roll_pitch_yaw, smoothed, tilt
 from dmp_cpg_ros.analysis.recording import Recording
@@ -21,7 +21,7 @@ FALLEN_TILT = np.deg2rad(60.0)
 """Tilt of the base beyond which the robot has fallen [rad]."""
 
 SWAY_WINDOW = 1.0
-"""The path is averaged over this time so that sway does not count as distance [s]."""
+"""The path is averaged over whole gait cycles of at least this time: sway is no distance [s]."""
 
 SHORTEST_DISTANCE = 0.5
 """Distance below which figures per metre are not given [m]."""
@@ -72,7 +72,9 @@ def distance_walked(recording: Recording) -> float | None:
     odometry = recording.odometry
     if not odometry.time.size:
         return None
-    path = smoothed(odometry.time, odometry.position_in_world[:, :2], SWAY_WINDOW)
+    period = gait_period(recording) or SWAY_WINDOW
+    window = period * np.ceil(SWAY_WINDOW / period)
+    path = smoothed(odometry.time, odometry.position_in_world[:, :2], window)
     return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 

@@ -1,0 +1,330 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Metrics find what was prescribed, and say nothing where nothing was recorded."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic_walk import MASS, SyntheticWalk, robot
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.foot_motion import feet_in_base, foot_slip, shank_rate_in_base
+from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
+from dmp_cpg_ros.analysis.motion import rotations
+from dmp_cpg_ros.analysis.recording import (
+    FootForceSeries,
+    JointSeries,
+    OdometrySeries,
+    Recording,
+    StatusEvent,
+)
+from dmp_cpg_ros.analysis.strict_json import to_json
+
+
+def metrics_of(walk: SyntheticWalk, **changes: Any) -> dict[str, Any]:
+    recording = dataclasses.replace(walk.recording(), **changes)
+    return compute_metrics(recording, RunContext(robot(), walk.gait))
+
+
+@pytest.fixture(scope='module')
+def plain_metrics() -> dict[str, Any]:
+    return metrics_of(SyntheticWalk())
+
+
+def test_an_empty_recording_has_no_numbers() -> None:
+    metrics = compute_metrics(Recording(), RunContext(robot()))
+    flat = {**metrics['robot'], **metrics['gait'], **metrics['timing']}
+    assert all(value is None for value in flat.values())
+    assert metrics['stop'] | {'all': 0} == {
+        'predicted_s': None,
+        'bound_s': None,
+        'measured_s': None,
+        'count': 0,
+        'completed': 0,
+        'all': 0,
+    }
+    assert json.loads(to_json(metrics)) == metrics
+
+
+@pytest.mark.parametrize('topic', [field.name for field in dataclasses.fields(Recording)])
+def test_every_topic_may_be_missing(topic: str) -> None:
+    walk = SyntheticWalk(rate_hz=50.0)
+    empty = getattr(Recording(), topic)
+    metrics = metrics_of(walk, **{topic: empty})
+    json.loads(to_json(metrics), parse_constant=pytest.fail)
+
+
+def test_the_contract_names_every_number(plain_metrics: dict[str, Any]) -> None:
+    for group, names in {
+        'robot': 'fell distance_m yaw_drift_deg_per_10m cost_of_transport foot_slip_m',
+        'tracking': 'v_rmse gamma_rmse',
+        'gait': 'phase_error_rad_max duty_factor',
+        'stop': 'predicted_s bound_s measured_s',
+        'start': 'predicted_s bound_s measured_s',
+        'timing': 'rate_hz real_time_factor latency_ms_p50 latency_ms_p99 deadline_misses',
+    }.items():
+        for name in names.split():
+            assert plain_metrics[group][name] is not None, f'{group}.{name}'
+
+
+def test_distance_is_that_of_the_path() -> None:
+    walk = SyntheticWalk(turn_rate=0.3)
+    _, _, speed = walk.body()
+    distance = metrics_of(walk)['robot']['distance_m']
+    assert distance == pytest.approx(speed.sum() / walk.rate_hz, rel=0.01)
+
+
+def test_sway_is_no_distance() -> None:
+    walk = SyntheticWalk()
+    recording = walk.recording()
+    odometry = recording.odometry
+    sway = 0.03 * np.sin(2.0 * np.pi * walk.cadence_hz * odometry.time) * walk.walking()
+    position = odometry.position_in_world + np.outer(sway, [0.0, 1.0, 0.0])
+    swaying = dataclasses.replace(odometry, position_in_world=position)
+    assert metrics_of(walk, odometry=swaying)['robot']['distance_m'] == pytest.approx(
+        metrics_of(walk)['robot']['distance_m'], rel=0.02
+    )
+
+
+@pytest.mark.parametrize('drift_deg_per_m', [-0.8, 0.0, 0.3])
+def test_yaw_drift_is_found(drift_deg_per_m: float) -> None:
+    metrics = metrics_of(SyntheticWalk(yaw_drift_deg_per_m=drift_deg_per_m))
+    assert metrics['robot']['yaw_drift_deg_per_10m'] == pytest.approx(
+        10.0 * abs(drift_deg_per_m), rel=0.01, abs=1e-6
+    )
+
+
+def test_a_commanded_turn_is_no_drift() -> None:
+    assert metrics_of(SyntheticWalk(turn_rate=0.5))['robot']['yaw_drift_deg_per_10m'] is None
+
+
+@pytest.mark.parametrize('slip_speed', [0.0, 0.02])
+def test_slip_is_found(slip_speed: float) -> None:
+    walk = SyntheticWalk(slip_speed=slip_speed)
+    stance, walking = walk.stance(), walk.walking()
+    held = (stance[1:] & stance[:-1]) & walking[1:, None]
+    expected = held.sum() * slip_speed / walk.rate_hz
+    assert metrics_of(walk)['robot']['foot_slip_m'] == pytest.approx(expected, abs=1e-6)
+
+
+def test_slip_does_not_depend_on_the_heading() -> None:
+    straight = metrics_of(SyntheticWalk(slip_speed=0.02))['robot']
+    turned = metrics_of(SyntheticWalk(slip_speed=0.02, turn_rate=0.4))['robot']
+    assert turned['foot_slip_m'] == pytest.approx(straight['foot_slip_m'], rel=1e-3)
+
+
+def test_a_rolling_foot_does_not_slip() -> None:
+    """The base moves just so that the shank, turning about y, rolls on its round foot."""
+    radius, n = 0.03, 400
+    leg = robot(radius).legs[0]
+    time = np.linspace(0.0, 1.0, n)
+    hip, knee = 0.4 * np.sin(2.0 * time), -0.9 + 0.2 * np.cos(3.0 * time)
+    q = np.column_stack([np.zeros(n), hip, knee])
+    q_dot = np.column_stack([np.zeros(n), 0.8 * np.cos(2.0 * time), -0.6 * np.sin(3.0 * time)])
+    foot = feet_in_base(leg, q)
+    rolled = radius * (hip + knee)  # [m] along x
+    position = np.column_stack([rolled - foot[:, 0], np.zeros(n), radius - foot[:, 2]])
+    recording = Recording(
+        joints=JointSeries(time, np.tile(q, 4), np.tile(q_dot, 4), np.zeros((n, 12))),
+        odometry=OdometrySeries(
+            time,
+            position,
+            np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)),
+            np.zeros((n, 3)),
+            np.zeros((n, 3)),
+        ),
+        feet=FootForceSeries(time, np.tile([50.0, 0.0, 0.0, 0.0], (n, 1))),
+    )
+    slip = foot_slip(recording, robot(radius), 2.0)
+    assert slip is not None
+    assert slip[0] < 1e-4
+    sliding = foot_slip(recording, robot(0.0), 2.0)
+    assert sliding is not None
+    assert sliding[0] == pytest.approx(np.abs(np.diff(rolled)).sum(), rel=1e-3)
+
+
+def test_the_shank_turns_as_its_links_do() -> None:
+    """Angular velocity against the difference quotient of the shank's rotation."""
+    rng = np.random.default_rng(1)
+    leg = dataclasses.replace(robot().legs[1], axis_sign=np.array([-1.0, 1.0, -1.0]))
+    q, q_dot, h = rng.uniform(-1.0, 1.0, 3), rng.uniform(-1.0, 1.0, 3), 1e-6
+
+    def shank(q: np.ndarray) -> np.ndarray:
+        a, b = leg.axis_sign[0] * q[0], leg.axis_sign[1] * q[1] + leg.axis_sign[2] * q[2]
+        return rotations(
+            np.array(
+                [
+                    [
+                        np.sin(a / 2) * np.cos(b / 2),
+                        np.cos(a / 2) * np.sin(b / 2),
+                        np.sin(a / 2) * np.sin(b / 2),
+                        np.cos(a / 2) * np.cos(b / 2),
+                    ]
+                ]
+            )
+        )[0]
+
+    spin = (shank(q + h * q_dot) - shank(q - h * q_dot)) / (2.0 * h) @ shank(q).T
+    omega = shank_rate_in_base(leg, q[None], q_dot[None])[0]
+    np.testing.assert_allclose([spin[2, 1], spin[0, 2], spin[1, 0]], omega, atol=1e-8)
+
+
+@pytest.mark.parametrize('duty_factor', [0.6, 0.72])
+def test_duty_factor_is_found(duty_factor: float) -> None:
+    gait = metrics_of(SyntheticWalk(duty_factor=duty_factor))['gait']
+    assert gait['duty_factor'] == pytest.approx(duty_factor, abs=0.02)
+    assert gait['duty_factor_planned'] == pytest.approx(duty_factor)
+
+
+def test_a_phase_error_is_found() -> None:
+    error = np.array([0.0, 0.2, 0.0, 0.0])
+    gait = metrics_of(SyntheticWalk(phase_offset_error=error))['gait']
+    # relative to the circular mean of the four, which follows by about a quarter
+    assert gait['phase_error_rad_max'] == pytest.approx(0.15, abs=0.002)
+
+
+def test_without_a_gait_the_offsets_come_from_the_recording() -> None:
+    walk = SyntheticWalk(phase_offset_error=np.array([0.0, 0.2, 0.0, 0.0]))
+    metrics = compute_metrics(walk.recording(), RunContext(robot()))
+    assert metrics['gait']['phase_error_rad_max'] < 1e-9
+
+
+@pytest.mark.parametrize('ratio', [0.9, 1.0, 1.05])
+def test_the_steady_speed_error_is_found(ratio: float) -> None:
+    tracking = metrics_of(SyntheticWalk(speed_ratio=ratio))['tracking']
+    assert tracking['steady']
+    for entry in tracking['steady']:
+        assert entry['v_error'] == pytest.approx(ratio - 1.0, abs=1e-3)
+        assert entry['cycles'] == pytest.approx(
+            (entry['end_s'] - entry['start_s']) * SyntheticWalk.cadence_hz, abs=0.05
+        )
+    assert tracking['v_error_max'] == pytest.approx(abs(ratio - 1.0), abs=1e-3)
+
+
+def test_perfect_tracking_has_no_error(plain_metrics: dict[str, Any]) -> None:
+    assert plain_metrics['tracking']['v_rmse'] < 1e-12
+    assert plain_metrics['tracking']['gamma_rmse'] < 1e-12
+
+
+def test_ripple_counts_in_every_sample_but_not_over_a_cycle() -> None:
+    walk = SyntheticWalk()
+    odometry = walk.recording().odometry
+    ripple = 0.05 * np.sin(2.0 * np.pi * walk.cadence_hz * odometry.time)
+    velocity = odometry.velocity_in_base + np.outer(ripple, [1.0, 0.0, 0.0])
+    tracking = metrics_of(walk, odometry=dataclasses.replace(odometry, velocity_in_base=velocity))[
+        'tracking'
+    ]
+    assert tracking['v_rmse'] == pytest.approx(0.05 / np.sqrt(2.0), rel=0.02)
+    assert tracking['v_rmse_cycle'] < 0.2 * tracking['v_rmse']
+
+
+def test_cost_of_transport_is_work_over_weight_and_distance() -> None:
+    walk = SyntheticWalk()
+    recording = walk.recording()
+    n = len(recording.joints.time)
+    power = np.zeros((n, 12))
+    power[:, 4], power[:, 7] = 20.0, -50.0  # the braking joint gives nothing back
+    joints = dataclasses.replace(recording.joints, velocity=np.ones((n, 12)), effort=power)
+    metrics = metrics_of(walk, joints=joints)['robot']
+    duration = recording.joints.time[-1]
+    assert metrics['cost_of_transport'] == pytest.approx(
+        20.0 * duration / (MASS * 9.81 * metrics['distance_m']), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize('what', ['height', 'tilt'])
+def test_a_fall_is_seen(what: str) -> None:
+    walk = SyntheticWalk()
+    odometry = walk.recording().odometry
+    if what == 'height':
+        position = odometry.position_in_world.copy()
+        position[700:, 2] = 0.1
+        fallen = dataclasses.replace(odometry, position_in_world=position)
+    else:
+        quaternion = odometry.quaternion.copy()
+        quaternion[700:] = [np.sin(0.6), 0.0, 0.0, np.cos(0.6)]  # rolled by 1.2 rad
+        fallen = dataclasses.replace(odometry, quaternion=quaternion)
+    assert metrics_of(walk)['robot']['fell'] is False
+    assert metrics_of(walk, odometry=fallen)['robot']['fell'] is True
+
+
+def test_a_stop_is_reported_as_stated_and_as_the_body_did() -> None:
+    walk = SyntheticWalk()
+    stop = metrics_of(walk)['stop']
+    assert (stop['count'], stop['completed']) == (1, 1)
+    entry = stop['all'][0]
+    assert entry['request_s'] == walk.stop_s
+    assert stop['measured_s'] == entry['measured_s'] == walk.time_to_rest_s
+    assert entry['feet_down_at_rest'] is True
+    position, _, speed = walk.body()
+    still = walk.time[walk.time >= walk.stop_s][
+        np.flatnonzero(speed[walk.time >= walk.stop_s] < 0.01)[0]
+    ]
+    assert entry['body_still_after_s'] == pytest.approx(still - walk.stop_s, abs=0.02)
+    request, rest = (
+        round(walk.stop_s * walk.rate_hz),
+        round((entry['rest_s'] + 0.5) * walk.rate_hz),
+    )
+    moved = np.linalg.norm(position[rest] - position[request])
+    assert entry['displacement_m'] == pytest.approx(moved, abs=1e-3)
+
+
+def test_a_lifted_foot_at_rest_is_seen() -> None:
+    walk = SyntheticWalk()
+    feet = walk.recording().feet
+    force = feet.force.copy()
+    force[round(11.0 * walk.rate_hz), 2] = 0.0
+    entry = metrics_of(walk, feet=FootForceSeries(feet.time, force))['stop']['all'][0]
+    assert entry['feet_down_at_rest'] is False
+    assert entry['least_foot_force_n'] == 0.0
+
+
+def test_a_stop_that_never_came_to_rest_counts_as_asked_only() -> None:
+    walk = SyntheticWalk()
+    events = tuple(event for event in walk.events() if event.message != 'at_rest')
+    stop = metrics_of(walk, inhibition=events)['stop']
+    assert (stop['count'], stop['completed'], stop['measured_s']) == (1, 0, None)
+
+
+def test_standing_before_the_first_start_is_no_stop() -> None:
+    events = (StatusEvent(0.0, 0, 'at_rest', {}), *SyntheticWalk().events()[4:])
+    metrics = metrics_of(SyntheticWalk(), inhibition=events)
+    assert metrics['stop']['count'] == 0
+    assert metrics['start']['count'] == 1
+
+
+def test_a_start_that_was_interrupted_is_not_completed() -> None:
+    events = (
+        StatusEvent(0.0, 0, 'at_rest', {}),
+        StatusEvent(1.0, 0, 'releasing', {}),
+        StatusEvent(1.2, 0, 'waiting', {}),
+        StatusEvent(2.0, 0, 'at_rest', {}),
+        StatusEvent(3.0, 0, 'releasing', {}),
+        StatusEvent(3.5, 0, 'walking', {}),
+    )
+    start = metrics_of(SyntheticWalk(), inhibition=events)['start']
+    assert (start['count'], start['completed']) == (2, 1)
+    assert start['measured_s'] == pytest.approx(0.5)
+
+
+def test_timing_is_what_the_robot_said_last(plain_metrics: dict[str, Any]) -> None:
+    statuses = SyntheticWalk().statuses()['mujoco_robot: timing']
+    assert plain_metrics['timing']['latency_ms_p50'] == statuses[-1].number('latency_ms_p50')
+    assert plain_metrics['timing']['deadline_misses'] == int(
+        statuses[-1].values['deadline_misses']
+    )
+
+
+def test_numbers_that_are_not_finite_are_null_in_json() -> None:
+    value = {
+        'a': float('nan'),
+        'b': [np.inf, np.float32(1.5)],
+        'c': np.arange(2),
+        'd': np.bool_(True),
+    }
+    assert json.loads(to_json(value)) == {'a': None, 'b': [None, 1.5], 'c': [0, 1], 'd': True}

@@ -1,0 +1,241 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Figures, pictures, the report and the command that makes them."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import pytest
+from synthetic_bag import write_bag
+from synthetic_walk import SyntheticWalk, robot
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.facts import facts
+from dmp_cpg_ros.analysis.figures.catalogue import CATALOGUE, write_figures
+from dmp_cpg_ros.analysis.figures.footfall import planned_stance
+from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
+from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
+from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
+from dmp_cpg_ros.analysis.pictures import moments, write_pictures
+from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.report_parts import flattened, label
+from dmp_cpg_ros.analysis.run import RunResults, write_results
+from dmp_cpg_ros.commands.analyze import BAD_INPUT, analyze_run, main
+
+WALK = SyntheticWalk(rate_hz=50.0, turn_rate=0.3)
+
+CERTIFICATE = [
+    {'name': 'synchronisation', 'left': 400.0, 'right': 8.0, 'margin': 392.0, 'holds': True},
+    {'name': '<capture>', 'left': 0.1, 'right': 0.3, 'margin': 0.2, 'holds': True},
+]
+
+
+@pytest.fixture(scope='module')
+def walked() -> Recording:
+    return WALK.recording()
+
+
+@pytest.fixture(scope='module')
+def context() -> RunContext:
+    return RunContext(robot(), WALK.gait)
+
+
+def no_pictures(*poses: Any) -> list[Any]:
+    return []
+
+
+def grey_pictures(positions: Any, quaternions: Any, joints: Any) -> list[Any]:
+    assert positions.shape[1:] == (3,)
+    assert joints.shape[1:] == (12,)
+    np.testing.assert_allclose(roll_pitch_yaw(quaternions)[:, 2] % (2 * np.pi), 0.0, atol=1e-9)
+    return [np.full((9, 16, 3), 128, dtype=np.uint8)] * len(positions)
+
+
+@pytest.fixture(scope='module')
+def results(
+    walked: Recording, context: RunContext, tmp_path_factory: pytest.TempPathFactory
+) -> RunResults:
+    manifest = {'scenario': 'start & stop', 'lock_step': True, 'parameters': {'a': {'b': 1}}}
+    return write_results(
+        tmp_path_factory.mktemp('run'), walked, context, manifest, CERTIFICATE, grey_pictures
+    )
+
+
+def test_every_figure_is_drawn_and_nothing_global_changes(
+    walked: Recording, context: RunContext, tmp_path: Path
+) -> None:
+    before = dict(matplotlib.rcParams)
+    written = write_figures(walked, context, tmp_path)
+    assert list(written) == [entry.name for entry in CATALOGUE]
+    assert all(path.read_bytes().startswith(b'\x89PNG') for path in written.values())
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_an_empty_recording_has_no_figures(tmp_path: Path) -> None:
+    assert write_figures(Recording(), RunContext(), tmp_path) == {}
+
+
+@pytest.mark.parametrize(
+    'topic', ['joints', 'canonical', 'reference', 'odometry', 'feet', 'inhibition', 'statuses']
+)
+def test_a_missing_topic_costs_no_more_than_its_figures(
+    walked: Recording, context: RunContext, tmp_path: Path, topic: str
+) -> None:
+
+    less = dataclasses.replace(walked, **{topic: getattr(Recording(), topic)})
+    for entry in CATALOGUE:
+        entry.draw(less, context)
+        entry.draw(less, RunContext())
+
+
+def test_the_planned_stance_is_that_of_the_walk(walked: Recording, context: RunContext) -> None:
+    planned = planned_stance(walked, context)
+    assert planned is not None
+    running = (WALK.time >= WALK.walk_s) & (WALK.time < WALK.stop_s)
+    np.testing.assert_array_equal(planned[running], WALK.stance()[running])
+
+
+def test_moments_lie_where_their_captions_say(walked: Recording, context: RunContext) -> None:
+    found = {moment.name: moment.time for moment in moments(walked, context)}
+    assert set(found) == {'at_rest', 'turning'}  # this walk never goes straight
+    assert WALK.stop_s + WALK.time_to_rest_s <= found['at_rest'] <= WALK.release_s
+    row = np.searchsorted(walked.feet.time, found['turning'])
+    assert walked.feet.force[row, 0] == 0.0
+
+
+def test_a_run_goes_on_without_pictures(
+    walked: Recording, context: RunContext, tmp_path: Path
+) -> None:
+    assert write_pictures(walked, context, tmp_path, no_pictures) == {}
+
+
+class References(HTMLParser):
+    """Collects everything that a browser would follow or load."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.tags: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.found += [
+            value or ''
+            for name, value in attrs
+            if name in ('src', 'href', 'srcset', 'data', 'action')
+        ]
+
+
+def test_the_report_fetches_nothing(results: RunResults) -> None:
+    assert results.report is not None
+    text = results.report.read_text(encoding='utf-8')
+    parser = References()
+    parser.feed(text)
+    assert parser.found
+    assert all(value.startswith(('data:image/png;base64,', '#')) for value in parser.found)
+    assert not {'script', 'link', 'iframe', 'object', 'embed'} & set(parser.tags)
+    assert not re.search(r'url\(|@import|https?:', text)
+    links = {value[1:] for value in parser.found if value.startswith('#')}
+    assert links <= set(re.findall(r'id="(\w+)"', text))
+
+
+def test_the_report_shows_figures_pictures_certificate_and_escapes(results: RunResults) -> None:
+    assert results.report is not None
+    text = results.report.read_text(encoding='utf-8')
+    assert text.count('data:image/png') == len(CATALOGUE) + len(results.pictures)
+    for word in ('start &amp; stop', '&lt;capture&gt;', 'lock-step', 'synchronisation'):
+        assert word in text
+    assert '<capture>' not in text
+
+
+def test_the_folder_holds_strict_json(results: RunResults) -> None:
+    for name in ('metrics.json', 'manifest.json'):
+        text = (results.folder / name).read_text(encoding='utf-8')
+        json.loads(text, parse_constant=pytest.fail)
+    assert json.loads((results.folder / 'metrics.json').read_text())['certificate'] == CERTIFICATE
+
+
+def test_every_number_is_defined(results: RunResults) -> None:
+    numbers = {key: value for key, value in results.metrics.items() if key != 'certificate'}
+    assert set(flattened(numbers)) == set(DEFINITIONS)
+
+
+def test_labels_have_units() -> None:
+    assert label('body_speed_at_rest_m_s') == 'body speed at rest [m/s]'
+    assert label('request_s') == 'request [s]'
+    assert label('cycles') == 'cycles'
+
+
+def test_facts_do_not_hold_when_the_run_was_bad(walked: Recording, context: RunContext) -> None:
+    metrics = compute_metrics(walked, context, [{'name': 'a', 'holds': False}])
+    good = {fact.statement for fact in facts(metrics) if fact.holds is False}
+    assert good == {'The certificate of the running parameters holds'}
+    metrics['robot']['fell'] = True
+    metrics['tracking']['v_error_max'] = 0.2
+    metrics['stop']['all'][0] |= {
+        'measured_s': 2.0,
+        'bound_s': 1.0,
+        'body_speed_at_rest_m_s': 0.02,
+        'feet_down_at_rest': False,
+    }
+    metrics['timing']['real_time_factor'] = 0.5
+    assert sum(fact.holds is False for fact in facts(metrics, lock_step=False)) == 7
+    assert sum(fact.holds is False for fact in facts(metrics, lock_step=True)) == 6
+
+
+def test_the_command_needs_a_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path / 'nowhere')]) == BAD_INPUT
+    assert 'does not exist' in capsys.readouterr().err
+    assert main([str(tmp_path)]) == BAD_INPUT
+    assert 'no rosbag2 recording' in capsys.readouterr().err
+    with pytest.raises(SystemExit) as stopped:
+        main(['--help'])
+    assert stopped.value.code == 0
+
+
+def test_the_command_names_a_bad_robot_file(
+    walked: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_bag(walked, tmp_path / 'bag')
+    assert main([str(tmp_path), '--robot', str(tmp_path / 'no.yaml')]) == BAD_INPUT
+    assert 'no.yaml' in capsys.readouterr().err
+
+
+def test_the_command_fills_the_runs_folder_and_keeps_its_manifest(
+    walked: Recording, tmp_path: Path
+) -> None:
+    write_bag(walked, tmp_path / 'bag')
+    parameters = {'canonical_oscillators': {'gait': 'trot'}, 'robot': {'robot': 'mini_quadruped'}}
+    first = analyze_run(
+        tmp_path,
+        parameters={**parameters, 'x': {'robot': 'robots/mini_quadruped.yaml'}},
+        certificate=CERTIFICATE,
+        lock_step=True,
+        report=False,
+        scenario='a',
+    )
+    assert len(first.manifest['digests']) == 6
+    assert not (tmp_path / 'report.html').exists()
+    assert main([str(tmp_path), '--no-pictures']) == 0
+    for name in ('metrics.json', 'manifest.json', 'report.html', 'figures/footfall.png'):
+        assert (tmp_path / name).is_file()
+    assert json.loads((tmp_path / 'manifest.json').read_text()) == first.manifest
+    metrics = json.loads((tmp_path / 'metrics.json').read_text())
+    assert metrics['certificate'] == CERTIFICATE
+    assert metrics['gait']['name'] == 'trot'
+
+
+def test_a_bare_bag_gets_its_results_beside_it(walked: Recording, tmp_path: Path) -> None:
+    write_bag(walked, tmp_path / 'outing')
+    assert analyze_run(tmp_path / 'outing', report=False).folder == tmp_path / 'outing_analysis'
+    assert (
+        analyze_run(tmp_path / 'outing', report=False, out=tmp_path / 'x').folder == tmp_path / 'x'
+    )
