@@ -124,17 +124,20 @@ def held_out_errors(
 
 
 def reproduction_errors(
-    primitive: DiscretePrimitive, demonstrations: Demonstration | Iterable[Demonstration]
+    primitive: DiscretePrimitive,
+    demonstrations: Demonstration | Iterable[Demonstration],
+    goals: Sequence[ArrayLike] | None = None,
 ) -> Array:
     """Largest distance of reproduced from demonstrated positions, as a fraction of the range.
 
-    The primitive runs from each demonstration's start to its last position with τ to match its
-    duration.
+    The primitive runs from each demonstration's start to its goal with τ to match its duration.
 
     Parameters
     ----------
     primitive : DiscretePrimitive
     demonstrations : Demonstration or iterable of Demonstration
+    goals : sequence of array_like (n,), optional
+        Goal of each demonstration; its last position without.
 
     Returns
     -------
@@ -143,10 +146,10 @@ def reproduction_errors(
     """
     movements = as_demonstrations(demonstrations)
     worst = np.zeros(primitive.dofs)
-    for movement in movements:
+    for movement, goal in zip(movements, _goals(movements, goals), strict=True):
         tau = movement.duration / primitive.duration
-        state = primitive.initial_state(movement.positions[0], None, movement.positions[-1], tau)
-        made = primitive.rollout(movement.times, DiscreteInput(movement.positions[-1], tau), state)
+        state = primitive.initial_state(movement.positions[0], None, goal, tau)
+        made = primitive.rollout(movement.times, DiscreteInput(goal, tau), state)
         worst = np.maximum(worst, np.abs(made.positions - movement.positions).max(axis=0))
     return worst / ranges(movements)
 
@@ -162,13 +165,15 @@ def _task(
     movements, options = as_demonstrations(demonstrations), options or FitOptions()
     if options.method != 'response':
         movements = [movement.with_derivatives() for movement in movements]
-    dofs = movements[0].dofs
-    if goals is not None and len(goals) != len(movements):
-        raise ParameterError(f'{len(goals)} goals do not match {len(movements)} demonstrations')
-    ends = [
-        m.positions[-1] if goals is None else vector(goals[i], dofs, 'goal')
-        for i, m in enumerate(movements)
-    ]
     duration = float(np.mean([movement.duration for movement in movements]))
-    spring = chosen_gains(duration, stiffness, damping, dofs, form)
-    return DiscreteTask(movements, ends, spring, duration, options)
+    spring = chosen_gains(duration, stiffness, damping, movements[0].dofs, form)
+    return DiscreteTask(movements, _goals(movements, goals), spring, duration, options)
+
+
+def _goals(movements: list[Demonstration], goals: Sequence[ArrayLike] | None) -> list[Array]:
+    """The given goals, checked, or the last positions."""
+    if goals is None:
+        return [movement.positions[-1] for movement in movements]
+    if len(goals) != len(movements):
+        raise ParameterError(f'{len(goals)} goals do not match {len(movements)} demonstrations')
+    return [vector(goal, movements[0].dofs, 'goal') for goal in goals]

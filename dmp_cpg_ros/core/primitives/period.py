@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -13,8 +15,7 @@ from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 Array = NDArray[np.float64]
 
 _HARMONICS = 8
-_COARSE_SAMPLES = 600
-_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+_COARSE_SAMPLES = 500
 
 
 def find_period(
@@ -57,9 +58,10 @@ def find_period(
         raise DataError(
             f'periods from {1.0 / high:g} s to {1.0 / low:g} s: there is none to look for'
         )
-    thin = slice(None, None, max(1, len(times) // _COARSE_SAMPLES))
+    whole = _Fit(times, values, 0.45 * (len(times) - 1) / span)
+    some = _some(whole)
     coarse = {
-        f: _best_nearby(times[thin], values[thin], f, 0.6 / span, low, high)
+        f: some.best_nearby(f, 0.6 / span, low, high)
         for f in _candidates(times, values, low, high)
     }
     if not coarse:
@@ -67,11 +69,8 @@ def find_period(
             f'no period between {1.0 / high:g} s and {1.0 / low:g} s shows in the demonstration'
         )
     least = min(error for _, error in coarse.values())
-    refined = [
-        _refined(times, values, f, 0.06 / span)
-        for f, error in coarse.values()
-        if error < 3.0 * least + 0.01
-    ]
+    plausible = [f for f, error in coarse.values() if error < 3.0 * least + 0.01]
+    refined = [whole.refined(f, 0.06 / span) for f in plausible]
     least = min(error for _, error in refined)
     if least > 0.5:
         raise DataError(
@@ -153,42 +152,54 @@ def _candidates(times: Array, values: Array, low: float, high: float) -> list[fl
     return found
 
 
+def _some(fit: _Fit) -> _Fit:
+    """So few samples that the search is quick, drawn at random lest frequencies fold."""
+    if len(fit.times) <= _COARSE_SAMPLES:
+        return fit
+    drawn = np.random.default_rng(0).choice(len(fit.times), _COARSE_SAMPLES, replace=False)
+    drawn.sort()
+    return _Fit(fit.times[drawn], fit.values[drawn], fit.highest)
+
+
 def _design(times: Array, frequency: float, harmonics: int) -> Array:
-    angles = 2.0 * np.pi * frequency * np.outer(times, np.arange(1, harmonics + 1))
-    return np.hstack([np.ones((len(times), 1)), np.cos(angles), np.sin(angles)])
+    """Columns 1, cos(m ω t), sin(m ω t), (samples, 2 harmonics + 1)."""
+    turn = np.exp(2j * np.pi * frequency * times)[:, None]
+    waves = np.cumprod(np.broadcast_to(turn, (len(times), harmonics)), axis=1)
+    return np.hstack([np.ones((len(times), 1)), waves.real, waves.imag])
 
 
-def _unexplained(times: Array, values: Array, frequency: float) -> float:
-    """Share of the variance that a Fourier series of this frequency leaves."""
-    nyquist = 0.45 * (len(times) - 1) / times[-1]
-    harmonics = int(max(1, min(_HARMONICS, nyquist // frequency, (len(times) - 1) // 4)))
-    q = np.linalg.qr(_design(times, frequency, harmonics))[0]
-    rest = values - q @ (q.T @ values)
-    return float(np.sum(rest**2) / np.sum(values**2))
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Samples to which Fourier series are fitted, and the highest frequency that they show."""
 
+    times: Array
+    values: Array
+    highest: float
 
-def _best_nearby(
-    times: Array, values: Array, frequency: float, reach: float, low: float, high: float
-) -> tuple[float, float]:
-    grid = np.linspace(max(low, frequency - reach), min(high, frequency + reach), 21)
-    errors = [_unexplained(times, values, float(f)) for f in grid]
-    best = int(np.argmin(errors))
-    return float(grid[best]), errors[best]
+    def unexplained(self, frequency: float) -> float:
+        """Share of the variance that a Fourier series of this frequency leaves."""
+        most = (len(self.times) - 1) // 4
+        harmonics = int(max(1, min(_HARMONICS, self.highest // frequency, most)))
+        design = _design(self.times, frequency, harmonics)
+        gram = design.T @ design + 1e-10 * len(design) * np.eye(design.shape[1])
+        projected = design.T @ self.values
+        rest = self.values - design @ np.linalg.solve(gram, projected)
+        return float(np.sum(rest**2) / np.sum(self.values**2))
 
+    def best_nearby(
+        self, frequency: float, reach: float, low: float, high: float
+    ) -> tuple[float, float]:
+        """Best of a grid of frequencies, and what it leaves unexplained."""
+        grid = np.linspace(max(low, frequency - reach), min(high, frequency + reach), 21)
+        errors = [self.unexplained(float(f)) for f in grid]
+        best = int(np.argmin(errors))
+        return float(grid[best]), errors[best]
 
-def _refined(times: Array, values: Array, frequency: float, reach: float) -> tuple[float, float]:
-    """Golden-section search for the frequency of the best fit within the reach on both sides."""
-    left, right = frequency - reach, frequency + reach
-    inner = [right - _GOLDEN * (right - left), left + _GOLDEN * (right - left)]
-    errors = [_unexplained(times, values, f) for f in inner]
-    while right - left > 1e-9 * frequency:
-        if errors[0] < errors[1]:
-            right, inner[1], errors[1] = inner[1], inner[0], errors[0]
-            inner[0] = right - _GOLDEN * (right - left)
-            errors[0] = _unexplained(times, values, inner[0])
-        else:
-            left, inner[0], errors[0] = inner[0], inner[1], errors[1]
-            inner[1] = left + _GOLDEN * (right - left)
-            errors[1] = _unexplained(times, values, inner[1])
-    best = int(np.argmin(errors))
-    return inner[best], errors[best]
+    def refined(self, frequency: float, reach: float) -> tuple[float, float]:
+        """Frequency of the best fit, by parabolas through three frequencies ever closer."""
+        for width in reach * 0.3 ** np.arange(8):
+            low, middle, high = (self.unexplained(frequency + s * width) for s in (-1, 0, 1))
+            bend = low - 2.0 * middle + high
+            shift = 0.5 * (low - high) / bend if bend > 0.0 else float(np.sign(low - high))
+            frequency += width * min(max(shift, -1.0), 1.0)
+        return frequency, self.unexplained(frequency)

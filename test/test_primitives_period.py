@@ -1,0 +1,84 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The period of a recording: whole or broken cycles, weak fundamentals, noise, uneven sampling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.core.primitives.demonstrations import minimum_jerk, walking_joints
+from dmp_cpg_ros.core.primitives.period import find_period, fourier_series, phase_lead
+
+SHAPES = {
+    'sine': lambda u: np.sin(u),
+    'weak fundamental': lambda u: 0.1 * np.sin(u) + np.sin(2.0 * u + 1.0),
+    'third harmonic': lambda u: 0.2 * np.sin(u) + np.sin(3.0 * u),
+    'pulses': lambda u: np.exp(4.0 * np.cos(u)),
+    'triangle': lambda u: np.arcsin(np.sin(u)),
+}
+
+
+@settings(max_examples=25)
+@given(
+    st.sampled_from(sorted(SHAPES)),
+    st.floats(1.7, 20.0),
+    st.floats(0.05, 30.0),
+    st.floats(0.0, 6.0),
+)
+def test_the_period_is_found(shape, cycles, period, phase):
+    times = np.linspace(0.0, cycles * period, max(120, int(40 * cycles)))
+    found = find_period(Demonstration(times, SHAPES[shape](2.0 * np.pi * times / period + phase)))
+    assert found == pytest.approx(period, rel=2e-3)
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_noise_blurs_the_period_only_a_little(seed):
+    assert find_period(walking_joints(0.5, 8.4, noise=0.05, seed=seed)) == pytest.approx(
+        0.5, rel=2e-3
+    )
+
+
+def test_uneven_sampling_does_not_matter():
+    times = np.sort(np.random.default_rng(0).uniform(0.0, 5.0, 400))
+    found = find_period(Demonstration(times, SHAPES['pulses'](2.0 * np.pi * times / 0.7)))
+    assert found == pytest.approx(0.7, rel=1e-3)
+
+
+def test_degrees_of_freedom_vote_together():
+    times = np.linspace(0.0, 6.0, 600)
+    twice = np.sin(4.0 * np.pi * times)
+    assert find_period(Demonstration(times, twice)) == pytest.approx(0.5, rel=1e-4)
+    both = np.stack([twice, 0.01 * np.sin(2.0 * np.pi * times), np.full(600, 3.0)], axis=1)
+    assert find_period(Demonstration(times, both)) == pytest.approx(1.0, rel=1e-4)
+
+
+def test_what_has_no_period_is_refused():
+    times = np.linspace(0.0, 1.0, 100)
+    with pytest.raises(DataError, match='nothing moves'):
+        find_period(Demonstration(times, np.ones(100)))
+    with pytest.raises(DataError, match='half of the variance'):
+        find_period(Demonstration(times, np.random.default_rng(0).normal(size=100)))
+    with pytest.raises(DataError, match='none to look for'):
+        find_period(minimum_jerk([0.0], [1.0]), shortest=2.0, longest=1.0)
+
+
+@given(st.floats(-3.1, 3.1), st.integers(0, 99))
+def test_phase_lead_is_the_shift(shift, seed):
+    rng = np.random.default_rng(seed)
+    reference = (rng.normal(size=(6, 2)) + 1j * rng.normal(size=(6, 2))) / np.arange(1, 7)[:, None]
+    shifted = reference * np.exp(1j * shift * np.arange(6))[:, None]
+    assert np.angle(np.exp(1j * (phase_lead(reference, shifted) - shift))) == pytest.approx(
+        0.0, abs=1e-6
+    )
+
+
+def test_fourier_series_needs_no_whole_cycles():
+    times = np.linspace(0.0, 1.37, 300)
+    values = 2.0 + 3.0 * np.cos(4.0 * times) - np.sin(8.0 * times)
+    series = fourier_series(times, values[:, None], 4.0, 3)[:, 0]
+    np.testing.assert_allclose(series, [2.0, 3.0, 1j, 0.0], atol=1e-8)
