@@ -1,0 +1,156 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Balance: forces inside their limits, wrenches met where the limits allow, torques bounded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_examples import GAITS, GRAVITY, TICK, network, quadruped, standing_state
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.core.force_distribution import distribute
+from dmp_cpg_ros.core.leg_kinematics import LegKinematics
+from dmp_cpg_ros.core.leg_primitive import nominal_foothold
+from dmp_cpg_ros.core.posture import PostureController, PostureParameters, level_from_base
+
+ROBOT = quadruped()
+FEET = np.array([nominal_foothold(ROBOT, leg.name) for leg in ROBOT.legs])
+WEIGHT = ROBOT.mass * GRAVITY
+LARGEST = 2.0 * WEIGHT
+
+wrenches = st.tuples(*[st.floats(-300.0, 300.0)] * 3, *[st.floats(-80.0, 80.0)] * 3).map(np.array)
+loads = st.lists(st.sampled_from([0.0, 0.3, 1.0]), min_size=4, max_size=4).map(np.array)
+
+
+def wrench_of(forces: np.ndarray, feet: np.ndarray) -> np.ndarray:
+    return np.concatenate([forces.sum(axis=0), np.cross(feet, forces).sum(axis=0)])
+
+
+@given(wrench=wrenches, load=loads, friction=st.floats(0.05, 1.5), seed=st.integers(0, 100))
+def test_forces_stay_in_their_cones(
+        wrench: np.ndarray, load: np.ndarray, friction: float, seed: int) -> None:
+    feet = FEET + np.random.default_rng(seed).normal(scale=0.05, size=(4, 3))
+    forces = distribute(wrench, feet, load, friction, LARGEST)
+    assert np.all(np.isfinite(forces))
+    assert np.all(forces[:, 2] >= 0.0) and np.all(forces[:, 2] <= LARGEST * load + 1e-9)
+    assert np.all(np.hypot(*forces[:, :2].T) <= friction * forces[:, 2] + 1e-9)
+
+
+@given(push=st.tuples(*[st.floats(-5.0, 5.0)] * 2), moment=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
+       lift=st.floats(0.8, 1.3), swinging=st.sampled_from([None, 0, 1, 2, 3]))
+def test_a_wrench_within_the_limits_is_met(
+        push: tuple[float, ...], moment: tuple[float, ...], lift: float,
+        swinging: int | None) -> None:
+    load, wrench = np.ones(4), np.array([*push, lift * WEIGHT, *moment])
+    if swinging is not None:
+        load[swinging] = 0.0
+        # three feet carry what is above their triangle
+        support = FEET[load > 0.0].mean(axis=0)
+        wrench[3:5] += lift * WEIGHT * np.array([support[1], -support[0]])
+    forces = distribute(wrench, FEET, load, 2.0, LARGEST)
+    scale = np.array([WEIGHT] * 3 + [0.2 * WEIGHT] * 3)
+    assert np.all(np.abs(wrench_of(forces, FEET) - wrench) < 0.01 * scale)
+    assert swinging is None or not forces[swinging].any()
+
+
+def test_without_load_there_are_no_forces() -> None:
+    wrench = np.array([0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0])
+    forces = distribute(wrench, FEET, np.zeros(4), 0.6, LARGEST)
+    assert not forces.any()
+
+
+def controller(gait: str = 'amble', **changes: object) -> PostureController:
+    return PostureController(ROBOT, GAITS[gait], PostureParameters(**changes))  # type: ignore[arg-type]
+
+
+def forces_of(torque: np.ndarray) -> np.ndarray:
+    """Forces of the ground on the feet that torques balance."""
+    q = standing_state(ROBOT).joint_position.reshape(4, 3)
+    return np.array([-np.linalg.solve(LegKinematics(leg).jacobian_in_base(a).T, t)
+                     for leg, a, t in zip(ROBOT.legs, q, torque.reshape(4, 3), strict=True)])
+
+
+@pytest.mark.parametrize('gait', GAITS)
+def test_standing_still_the_feet_carry_the_weight_and_nothing_else(gait: str) -> None:
+    of, x = controller(gait), network(gait).locked_state()
+    _, feedback = of.step(
+        of.initial_state(), standing_state(ROBOT), x, 0.0 * x, np.zeros(3), TICK)
+    wrench = wrench_of(forces_of(feedback.torque), FEET)
+    assert np.allclose(wrench, [0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0], atol=0.01 * WEIGHT)
+    assert not feedback.shift_in_base.any() and not feedback.correction.any()
+
+
+@pytest.mark.parametrize(('change', 'component', 'sign'), [
+    ({'base_velocity_in_base': np.array([0.2, 0.0, 0.0])}, 0, -1.0),
+    ({'base_velocity_in_base': np.array([0.0, -0.2, 0.0])}, 1, 1.0),
+    ({'base_velocity_in_base': np.array([0.0, 0.0, 0.2])}, 2, -1.0),
+    ({'base_rate_in_base': np.array([0.5, 0.0, 0.0])}, 3, -1.0),
+    ({'base_rate_in_base': np.array([0.0, 0.5, 0.0])}, 4, -1.0),
+    ({'base_rate_in_base': np.array([0.0, 0.0, 0.5])}, 5, -1.0),
+    ({'base_quaternion': np.array([0.05, 0.0, 0.0, 1.0]) / np.hypot(0.05, 1.0)}, 3, -1.0),
+    ({'base_quaternion': np.array([0.0, 0.05, 0.0, 1.0]) / np.hypot(0.05, 1.0)}, 4, -1.0),
+])
+def test_errors_are_answered_by_the_opposite_wrench(
+        change: dict[str, np.ndarray], component: int, sign: float) -> None:
+    of, x = controller(), network().locked_state()
+    at_rest = wrench_of(forces_of(of.step(
+        of.initial_state(), standing_state(ROBOT), x, 0.0 * x, np.zeros(3), TICK)[1].torque), FEET)
+    state = standing_state(ROBOT, **change)
+    feedback = of.step(of.initial_state(), state, x, 0.0 * x, np.zeros(3), TICK)[1]
+    R = level_from_base(state.base_quaternion)
+    wrench = wrench_of(forces_of(feedback.torque) @ R.T, FEET @ R.T)
+    assert sign * (wrench - at_rest)[component] > 0.1
+
+
+@given(seed=st.integers(0, 10_000), size=st.floats(0.0, 20.0), gait=st.sampled_from(list(GAITS)))
+def test_torques_and_shifts_are_finite_and_within_limits_in_any_state(
+        seed: int, size: float, gait: str) -> None:
+    rng, of = np.random.default_rng(seed), controller(gait)
+    quaternion = rng.normal(size=4)
+    state = standing_state(
+        ROBOT, joint_position=rng.uniform(-3.0, 3.0, 12),
+        base_rate_in_base=size * rng.normal(size=3),
+        base_velocity_in_base=size * rng.normal(size=3),
+        base_quaternion=quaternion / np.linalg.norm(quaternion))
+    x, x_dot = rng.normal(size=(4, 2)), 20.0 * rng.normal(size=(4, 2))
+    memory = of.initial_state()
+    for _ in range(3):
+        memory, feedback = of.step(memory, state, x, x_dot, rng.normal(size=3), TICK)
+    limit = np.concatenate([leg.torque_limit for leg in ROBOT.legs])
+    p = of.parameters
+    assert np.all(np.abs(feedback.torque) <= limit)
+    assert np.all(np.hypot(*feedback.shift_in_base.T) <= p.placement_limit + 1e-9)
+    assert np.all(np.isfinite(feedback.correction))
+    assert abs(feedback.correction[2]) <= p.heading_gain * p.heading_limit + 1e-9
+
+
+@given(seed=st.integers(0, 1000))
+def test_levelling_keeps_the_heading_and_removes_the_tilt(seed: int) -> None:
+    q = np.random.default_rng(seed).normal(size=4)
+    x, y, z, w = q / np.linalg.norm(q)
+    R_world_base = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+    R_level_base = level_from_base(np.array([x, y, z, w]))
+    assert np.allclose(R_level_base @ R_level_base.T, np.eye(3), atol=1e-6)
+    R_world_level = R_world_base @ R_level_base.T
+    assert np.allclose(R_world_level[2], [0.0, 0.0, 1.0], atol=1e-6)
+    forward = R_world_base[:, 0] - [0.0, 0.0, R_world_base[2, 0]]
+    assert np.allclose(np.cross(R_world_level[:, 0], forward), 0.0, atol=1e-6)
+
+
+def test_a_correction_grows_while_walking_and_is_forgotten_at_rest() -> None:
+    of, at = controller(), network()
+    x, r = at.locked_state(), np.array([0.5, 0.0, 0.0])
+    x_dot = at.omega(r) * (x @ np.array([[0.0, -1.0], [1.0, 0.0]]))
+    memory, slow = of.initial_state(), standing_state(ROBOT)
+    for _ in range(500):
+        memory, feedback = of.step(memory, slow, x, x_dot, r, TICK)
+    assert feedback.correction[0] > 0.05
+    assert feedback.correction[0] <= of.parameters.speed_correction_limit * 0.5 + 1e-9
+    for _ in range(500):
+        memory, feedback = of.step(memory, slow, x, 0.0 * x, np.zeros(3), TICK)
+    assert np.abs(feedback.correction).max() < 1e-3

@@ -1,0 +1,256 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Inhibition, the words of a stop and a start, automatic stops, predictions kept to the tick.
+
+The robot only stands: nothing of the body enters the oscillators, the reference or the words.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import groupby
+
+import numpy as np
+import pytest
+from core_examples import GAITS, TICK_NS, quadruped, standing_state, suite_parameters
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait_supervisor import STATE_WORDS
+from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
+from dmp_cpg_ros.core.phase import phase, wrapped
+from dmp_cpg_ros.core.posture import (
+    PostureController,
+    PostureFeedback,
+    PostureParameters,
+    PostureState,
+)
+from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.robot_state import LEGS, JointTargets
+from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
+
+ROBOT = quadruped()
+STANDING = standing_state(ROBOT)
+NO_TARGETS = JointTargets(np.zeros(3), np.zeros(3), np.zeros(3))
+NO_FEEDBACK = PostureFeedback(np.zeros(12), np.zeros((4, 2)), np.zeros(3))
+TICK = TICK_NS * 1e-9
+
+
+class LimblessLoop(WalkingLoop):
+    """A walking loop without legs and balance, of which the rest knows nothing."""
+
+    def _leg(self, *_: object) -> JointTargets:
+        return NO_TARGETS
+
+
+class NoBalance(PostureController):
+    def step(self, memory: PostureState, *_: object) -> tuple[PostureState, PostureFeedback]:
+        return memory, NO_FEEDBACK
+
+
+class Run:
+    """A walking loop on a robot that stands still, tick by tick."""
+
+    def __init__(self, gait: str = 'amble', **changes: object) -> None:
+        self.loop = LimblessLoop(ROBOT, GAITS[gait], suite_parameters(**changes))
+        self.loop.posture = NoBalance(ROBOT, GAITS[gait], PostureParameters())
+        self.time_ns = 0
+        self.ticks: list[Tick] = []
+
+    def go(self, seconds: float) -> Run:
+        for _ in range(round(seconds / TICK)):
+            self.ticks.append(self.loop.tick(replace(STANDING, time_ns=self.time_ns)))
+            self.time_ns += TICK_NS
+        return self
+
+    def until(self, *words: str, longest: float = 12.0) -> float:
+        """Time until the state is one of the words [s]."""
+        for k in range(1, round(longest / TICK) + 1):
+            self.go(TICK)
+            if self.loop.stop.word in words:
+                return k * TICK
+        raise AssertionError(f'{self.loop.stop.word} for {longest} s')
+
+    def words(self) -> list[str]:
+        return [word for word, _ in groupby(tick.supervisor.word for tick in self.ticks)]
+
+
+def walking(gait: str = 'amble', speed: float = 0.5, seconds: float = 3.0,
+            **changes: object) -> Run:
+    run = Run(gait, **changes).go(2 * TICK)
+    run.loop.command(speed)
+    return run.go(seconds)
+
+
+def test_a_whole_stop_and_start_says_its_words_in_order() -> None:
+    run = walking()
+    assert run.words() == ['at_rest', 'releasing', 'walking']
+    run.loop.request(True)
+    run.ticks.clear()
+    run.go(3.0)
+    assert run.words() == ['waiting', 'captured', 'at_rest']
+    run.loop.request(False)
+    run.ticks.clear()
+    run.go(2.0)
+    assert run.words() == ['releasing', 'walking']
+    assert set(run.words()) <= set(STATE_WORDS)
+
+
+def test_rest_is_rest() -> None:
+    run = walking()
+    run.loop.request(True)
+    run.until('at_rest')
+    tick = run.ticks[-1]
+    assert np.abs(tick.x_dot).max() < 0.06
+    assert run.loop.network.scale.foot_speed(*tick.r) <= 0.01
+    measured = run.loop.stop.measured_s
+    run.go(1.0)
+    assert run.loop.stop.word == 'at_rest' and run.loop.stop.measured_s == measured
+
+
+def test_while_stopping_the_reference_is_zero_and_after_it_is_the_command() -> None:
+    run = walking()
+    run.loop.request(True)
+    run.go(3.0)
+    assert np.abs(run.ticks[-1].r).max() < 1e-3
+    run.loop.request(False)
+    run.go(3.0)
+    assert run.ticks[-1].r[0] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_inhibition_is_armed_only_when_the_reference_is_slow() -> None:
+    run = walking(speed=0.8)
+    run.loop.request(True)
+    run.ticks.clear()
+    run.go(2.0)
+    speed = [run.loop.network.scale.foot_speed(*tick.r) for tick in run.ticks]
+    armed = [tick.supervisor.armed for tick in run.ticks]
+    first = armed.index(True)
+    assert speed[first] <= 0.1 < speed[first - 1] and all(armed[first:])
+
+
+def test_a_start_in_the_middle_of_a_stop_walks_on() -> None:
+    run = walking()
+    run.loop.request(True)
+    run.go(0.5)
+    run.loop.request(False)
+    assert not run.loop.stop.armed
+    run.until('walking', longest=2.0)
+
+
+def test_asking_again_changes_neither_the_time_nor_the_word() -> None:
+    run = walking()
+    run.loop.request(True)
+    run.go(0.4)
+    before = run.loop.stop
+    run.loop.request(True)
+    assert run.loop.stop == before
+
+
+def test_a_zero_command_stops_after_the_delay_and_a_command_resumes() -> None:
+    run = walking(inhibition=InhibitionParameters(auto_delay=0.5))
+    run.loop.command(0.0)
+    run.go(0.4)
+    assert not run.loop.stop.requested
+    run.go(0.2)
+    assert run.loop.stop.requested and run.loop.stop.automatic
+    run.until('at_rest')
+    run.loop.command(0.3)
+    run.go(2 * TICK)
+    assert not run.loop.stop.requested
+    run.until('walking')
+
+
+def test_silence_of_the_command_leads_to_the_same_stop() -> None:
+    run = walking(reference=ReferenceParameters(cmd_vel_timeout=0.5), seconds=TICK,
+                  inhibition=InhibitionParameters(auto_delay=0.5))
+    run.go(1.1)
+    assert run.loop.stop.requested
+    run.until('at_rest')
+
+
+def test_without_auto_inhibit_a_zero_command_trots_on_the_spot() -> None:
+    run = Run('trot', inhibition=InhibitionParameters(auto_inhibit=False, start_inhibited=False))
+    run.go(4.0)
+    assert not run.loop.stop.requested and run.loop.stop.word == 'free'
+    assert np.abs(run.ticks[-1].x_dot).max() > 1.0
+
+
+def test_a_stop_by_service_is_not_undone_by_commands() -> None:
+    run = walking()
+    run.loop.request(True)
+    run.until('at_rest')
+    run.loop.command(0.8)
+    run.go(2.0)
+    assert run.loop.stop.word == 'at_rest'
+
+
+def test_a_service_call_makes_an_automatic_stop_its_own() -> None:
+    run = walking(inhibition=InhibitionParameters(auto_delay=0.2))
+    run.loop.command(0.0)
+    run.go(0.5)
+    run.loop.request(True)
+    run.loop.command(0.5)
+    run.go(3.0)
+    assert run.loop.stop.word == 'at_rest'
+
+
+@pytest.mark.parametrize('leg', LEGS)
+def test_any_one_leg_can_be_the_inhibited_one(leg: str) -> None:
+    run = walking(inhibition=InhibitionParameters(inhibited_legs=(leg,)))
+    predicted = run.loop.request(True)
+    assert run.until('at_rest') == pytest.approx(predicted, abs=1e-9)
+    rest = run.ticks[-1].x
+    run.loop.request(False)
+    run.until('walking')
+    # every leg rests ahead of its place, by what the one that is held must bear and the others lag
+    network, p = run.loop.network, run.loop.parameters
+    omega = network.omega(np.zeros(3))
+    most = 4.0 * omega / p.inhibition.inhibition_gain + omega / p.canonical.coupling_gain
+    ahead = wrapped(phase(rest) - network.gait.phases)
+    assert np.all((ahead > 0.0) & (ahead < 1.05 * most))
+
+
+@given(gait=st.sampled_from(list(GAITS)), speed=st.floats(0.1, 1.0), later=st.floats(0.0, 0.8),
+       turn=st.floats(-0.5, 0.5))
+@settings(max_examples=12)
+def test_predictions_are_kept_to_the_tick(
+        gait: str, speed: float, later: float, turn: float) -> None:
+    run = walking(gait, speed, 1.5 + later)
+    run.loop.command(speed, 0.0, turn)
+    run.go(0.3)
+    predicted = run.loop.request(True)
+    assert run.until('at_rest') == pytest.approx(predicted, abs=1e-9)
+    assert run.loop.stop.measured_s == pytest.approx(predicted, abs=1e-9)
+    predicted = run.loop.request(False)
+    assert run.until('walking', 'free') == pytest.approx(predicted, abs=1e-9)
+    assert run.loop.stop.measured_s == pytest.approx(predicted, abs=1e-9)
+
+
+def test_a_stop_that_never_comes_is_predicted_as_such() -> None:
+    run = walking(inhibition=InhibitionParameters(inhibition_gain=20.0))
+    assert run.loop.request(True) == np.inf
+
+
+@given(x=st.lists(st.floats(-2.0, 2.0), min_size=4, max_size=4), radius=st.floats(0.1, 1.0))
+def test_inhibition_acts_inside_its_region_only(x: list[float], radius: float) -> None:
+    states, target = np.reshape(x, (2, 2)), np.array([[1.0, 0.0], [0.0, 1.0]])
+    acting = Inhibition(True, np.array([3.0, 5.0]), radius).acting_gains(states, target)
+    inside = np.hypot(*(states - target).T) <= radius
+    clear = np.abs(np.hypot(*(states - target).T) - radius) > 1e-12
+    assert np.array_equal(acting[clear], np.where(inside, [3.0, 5.0], 0.0)[clear])
+
+
+def test_armed_gains_are_those_of_the_inhibited_legs() -> None:
+    p = InhibitionParameters(inhibition_gain=7.0, inhibited_legs=('fr', 'rr'))
+    assert np.array_equal(p.armed_gains, [0.0, 7.0, 0.0, 7.0])
+    assert np.array_equal(initial_inhibition(p).gains, p.armed_gains)
+    free = initial_inhibition(InhibitionParameters(start_inhibited=False))
+    assert not free.requested and not free.gains.any()
+
+
+@pytest.mark.parametrize('legs', [(), ('fl', 'fl'), ('fl', 'tail')])
+def test_impossible_choices_of_legs_are_refused(legs: tuple[str, ...]) -> None:
+    with pytest.raises(ParameterError, match='fl, fr, rl, rr'):
+        InhibitionParameters(inhibited_legs=legs)
