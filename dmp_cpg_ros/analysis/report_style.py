@@ -29,7 +29,7 @@ table { border-collapse: collapse; width: 100%; font-size: 0.93em; }
 th, td { text-align: left; padding: 7px 12px; vertical-align: top;
   border-bottom: 1px solid var(--line); }
 tr:last-child > td { border-bottom: 0; }
-thead th { color: var(--soft); font-weight: 600; white-space: nowrap; }
+thead th { color: var(--soft); font-weight: 600; vertical-align: bottom; }
 tbody tr:nth-child(even) { background: var(--zebra); }
 th.number, td.number { text-align: right; }
 td.number { font-variant-numeric: tabular-nums; white-space: nowrap; }

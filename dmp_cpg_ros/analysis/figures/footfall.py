@@ -21,8 +21,8 @@ from dmp_cpg_ros.core.robot_state import LEGS
 
 CAPTION = (
     'Bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles of '
-    'steady walking. Bottom: the first stop, at whose end all four feet stand, and the start '
-    'after it.'
+    'steady walking. Bottom: the first stop and the start after it; at rest all four bars should '
+    'be unbroken.'
 )
 
 CYCLES = 6

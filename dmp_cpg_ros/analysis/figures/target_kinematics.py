@@ -13,7 +13,8 @@ from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS
 
 CAPTION = (
     'Targets of the hips and the knees across a stop by sparse inhibition and the start after it. '
-    'One oscillator is inhibited; the targets of all legs come to rest without a kick, and resume.'
+    'One oscillator is inhibited; the targets of all legs should come to rest and resume without '
+    'a kick.'
 )
 
 
