@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -59,6 +60,7 @@ class BagRecorder(ManagedNode):
         self._subscriptions_drained_at_end = [
             self._record(self._offered(topic, parameters)) for topic in TOPICS
             if ALL in parameters.topics or topic.name in parameters.topics]
+        self.serve('~/recorded', self._answer_recorded)
         self._started = time.monotonic()
         # The wall clock drives only how much a kill may cost.
         self._flush_timer: Timer = self.create_timer(parameters.flush_period, self._bag.flush,
@@ -87,6 +89,10 @@ class BagRecorder(ManagedNode):
         values |= {'messages': sum(self._bag.counts.values()), 'messages_on_disk': self._bag.flushed,
                    'wall_s': time.monotonic() - self._started}
         return values
+
+    def _answer_recorded(self, request: Any, response: Any) -> Any:
+        response.success, response.message = self.active, json.dumps(dict(self._bag.counts))
+        return response
 
     def _offered(self, topic: Interface, parameters: RecorderParameters) -> Interface:
         return STAMPED_CMD_VEL if parameters.stamped_cmd_vel and topic.name == 'cmd_vel' else topic

@@ -69,7 +69,7 @@ class Interface:
         Kinds of nodes that write and read it; of a service: that serve and call it. The recorder reads every
         topic and is named nowhere; ``user`` stands for whoever is outside the suite.
     sometimes : tuple of str
-        Of the subscribers: those that read it with some parameters only.
+        Of both: those that write or read it with some parameters only.
     latched : bool
         Whether a late reader gets the last message (transient local, depth 1).
     service : bool
@@ -137,7 +137,7 @@ TOPICS: tuple[Interface, ...] = (
               ('reference_filter', 'canonical_oscillators'), latched=True),
     Interface('/diagnostics', DiagnosticArray, 'health of every node', SUITE, ()),
     Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds', (GATE_OWNER,), ('user',),
-              latched=True),
+              latched=True, sometimes=(GATE_OWNER,)),
     Interface(f'{GATE_OWNER}/advance_until', Clock, 'stamp up to which the gate lets ticks pass', ('user',),
               (GATE_OWNER,)),
 )
@@ -147,6 +147,10 @@ SERVICES: tuple[Interface, ...] = (
     Interface('inhibit', SetBool, 'true stops the gait, false resumes it', ('inhibition',), ('user',), service=True),
     Interface('~/ready', Trigger, 'whether the node is active and connected with its neighbours', SUITE, ('user',),
               service=True),
+    Interface('~/commands_taken', Trigger, 'how many messages on cmd_vel the node has taken',
+              ('reference_filter', 'inhibition'), ('user',), service=True),
+    Interface('~/recorded', Trigger, 'how many messages of each topic are in the bag, as JSON', ('bag_recorder',),
+              ('user',), service=True),
 )
 """Services of the suite."""
 
@@ -184,10 +188,10 @@ def served_by(kind: str) -> tuple[Interface, ...]:
     return tuple(service for service in SERVICES if kind in service.publishers)
 
 
-def readers_of(topic: Interface) -> tuple[str, ...]:
-    """Kinds of nodes of the suite that always read a topic, the recorder included."""
-    always = (kind for kind in topic.subscribers if kind in SUITE and kind not in topic.sometimes)
-    return (*always, 'bag_recorder')
+def partners(topic: Interface, *, readers: bool) -> tuple[str, ...]:
+    """Kinds of nodes of the suite that always read (the recorder included) or always write a topic."""
+    kinds = (*topic.subscribers, 'bag_recorder') if readers else topic.publishers
+    return tuple(kind for kind in kinds if kind in SUITE and kind not in topic.sometimes)
 
 
 STAMPED_CMD_VEL = replace(INTERFACES['cmd_vel'], type=TwistStamped)

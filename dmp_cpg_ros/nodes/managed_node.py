@@ -24,7 +24,7 @@ from rclpy.subscription import Subscription
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.nodes.diagnostics import NodeHealth
-from dmp_cpg_ros.nodes.interfaces import Interface, interface, readers_of
+from dmp_cpg_ros.nodes.interfaces import Interface, interface, partners
 from dmp_cpg_ros.nodes.readiness import missing_connections
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters, ParameterTable, declare, plain
 from dmp_cpg_ros.nodes.tick_inputs import TickInputs, drain
@@ -71,6 +71,7 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]
         self._configured = False
         self._entities: list[Publisher | Subscription | Service] = []
         self._commands: list[Subscription] = []
+        self._commands_taken = 0
         self._outputs: list[tuple[Interface, Publisher]] = []
         self._inputs: list[tuple[Interface, Subscription]] = []
         self._table = self.parameter_table()
@@ -112,7 +113,7 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]
 
     def readers(self, topic: Interface) -> tuple[str, ...]:
         """Kinds of nodes that read one of this node's topics, for :meth:`missing`."""
-        return readers_of(topic)
+        return partners(topic, readers=True)
 
     # For nodes -----------------------------------------------------------------------------------------------
 
@@ -159,11 +160,14 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]
             Default: the profile of the interface for the suite's nodes.
         """
         topic = topic if isinstance(topic, Interface) else interface(topic)
-        subscription = self.create_subscription(topic.type, topic.name, self._guarded(topic, callback),
+        receive = self._guarded(topic, callback)
+        subscription = self.create_subscription(topic.type, topic.name, self._counted(receive) if command else receive,
                                                 qos or topic.reader_qos, raw=raw)
         self._entities.append(subscription)
         self._inputs.append((topic, subscription))
         if command:
+            if not self._commands:
+                self.serve('~/commands_taken', self._answer_commands_taken)
             self._commands.append(subscription)
         return subscription
 
@@ -312,6 +316,17 @@ class ManagedNode(LifecycleNode):  # type: ignore[misc]
                     raise
 
         return receive
+
+    def _counted(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        def receive(message: Any) -> None:
+            callback(message)
+            self._commands_taken += 1
+
+        return receive
+
+    def _answer_commands_taken(self, request: Any, response: Any) -> Any:
+        response.success, response.message = True, str(self._commands_taken)
+        return response
 
     def _reject(self, topic: str, error: DataError) -> None:
         if self.health.reject(topic, str(error)):

@@ -47,29 +47,29 @@ class MujocoRobotNode(ManagedNode):
 
     def configure(self) -> None:
         """Stand the robot up and create its topics."""
-        self._parameters = self.parameters_of(RobotParameters)
+        self._options = self.parameters_of(RobotParameters)
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._tick_ns = self.parameters_of(TickParameters).tick_ns
         self._robot = self._make_robot()
         stand = home_joint_position(self._robot.description)
-        self._guard = TargetGuard(stand, round(self._parameters.target_timeout * 1e9))
+        self._guard = TargetGuard(stand, round(self._options.target_timeout * 1e9))
         self._timing, self._writer, self._reader = RobotTiming(), RobotStateWriter(), JointTargetsReader()
         self._state: RobotState = self._robot.reset()
         self._fell, self._holding, self._open_until = False, True, -1
-        self._publishers = [self.publisher(name) for name in STATE_TOPICS]
+        self._state_publishers = [self.publisher(name) for name in STATE_TOPICS]
         self.listen('joint_targets', self._on_targets)
-        if self._parameters.gated:
+        if self._options.gated:
             self._held = self.publisher(f'{self.KIND}/holding_at')
             self.listen(f'{self.KIND}/advance_until', self._on_advance)
         self._viewer: Any = None
-        if self._parameters.viewer and self._parameters.physics == 'mujoco':
+        if self._options.viewer and self._options.physics == 'mujoco':
             from dmp_cpg_ros.robot.camera import open_viewer
             self._viewer = open_viewer(self._robot.model, self._robot.data)  # type: ignore[attr-defined]
 
     def activate(self) -> None:
         """Begin with the first tick: at the gate, or as soon as there is somebody to tell."""
         self._timer: Any = None
-        if self._parameters.gated:
+        if self._options.gated:
             self._hold()
         elif self._lock_step:
             self._timer = self.create_timer(READY_PERIOD_S, self._start_when_connected,
@@ -104,7 +104,7 @@ class MujocoRobotNode(ManagedNode):
         writer.fill(self._state)
         messages = (writer.clock, writer.imu, writer.odom, writer.foot_contacts, writer.joint_states)
         self._timing.published(stamp)
-        for publisher, message in zip(self._publishers, messages, strict=True):
+        for publisher, message in zip(self._state_publishers, messages, strict=True):
             publisher.publish(message)
         self.end_tick()
 
@@ -114,7 +114,7 @@ class MujocoRobotNode(ManagedNode):
         targets = self._guard.targets(now, self._state.joint_position)
         silent = self._guard.silent(now)
         if silent and any(self._guard.stamps):
-            self.warn('silent', f"no targets from {', '.join(silent)} for {self._parameters.target_timeout} s: "
+            self.warn('silent', f"no targets from {', '.join(silent)} for {self._options.target_timeout} s: "
                       'the robot holds a stand by itself', error=True)
         elif not silent:
             self.clear('silent')
@@ -144,7 +144,7 @@ class MujocoRobotNode(ManagedNode):
 
     def _hold(self) -> None:
         """Publish the state, or wait at the gate until it may be published."""
-        if not self._parameters.gated or self._open_until >= self._state.time_ns:
+        if not self._options.gated or self._open_until >= self._state.time_ns:
             self._publish_state()
             return
         self._holding = True
@@ -176,7 +176,7 @@ class MujocoRobotNode(ManagedNode):
     # Inside --------------------------------------------------------------------------------------------------
 
     def _make_robot(self) -> Robot:
-        p, file = self._parameters, find_config(self.parameters_of(RobotFileParameters).robot)
+        p, file = self._options, find_config(self.parameters_of(RobotFileParameters).robot)
         if p.physics == 'perfect_tracking':
             return PerfectTrackingRobot(load_description(file), self._tick_ns)
         from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot

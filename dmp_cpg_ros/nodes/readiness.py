@@ -17,7 +17,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
 
-from dmp_cpg_ros.nodes.interfaces import INSTANCES, Interface
+from dmp_cpg_ros.nodes.interfaces import INSTANCES, Interface, partners
 
 
 def missing_connections(node: Node, kind: str,
@@ -54,7 +54,7 @@ def missing_connections(node: Node, kind: str,
             missing.append(f'{topic.name} is not matched with all of its {known} readers')
     for topic, subscription in inputs:
         ends = node.get_publishers_info_by_topic(subscription.topic_name)
-        absent = _absent(ends, topic.publishers, kind, expected)
+        absent = _absent(ends, partners(topic, readers=False), kind, expected)
         missing += [f'{topic.name} is not published by {name}' for name in absent]
         known = sum(_compatible(end.qos_profile, subscription.qos_profile) for end in ends)
         if not absent and subscription.get_publisher_count() < known:

@@ -1,0 +1,89 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A group of child processes: started together, watched, ended together, their output kept."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Ended:
+    """A process that has ended.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    status : int
+        Its exit status; negative for a signal.
+    log : Path
+        Its output.
+    """
+
+    name: str
+    status: int
+    log: Path
+
+    def __str__(self) -> str:
+        """Say what happened, with the last line of the output."""
+        how = f'was ended by signal {-self.status}' if self.status < 0 else f'ended with status {self.status}'
+        lines = self.log.read_text(encoding='utf-8', errors='replace').strip().splitlines()
+        return f"{self.name} {how}{': ' + lines[-1] if lines else ''}"
+
+
+class ProcessGroup:
+    """Child processes that run modules of this package.
+
+    Parameters
+    ----------
+    logs : Path
+        Folder for one file of output per process.
+    """
+
+    def __init__(self, logs: Path) -> None:
+        """Start with no process."""
+        logs.mkdir(parents=True, exist_ok=True)
+        self._logs = logs
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, name: str, module: str, arguments: Sequence[str]) -> None:
+        """Run ``python -m module arguments`` in a session of its own, so that Ctrl-C reaches this process only."""
+        environment = {**os.environ, 'PYTHONUNBUFFERED': '1'}
+        with (self._logs / f'{name}.log').open('wb') as log:
+            self._processes[name] = subprocess.Popen(
+                [sys.executable, '-m', module, *arguments], stdin=subprocess.DEVNULL, stdout=log,
+                stderr=subprocess.STDOUT, start_new_session=True, env=environment)
+
+    def ended(self) -> list[Ended]:
+        """Processes that have ended."""
+        return [Ended(name, process.returncode, self._logs / f'{name}.log')
+                for name, process in self._processes.items() if process.poll() is not None]
+
+    def stop(self, patience_s: float = 15.0) -> list[str]:
+        """End all processes: interrupt, and after a time kill.
+
+        Returns
+        -------
+        list of str
+            Names of those that had to be killed.
+        """
+        running = {name: process for name, process in self._processes.items() if process.poll() is None}
+        for process in running.values():
+            process.send_signal(signal.SIGINT)
+        deadline, killed = time.monotonic() + patience_s, []
+        for name, process in running.items():
+            try:
+                process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                killed.append(name)
+                process.kill()
+                process.wait()
+        return killed

@@ -1,0 +1,235 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One run of the suite: processes up, ready, the scenario played, everything down again."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import rclpy
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rclpy.executors import Executor
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from dmp_cpg_ros.commands.processes import ProcessGroup
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.scenario import Scenario
+from dmp_cpg_ros.nodes.executors import make_executor
+from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
+from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
+
+READY_WITHIN_S = 120.0
+"""How long nodes may take to come up and find each other [s]."""
+
+SLICE_S = 0.1
+"""How often processes and Ctrl-C are looked at [s]."""
+
+LAST_WORDS_S = 10.0
+"""How long a node may take to finish its work at the end of a run [s]."""
+
+SETTLED_S = 0.3
+"""Time without a new message after which the recording counts as complete [s]."""
+
+Say = Callable[[float, str], None]
+
+
+class SuiteError(DmpCpgError):
+    """The suite did not come up, or a node died."""
+
+
+class Interrupted(DmpCpgError):
+    """The user pressed Ctrl-C."""
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """What to run.
+
+    Attributes
+    ----------
+    scenario : Scenario
+        What is asked of the robot.
+    tick_ns : int
+        Control tick [ns].
+    parameters : Path
+        Parameter file with every node's parameters.
+    logs : Path
+        Folder for the output of the processes.
+    lock_step, composed : bool
+        How to run.
+    """
+
+    scenario: Scenario
+    tick_ns: int
+    parameters: Path
+    logs: Path
+    lock_step: bool
+    composed: bool
+
+
+def run_suite(plan: RunPlan, say: Say) -> None:
+    """Run the suite from nothing to nothing.
+
+    Parameters
+    ----------
+    plan : RunPlan
+        What to run.
+    say : callable (time_s, text)
+        Told what happens.
+
+    Raises
+    ------
+    SuiteError
+        If nodes do not get ready, or one ends before its time; its last words are in the text.
+    PlayerError
+        If the suite does not take a command.
+    Interrupted
+        On Ctrl-C or SIGTERM; everything is shut down cleanly all the same.
+    """
+    group = ProcessGroup(plan.logs)
+    with _interrupt() as interrupted:
+        os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            _start(plan, group)
+            player = ScenarioPlayer(plan.scenario, plan.tick_ns, plan.lock_step, say)
+            executor = make_executor('events')
+            executor.add_node(player)
+            watch = _Watch(executor, player, group, interrupted)
+            try:
+                watch.until_ready([node.name for node in SUITE_NODES] + [RECORDER.name])
+                player.begin()
+                watch.until(player.finished, float('inf'))
+                player.finished.result()
+            finally:
+                watch.finish_work()
+                executor.remove_node(player)
+                player.destroy_node()
+        finally:
+            killed = group.stop()
+            rclpy.try_shutdown()
+            if killed:
+                say(float('nan'), f"had to kill {', '.join(killed)}")
+
+
+def _start(plan: RunPlan, group: ProcessGroup) -> None:
+    files = ['--ros-args', '--params-file', str(plan.parameters)]
+    if plan.composed:
+        group.start('composed_suite', 'dmp_cpg_ros.commands.composed_suite', files)
+        group.start(RECORDER.name, RECORDER.module, files)
+        return
+    for node in (RECORDER, *SUITE_NODES):
+        group.start(node.name, node.module, [*files, '-r', f'__node:={node.name}'])
+
+
+class _Watch:
+    """Spins the player while it watches the processes and Ctrl-C."""
+
+    def __init__(self, executor: Executor, player: ScenarioPlayer, group: ProcessGroup,
+                 interrupted: list[int]) -> None:
+        self._executor, self._player, self._group, self._interrupted = executor, player, group, interrupted
+
+    def until(self, future: Future, patience_s: float) -> bool:
+        """Spin until a future is done; returns whether it is."""
+        deadline = time.monotonic() + patience_s
+        while not future.done() and time.monotonic() < deadline:
+            self._executor.spin_until_future_complete(future, timeout_sec=SLICE_S)
+            if self._interrupted:
+                raise Interrupted('interrupted')
+            ended = self._group.ended()
+            if ended:
+                raise SuiteError('; '.join(map(str, ended)))
+        return bool(future.done())
+
+    def until_ready(self, names: list[str]) -> None:
+        """Ask every node whether it is active and connected until all say yes."""
+        deadline, waiting = time.monotonic() + READY_WITHIN_S, 'nodes to appear'
+        clients = {name: self._player.create_client(Trigger, f'{name}/ready') for name in names}
+        while clients or not self._player.connected():
+            if time.monotonic() > deadline:
+                raise SuiteError(f'not ready within {READY_WITHIN_S:g} s: {waiting}')
+            for name, client in list(clients.items()):
+                answer = self._ask(client, Trigger.Request())
+                if answer is not None and answer.success:
+                    self._player.destroy_client(clients.pop(name))
+                else:
+                    waiting = f"{name} does not answer" if answer is None else f'{name}: {answer.message}'
+            self.until(Future(), SLICE_S)
+
+    def finish_work(self) -> None:
+        """Stop the robot, let the recorder take all that was said, deactivate everything."""
+        if self._group.ended():
+            return
+        *others, robot = SUITE_NODES
+        try:
+            self._deactivate(robot.name)
+            self._until_recorded()
+            for node in (*others, RECORDER):
+                self._deactivate(node.name)
+        except DmpCpgError:
+            return
+
+    def _deactivate(self, name: str) -> None:
+        client = self._player.create_client(ChangeState, f'{name}/change_state')
+        client.wait_for_service(timeout_sec=LAST_WORDS_S)
+        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
+        self._ask(client, request, LAST_WORDS_S)
+
+    def _until_recorded(self) -> None:
+        """Wait until nothing more arrives at the recorder."""
+        client = self._player.create_client(Trigger, f'{RECORDER.name}/recorded')
+        client.wait_for_service(timeout_sec=LAST_WORDS_S)
+        deadline, before = time.monotonic() + LAST_WORDS_S, None
+        while time.monotonic() < deadline:
+            answer = self._ask(client, Trigger.Request())
+            if answer is not None and answer.message == before:
+                return
+            before = None if answer is None else answer.message
+            self._pause(SETTLED_S)
+
+    def _pause(self, seconds: float) -> None:
+        interrupted, self._interrupted = self._interrupted, []
+        self.until(Future(), seconds)
+        self._interrupted = interrupted
+
+    def _ask(self, client: Any, request: Any, patience_s: float = 2.0) -> Any:
+        """Answer of a service, or None when it is not there or does not answer."""
+        if not client.service_is_ready():
+            return None
+        future = client.call_async(request)
+        interrupted, self._interrupted = self._interrupted, []
+        try:
+            if not self.until(future, patience_s):
+                return None
+            return future.result()
+        finally:
+            self._interrupted = interrupted
+
+
+@contextmanager
+def _interrupt() -> Iterator[list[int]]:
+    """Collect SIGINT and SIGTERM instead of being ended by them."""
+    received: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        received.append(number)
+
+    former = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for number, handler in former.items():
+            signal.signal(number, handler)
+
+

@@ -1,0 +1,197 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Plays a scenario to the running suite: velocity commands and service calls at their ticks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist
+from rclpy.node import Node
+from rclpy.task import Future
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import SetBool, Trigger
+
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.scenario import Action, Command, Scenario
+from dmp_cpg_ros.nodes.conversions import header_ns, read_inhibition_state
+from dmp_cpg_ros.nodes.interfaces import GATE_OWNER, interface
+from dmp_cpg_ros.nodes.message_values import set_stamp, stamp_ns
+
+FAR_NS = 2**31 * 10**9 - 1
+"""A stamp later than every run [ns]."""
+
+
+class PlayerError(DmpCpgError):
+    """The suite did not take a command or a request."""
+
+
+class ScenarioPlayer(Node):  # type: ignore[misc]
+    """Holds the robot's gate and lets a tick pass when everything that is to act in it has been delivered.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What to play.
+    tick_ns : int
+        Control tick [ns].
+    lock_step : bool
+        Whether the gate is held before every tick with an action; in real time it opens once.
+    say : callable (time_s, text)
+        Told what happens.
+
+    Attributes
+    ----------
+    finished : Future
+        Done at the end of the scenario, with an exception when it could not be played.
+    time_ns : int
+        Stamp of the robot's last tick [ns].
+    """
+
+    def __init__(self, scenario: Scenario, tick_ns: int, lock_step: bool, say: Callable[[float, str], None]) -> None:
+        """Create the topics; nothing is sent before :meth:`begin`."""
+        super().__init__('scenario_player')
+        self._actions, self._tick_ns, self._lock_step, self._say = scenario.timeline(tick_ns), tick_ns, lock_step, say
+        self._end_ns = scenario.ticks(tick_ns) * tick_ns
+        self._next, self._begun, self._busy, self._word = 0, False, False, ''
+        self._holding_ns, self._inhibition_ns = -1, -1
+        self.time_ns = 0
+        self.finished = Future()
+        command, gate = interface('cmd_vel'), interface(f'{GATE_OWNER}/advance_until')
+        self._command = self.create_publisher(Twist, command.name, command.publisher_qos)
+        self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
+        self._inhibit = self.create_client(SetBool, interface('inhibit').name)
+        self._takers = [self.create_client(Trigger, f'{node}/commands_taken') for node in command.subscribers]
+        self._sent = 0
+        for name, callback in ((f'{GATE_OWNER}/holding_at', self._on_holding),
+                               ('inhibition_state', self._on_inhibition), ('/clock', self._on_clock)):
+            topic = interface(name)
+            if name != '/clock' or not lock_step:
+                self.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
+
+    def connected(self) -> bool:
+        """Whether the gate, the readers of commands and the service are there."""
+        readers = len(interface('cmd_vel').subscribers)
+        clients = (self._inhibit, *self._takers)
+        return (self._gate.get_subscription_count() > 0 and all(client.service_is_ready() for client in clients)
+                and self._command.get_subscription_count() >= readers)
+
+    def begin(self) -> None:
+        """Begin with the first tick."""
+        self._begun = True
+        if self._lock_step:
+            self._continue()
+        else:
+            self._open(FAR_NS)
+
+    # Lock-step: the robot holds, everything is delivered, the robot goes on ------------------------------------
+
+    def _on_holding(self, message: Clock) -> None:
+        self._holding_ns = stamp_ns(message.clock)
+        self._continue()
+
+    def _on_inhibition(self, message: DiagnosticArray) -> None:
+        self._inhibition_ns = header_ns(message)
+        word = read_inhibition_state(message).word
+        if word != self._word:
+            self._word = word
+            self._say(self._inhibition_ns * 1e-9, word.replace('_', ' '))
+        if self._lock_step:
+            self._continue()
+
+    def _continue(self) -> None:
+        """Deliver what acts at the held tick once all nodes have finished the tick before, then open the gate."""
+        if not self._begun or not self._lock_step or self._holding_ns < 0 or self._busy or self.finished.done():
+            return
+        if self._holding_ns > 0 and self._inhibition_ns < self._holding_ns - self._tick_ns:
+            return
+        self.time_ns = self._holding_ns
+        if self.time_ns >= self._end_ns:
+            self.finished.set_result(None)
+            return
+        if self._deliver_due():
+            return
+        following = self._actions[self._next].time_ns if self._next < len(self._actions) else self._end_ns
+        self._holding_ns = -1
+        self._open(min(following, self._end_ns) - self._tick_ns)
+
+    def _deliver_due(self) -> bool:
+        """Deliver due actions; returns whether one is under way and will call back."""
+        while self._next < len(self._actions) and self._actions[self._next].time_ns <= self.time_ns:
+            action = self._actions[self._next]
+            self._next += 1
+            if action.label:
+                self._say(self.time_ns * 1e-9, f'> {action.label}')
+            if action.command is not None:
+                self._send(action.command)
+                return True
+            if action.inhibit is not None:
+                self._call(action)
+                return True
+        return False
+
+    def _send(self, command: Command) -> None:
+        message = Twist()
+        message.linear.x, message.linear.y, message.angular.z = command
+        self._command.publish(message)
+        self._sent += 1
+        self._busy = True
+        if self._lock_step:
+            self._await_takers(list(self._takers))
+        else:
+            self._delivered()
+
+    def _await_takers(self, takers: list[Any]) -> None:
+        """Ask each reader of cmd_vel whether it has the command, until all have."""
+        if not takers:
+            self._delivered()
+            return
+
+        def answered(future: Future) -> None:
+            taken = int(future.result().message)
+            self._await_takers(takers[1:] if taken >= self._sent else takers)
+
+        takers[0].call_async(Trigger.Request()).add_done_callback(answered)
+
+    def _delivered(self) -> None:
+        self._busy = False
+        if self._lock_step:
+            self._continue()
+        else:
+            self._deliver_due()
+
+    def _call(self, action: Action) -> None:
+        self._busy = True
+        self._inhibit.call_async(SetBool.Request(data=bool(action.inhibit))).add_done_callback(self._answered)
+
+    def _answered(self, future: Future) -> None:
+        answer = future.result()
+        if answer is None or not answer.success:
+            self._fail(f"service inhibit: {'no answer' if answer is None else answer.message}")
+            return
+        self._say(self.time_ns * 1e-9, f'  inhibit: {answer.message}')
+        self._delivered()
+
+    # Real time --------------------------------------------------------------------------------------------------
+
+    def _on_clock(self, message: Clock) -> None:
+        self.time_ns = stamp_ns(message.clock)
+        if not self._begun or self.finished.done():
+            return
+        if self.time_ns >= self._end_ns:
+            self.finished.set_result(None)
+        elif not self._busy:
+            self._deliver_due()
+
+    # Inside -----------------------------------------------------------------------------------------------------
+
+    def _open(self, until_ns: int) -> None:
+        message: Any = Clock()
+        set_stamp(message.clock, until_ns)
+        self._gate.publish(message)
+
+    def _fail(self, text: str) -> None:
+        if not self.finished.done():
+            self.finished.set_exception(PlayerError(text))
