@@ -55,7 +55,7 @@ def no_pictures(*poses: Any) -> list[Any]:
 def grey_pictures(positions: Any, quaternions: Any, joints: Any) -> list[Any]:
     assert positions.shape[1:] == (3,)
     assert joints.shape[1:] == (12,)
-    np.testing.assert_allclose(roll_pitch_yaw(quaternions)[:, 2] % (2 * np.pi), 0.0, atol=1e-9)
+    np.testing.assert_allclose(np.exp(1j * roll_pitch_yaw(quaternions)[:, 2]), 1.0, atol=1e-9)
     return [np.full((9, 16, 3), 128, dtype=np.uint8)] * len(positions)
 
 
@@ -108,7 +108,7 @@ def test_moments_lie_where_their_captions_say(walked: Recording, context: RunCon
     assert set(found) == {'at_rest', 'turning'}  # this walk never goes straight
     assert WALK.stop_s + WALK.time_to_rest_s <= found['at_rest'] <= WALK.release_s
     row = np.searchsorted(walked.feet.time, found['turning'])
-    assert walked.feet.force[row, 0] == 0.0
+    assert walked.feet.force[row].min() == 0.0
 
 
 def test_a_run_goes_on_without_pictures(

@@ -19,11 +19,15 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import MOVING, STOPPING, episodes, steady_segments
 from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
 from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.core.robot_state import LEGS
 
 Array = NDArray[np.float64]
 
 Draw = Callable[[Array, Array, Array], Sequence[NDArray[np.uint8]]]
 """From base positions (n, 3), quaternions (n, 4), joint positions (n, 12) to pictures, or none."""
+
+NEAR_FOOT = LEGS.index('fr')
+"""Front foot on the side from which pictures are taken."""
 
 FEWEST_SAMPLES = 3
 """Shorter losses of contact are no swings."""
@@ -127,13 +131,13 @@ def _pose(recording: Recording, time: float) -> tuple[Array, Array, Array]:
 
 
 def _foot_in_the_air(recording: Recording, context: RunContext, start: float, end: float) -> float:
-    """Middle of a swing of the front left foot near the middle of an interval [s]."""
+    """Middle of a swing of the near front foot, about the middle of an interval [s]."""
     middle = 0.5 * (start + end)
     feet = recording.feet
     if not feet.time.size:
         return middle
     inside = (feet.time >= start) & (feet.time <= end)
-    swings = stretches(inside & (feet.force[:, 0] <= context.contact_force))
+    swings = stretches(inside & (feet.force[:, NEAR_FOOT] <= context.contact_force))
     middles = [
         float(feet.time[(first + past) // 2])
         for first, past in swings
