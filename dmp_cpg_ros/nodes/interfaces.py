@@ -27,13 +27,14 @@ from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import ParameterError
 
-PUBLISHER_DEPTH = 200
-"""Messages that a publisher of every tick keeps for readers that lag (0.8 s at 250 Hz)."""
+PUBLISHER_DEPTH = 2000
+"""Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the period of 3 s at which
+Fast DDS tells readers what they have missed."""
 
 READER_DEPTH = 10
 """Messages of one publisher that a node of the suite queues."""
 
-RECORDER_DEPTH = 2000
+RECORDER_DEPTH = 8000
 """Messages per topic that the recorder queues."""
 
 INSTANCES = {'leg_transformation': 4}
