@@ -8,8 +8,16 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.analysis.message_numbers import (
+    Rows,
+    events,
+    robot_clock,
+    stacked,
+    stamp_ns,
+    twist,
+    xyz,
+)
 from dmp_cpg_ros.analysis.named_values import NamedValues
 from dmp_cpg_ros.analysis.recording import (
     ArrivalSeries,
@@ -25,9 +33,7 @@ from dmp_cpg_ros.analysis.recording import (
 )
 from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS
 
-Array = NDArray[np.float64]
 Handler = Callable[[int, Any], None]
-Rows = tuple[list[int], list[list[float]]]
 
 JOINT_TOPICS = (
     'joint_states',
@@ -88,13 +94,13 @@ class Collector:
             [f'{leg}_x{k}' for leg in LEGS for k in (1, 2)]
         )
         x, x_dot = (canonical[name].reshape(-1, len(LEGS), 2) for name in ('position', 'velocity'))
-        odometry = _stacked(self._rows['odom'], 13)
-        imu = _stacked(self._rows['imu'], 10)
+        odometry = stacked(self._rows['odom'], 13)
+        imu = stacked(self._rows['imu'], 10)
         return Recording(
             joints=self._joints('joint_states'),
             targets=self._joints('joint_targets'),
             canonical=CanonicalSeries(time, x, x_dot),
-            reference=VelocitySeries(*_stacked(self._rows['reference'], 3)),
+            reference=VelocitySeries(*stacked(self._rows['reference'], 3)),
             commands=self._commands(),
             odometry=OdometrySeries(odometry[0], *np.split(odometry[1], (3, 7, 10), axis=1)),
             imu=ImuSeries(imu[0], *np.split(imu[1], (4, 7), axis=1)),
@@ -126,8 +132,8 @@ class Collector:
     def _commands(self) -> VelocitySeries:
         stamps, rows = self._rows['cmd_vel']
         bag_ns, unstamped = self._unstamped_commands
-        stamped = [*stamps, *_robot_clock(bag_ns, self._clock if self._clock[0] else self._ticks)]
-        return VelocitySeries(*_stacked((stamped, rows + unstamped), 3))
+        stamped = [*stamps, *robot_clock(bag_ns, self._clock if self._clock[0] else self._ticks)]
+        return VelocitySeries(*stacked((stamped, rows + unstamped), 3))
 
     def _arrivals(self) -> ArrivalSeries:
         stamps = np.array(self._ticks[1], dtype=np.int64)
@@ -139,29 +145,29 @@ class Collector:
         )
 
     def _take_joint_targets(self, bag_ns: int, message: Any) -> None:
-        stamp = _stamp_ns(message.header.stamp)
+        stamp = stamp_ns(message.header.stamp)
         self._last_target[stamp] = bag_ns
         self._named['joint_targets'].add(stamp, message)
 
     def _take_joint_states(self, bag_ns: int, message: Any) -> None:
-        stamp = _stamp_ns(message.header.stamp)
+        stamp = stamp_ns(message.header.stamp)
         self._ticks[0].append(bag_ns)
         self._ticks[1].append(stamp)
         self._named['joint_states'].add(stamp, message)
 
     def _taker_of_named(self, topic: str) -> Callable[[int, Any], None]:
         named = self._named[topic]
-        return lambda _, message: named.add(_stamp_ns(message.header.stamp), message)
+        return lambda _, message: named.add(stamp_ns(message.header.stamp), message)
 
     def _taker_of_twists(self, topic: str) -> Callable[[int, Any], None]:
         def handle(_: int, message: Any) -> None:
-            self._row(topic, message, _twist(message.twist))
+            self._row(topic, message, twist(message.twist))
 
         return handle
 
     def _take_unstamped_twist(self, bag_ns: int, message: Any) -> None:
         self._unstamped_commands[0].append(bag_ns)
-        self._unstamped_commands[1].append(_twist(message))
+        self._unstamped_commands[1].append(twist(message))
 
     def _take_odometry(self, _: int, message: Any) -> None:
         pose, twist = message.pose.pose, message.twist.twist
@@ -169,11 +175,11 @@ class Collector:
             'odom',
             message,
             [
-                *_xyz(pose.position),
-                *_xyz(pose.orientation),
+                *xyz(pose.position),
+                *xyz(pose.orientation),
                 pose.orientation.w,
-                *_xyz(twist.linear),
-                *_xyz(twist.angular),
+                *xyz(twist.linear),
+                *xyz(twist.angular),
             ],
         )
 
@@ -182,74 +188,28 @@ class Collector:
             'imu',
             message,
             [
-                *_xyz(message.orientation),
+                *xyz(message.orientation),
                 message.orientation.w,
-                *_xyz(message.angular_velocity),
-                *_xyz(message.linear_acceleration),
+                *xyz(message.angular_velocity),
+                *xyz(message.linear_acceleration),
             ],
         )
 
     def _row(self, topic: str, message: Any, row: list[float]) -> None:
         stamps, rows = self._rows[topic]
-        stamps.append(_stamp_ns(message.header.stamp))
+        stamps.append(stamp_ns(message.header.stamp))
         rows.append(row)
 
     def _take_clock(self, bag_ns: int, message: Any) -> None:
         self._clock[0].append(bag_ns)
-        self._clock[1].append(_stamp_ns(message.clock))
+        self._clock[1].append(stamp_ns(message.clock))
 
     def _take_inhibition(self, _: int, message: Any) -> None:
-        for event in _events(message).values():
+        for event in events(message).values():
             last = self._inhibition[-1] if self._inhibition else None
             if last is None or (last.message, last.values) != (event.message, event.values):
                 self._inhibition.append(event)
 
     def _take_diagnostics(self, _: int, message: Any) -> None:
-        for name, event in _events(message).items():
+        for name, event in events(message).items():
             self._statuses.setdefault(name, []).append(event)
-
-
-def _stamp_ns(stamp: Any) -> int:
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
-
-
-def _xyz(vector: Any) -> tuple[float, float, float]:
-    return vector.x, vector.y, vector.z
-
-
-def _twist(twist: Any) -> list[float]:
-    return [twist.linear.x, twist.linear.y, twist.angular.z]
-
-
-def _events(message: Any) -> dict[str, StatusEvent]:
-    time = _stamp_ns(message.header.stamp) / 1e9
-    return {
-        status.name: StatusEvent(
-            time,
-            int(status.level),
-            status.message,
-            {pair.key: pair.value for pair in status.values},
-        )
-        for status in message.status
-    }
-
-
-def _stacked(rows: tuple[list[int], list[list[float]]], width: int) -> tuple[Array, Array]:
-    """Rows in the order of their stamps; of rows with one stamp the last counts."""
-    stamps = np.array(rows[0], dtype=np.int64)
-    values = np.array(rows[1], dtype=float).reshape(-1, width)
-    _, last = np.unique(stamps[::-1], return_index=True)
-    keep = len(stamps) - 1 - last
-    return stamps[keep] / 1e9, values[keep]
-
-
-def _robot_clock(bag_ns: list[int], clock: tuple[list[int], list[int]]) -> list[int]:
-    """Stamps on the robot's clock for messages without one.
-
-    The bag's record time may be wall time: each message gets the stamp of the tick that was
-    recorded last before it. A bag without ticks keeps its own time.
-    """
-    if not bag_ns or not clock[0]:
-        return bag_ns
-    before = np.searchsorted(np.array(clock[0]), np.array(bag_ns), side='right') - 1
-    return [clock[1][max(index, 0)] for index in before]
