@@ -1,0 +1,100 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One leg's primitive: goals whose velocity is their derivative, feet that come down at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_examples import GAITS, TICK, network, quadruped
+
+from dmp_cpg_ros.core.inhibition import Inhibition
+from dmp_cpg_ros.core.leg_primitive import (
+    LegParameters,
+    LegPrimitive,
+    body_scale,
+    nominal_foothold,
+)
+from dmp_cpg_ros.core.phase import phase_generator, state_at
+from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.transformation import TransformationState
+
+ROBOT = quadruped()
+REFERENCES = {'forward': [0.5, 0.0, 0.0], 'sideways': [0.0, 0.3, 0.0], 'turn': [0.2, 0.0, 0.8]}
+
+
+def leg_of(leg: str, gait: str, **changes: object) -> LegPrimitive:
+    return LegPrimitive(leg, ROBOT, GAITS[gait], LegParameters(**changes))  # type: ignore[arg-type]
+
+
+def walked(leg: LegPrimitive, r: np.ndarray, shift: np.ndarray, seconds: float) -> np.ndarray:
+    """Goals and their velocities of a leg that walks steadily, (ticks, 2, 3)."""
+    speed = leg.scale.foot_speed(*r)
+    omega, state, rows = leg.gait.omega(speed, leg.scale), leg.initial_state(), []
+    for k in range(round(seconds / TICK)):
+        x = state_at(omega * k * TICK)
+        x_dot = omega * phase_generator() @ x
+        state, goal, goal_velocity = leg.step(state, x, x_dot, r, shift, np.zeros(3), TICK)
+        rows.append((goal, goal_velocity))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize('direction', REFERENCES)
+@pytest.mark.parametrize(('leg', 'gait'), [('fl', 'amble'), ('rr', 'trot')])
+def test_goal_velocities_are_the_rates_of_the_goals(leg: str, gait: str, direction: str) -> None:
+    r, shift = np.array(REFERENCES[direction]), np.array([0.02, -0.01])
+    goals, velocities = walked(leg_of(leg, gait), r, shift, 3.0)[400:].swapaxes(0, 1)
+    rates = np.diff(goals, axis=0) / TICK
+    middle = 0.5 * (velocities[1:] + velocities[:-1])
+    assert np.abs(rates - middle).max() < 0.03 * np.abs(velocities).max()
+
+
+def test_an_unused_foot_path_in_stance_moves_against_the_body() -> None:
+    leg, r = leg_of('fl', 'amble'), np.array([0.5, 0.0, 0.0])
+    goals = walked(leg, r, np.zeros(2), 3.0)[400:, 0]
+    feet = np.array([leg.kinematics.foot_in_base(goal) for goal in goals])
+    standing = feet[:-1, 2] == pytest.approx(leg.foothold_in_base[2], abs=1e-9)
+    velocity = np.diff(feet[:, 0])[standing & (np.diff(feet[:, 2]) < 1e-9)] / TICK
+    assert np.allclose(velocity, -0.5 * leg.rolling[0], atol=1e-6)
+
+
+@pytest.mark.parametrize('gait', GAITS)
+def test_at_rest_every_foot_is_on_the_ground(gait: str) -> None:
+    at, zero = network(gait), np.zeros(3)
+    inhibition = Inhibition(True, np.array([400.0, 0.0, 0.0, 0.0]), 0.3)
+    x = at.rest_state(inhibition)
+    x_dot = at.rate(x, zero, inhibition)
+    for i, name in enumerate(LEGS):
+        leg = leg_of(name, gait)
+        state = leg.initial_state()
+        for _ in range(500):
+            state, goal, _ = leg.step(state, x[i], x_dot[i], zero, np.zeros(2), zero, TICK)
+        foot = leg.kinematics.foot_in_base(goal)
+        assert np.allclose(foot, nominal_foothold(ROBOT, name), atol=1e-6)
+
+
+def test_the_kinematic_reading_follows_the_goals_closely() -> None:
+    leg, r = leg_of('fr', 'trot'), np.array([0.5, 0.0, 0.0])
+    omega, state, errors = leg.gait.omega(0.5, leg.scale), leg.initial_state(), []
+    for k in range(750):
+        x = state_at(omega * k * TICK)
+        state, goal, _ = leg.step(state, x, omega * phase_generator() @ x, r, np.zeros(2),
+                                  np.zeros(3), TICK)
+        errors.append(np.abs(state.joints.position - goal).max())
+    assert max(errors[250:]) < 0.02
+
+
+def test_the_torque_reading_sends_torques_of_the_measured_joints() -> None:
+    leg, rng = leg_of('fl', 'amble', reading='torque'), np.random.default_rng(0)
+    q, q_dot, goal, goal_velocity, feedback = rng.normal(size=(5, 3))
+    measured = TransformationState(q, q_dot)
+    out = leg.targets(leg.initial_state(), goal, goal_velocity, feedback, measured)
+    p, J = leg.parameters, ROBOT.legs[0].rotor_inertia
+    expected = J * (p.stiffness * (goal - q) + p.damping * (goal_velocity - q_dot)) + feedback
+    assert np.allclose(out.effort, expected)
+
+
+def test_scale_of_the_body() -> None:
+    scale = body_scale(ROBOT)
+    assert scale.leg_length == pytest.approx(0.28)
+    assert scale.hip_radius == pytest.approx(np.hypot(0.19, 0.11))

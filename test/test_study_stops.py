@@ -1,0 +1,95 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The stop study: what it measures, what it counts, what it prints."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from core_examples import TICK, quadruped, standing_state
+
+from dmp_cpg_ros.analysis.recording import (
+    FootForceSeries,
+    JointSeries,
+    OdometrySeries,
+    Recording,
+)
+from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, body_at_rest, summary
+
+ROBOT = quadruped()
+
+
+def hold(speed: np.ndarray, force: float = 20.0) -> Recording:
+    """A hold in which the body slides forwards at a speed over feet that go with it."""
+    n = len(speed)
+    state, time = standing_state(ROBOT), TICK * np.arange(n)
+    position = np.zeros((n, 3))
+    position[:, 0] = np.cumsum(speed) * TICK
+    velocity = np.stack([speed, np.zeros(n), np.zeros(n)], axis=1)
+    return Recording(
+        joints=JointSeries(time, np.tile(state.joint_position, (n, 1)), np.zeros((n, 12)),
+                           np.zeros((n, 12))),
+        odometry=OdometrySeries(time, position, np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)), velocity,
+                                np.zeros((n, 3))),
+        feet=FootForceSeries(time, np.full((n, 4), force)))
+
+
+def test_the_body_is_at_rest_when_it_stays_slower_than_a_centimetre_per_second() -> None:
+    speed = np.repeat([0.2, 0.005, 0.02, 0.0], [100, 50, 50, 300])
+    outcome = body_at_rest(hold(speed), ROBOT, 2.0)
+    assert outcome.standing
+    assert outcome.body_rest_s == pytest.approx(200 * TICK)
+    assert outcome.displacement_m == pytest.approx(speed[1:201].sum() * TICK)
+    assert outcome.slip_m == pytest.approx(outcome.displacement_m)  # the feet go with the body
+    assert outcome.deceleration == pytest.approx(0.195 / 0.04)
+    assert outcome.tilt == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(('speed', 'force'), [(0.02, 20.0), (0.0, 1.0)])
+def test_it_does_not_stand_when_it_moves_or_a_foot_is_in_the_air(
+        speed: float, force: float) -> None:
+    assert not body_at_rest(hold(np.full(500, speed), force), ROBOT, 2.0).standing
+
+
+def test_a_summary_counts_every_case_but_measures_those_that_did_not_fall() -> None:
+    good = StopOutcome(False, True, True, predicted_s=1.1, bound_s=2.0, measured_s=1.0)
+    late = StopOutcome(False, True, False, predicted_s=1.0, bound_s=0.9, measured_s=1.0)
+    of = summary([good, late, StopOutcome(fell=True), StopOutcome(fell=True)])
+    assert (of.count, of.fell, of.standing, of.walked_on) == (4, 2, 2, 1)
+    assert (of.bounded, of.bound_exceeded) == (2, 1)
+    assert of.prediction_error == pytest.approx((0.05, 0.1))
+
+
+def test_a_stop_that_never_came_to_rest_exceeds_its_bound() -> None:
+    assert StopOutcome(False, bound_s=5.0, measured_s=np.inf).bound_exceeded
+    assert not StopOutcome(False, measured_s=1.0).bound_exceeded
+
+
+def test_the_command_prints_a_row_per_method_and_writes_every_case(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip('mujoco')
+    from dmp_cpg_ros.commands.study_stops import main
+
+    written = []
+    for jobs in ('1', '2'):
+        file = tmp_path / f'{jobs}.json'
+        assert main(['--phases', '2', '--speeds', '0.3', '--gaits', 'trot', '--jobs', jobs,
+                     '--quiet', '--json', str(file)]) == 0
+        written.append(json.loads(file.read_text(encoding='utf-8')))
+    assert written[0] == written[1]
+    assert len(written[0]) == 2 and all(case['standing'] for case in written[0])
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith('| trot')]
+    assert len(rows) == 2 and all('inhibition' in row for row in rows)
+
+
+@pytest.mark.parametrize('arguments', [['--gaits', 'gallop'], ['--phases', '0'], ['none.yaml']])
+def test_bad_arguments_end_with_status_2_and_a_reason(
+        arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip('mujoco')
+    from dmp_cpg_ros.commands.study_stops import main
+
+    assert main(arguments) == 2
+    assert 'study_stops: ' in capsys.readouterr().err
