@@ -50,6 +50,7 @@ class InhibitionNode(ManagedNode):
         self._x: Any = None
         self._r = np.zeros(3)
         self._predicted = self._bound = float('nan')
+        self._told: tuple[Any, ...] = ()
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = InhibitionStateWriter(), self.publisher('inhibition_state')
         self._ticks = self.match(('canonical_state', 'reference'), 'canonical_state', lock_step=self._lock_step)
@@ -81,17 +82,17 @@ class InhibitionNode(ManagedNode):
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
             self._predict(published)
-        if self._lock_step or self._changed(before):
+        if self._lock_step or self._news() != self._told:
             self._publish()
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop."""
         return {'inhibition': self._state.word, 'requested': self._state.requested, 'command': self._gate.at(self._state.time_ns)}
 
-    def _changed(self, before: Any) -> bool:
+    def _news(self) -> tuple[Any, ...]:
+        """What is told when it changes."""
         now = self._state
-        return (now.word, now.requested, now.armed, now.automatic, now.request_ns) != (
-            before.word, before.requested, before.armed, before.automatic, before.request_ns)
+        return now.word, now.requested, now.armed, now.automatic, now.request_ns
 
     def _answer_inhibit(self, request: Any, response: Any) -> Any:
         """Take a request; the answer says when it will be fulfilled. It acts from the next tick on."""
@@ -121,7 +122,7 @@ class InhibitionNode(ManagedNode):
                                   self._gate.at(self._state.time_ns), tick_s)
 
     def _publish(self) -> None:
-        state, acting = self._state, self._acting
+        state, acting, self._told = self._state, self._acting, self._news()
         values: dict[str, Any] = {'requested': state.requested, 'armed': state.armed, 'automatic': state.automatic}
         values.update((f'gain_{leg}', gain) for leg, gain in zip(LEGS, acting.gains.tolist(), strict=True))
         values.update(region_radius=acting.region_radius, request_stamp=state.request_ns * 1e-9,
