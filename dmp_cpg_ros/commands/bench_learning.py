@@ -1,0 +1,186 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Compares learning with ``movement_primitives`` (DFKI, BSD licence) on the same data in one run.
+
+Both get positions only and the same number of bases; each reproduces with its own integrator at
+the demonstration's sampling interval. Where that package is not installed, its columns stay empty;
+it has no rhythmic primitive.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.commands.demonstration_files import read_demonstration
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.primitives import learning_discrete, learning_rhythmic
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.core.primitives.demonstrations import (
+    LETTERS,
+    handwriting,
+    joint_angles,
+    minimum_jerk,
+    walking_joints,
+)
+from dmp_cpg_ros.core.primitives.learning import ranges
+
+_REPEATS = 5
+
+
+@dataclass(frozen=True)
+class LearningResult:
+    """How one library learned one demonstration.
+
+    Attributes
+    ----------
+    error : float
+        Largest reproduction error over degrees of freedom and time, as a fraction of the range.
+    seconds : float
+        Shortest fit of several [s].
+    """
+
+    error: float
+    seconds: float
+
+
+def demonstrations() -> dict[str, tuple[str, Demonstration]]:
+    """Built demonstrations by name, each with its kind, positions only."""
+    made = {f'handwriting {letter}': ('discrete', handwriting(letter)) for letter in LETTERS}
+    made['minimum jerk'] = ('discrete', minimum_jerk([0.0, 1.0], [1.0, -1.0]))
+    made['joint angles'] = ('discrete', joint_angles())
+    made['walking joints'] = ('rhythmic', walking_joints())
+    return {
+        name: (kind, Demonstration(d.times, d.positions, names=d.names))
+        for name, (kind, d) in made.items()
+    }
+
+
+def learn_ours(kind: str, demonstration: Demonstration, bases: int) -> LearningResult:
+    """Fit and reproduce with this package; the period of a rhythm is found in the fit.
+
+    Parameters
+    ----------
+    kind : str
+        ``discrete`` or ``rhythmic``.
+    demonstration : Demonstration
+    bases : int
+
+    Returns
+    -------
+    LearningResult
+    """
+    if kind == 'discrete':
+        reach, seconds = _fastest(lambda: learning_discrete.learn_discrete(demonstration, bases))
+        errors = learning_discrete.reproduction_errors(reach, demonstration)
+    else:
+        cycle, seconds = _fastest(lambda: learning_rhythmic.learn_rhythmic(demonstration, bases))
+        errors = learning_rhythmic.reproduction_errors(cycle, demonstration)
+    return LearningResult(float(errors.max()), seconds)
+
+
+def learn_theirs(demonstration: Demonstration, bases: int) -> LearningResult | None:
+    """Fit and reproduce with ``movement_primitives``; None where it cannot be imported.
+
+    Parameters
+    ----------
+    demonstration : Demonstration
+        Of a discrete movement.
+    bases : int
+
+    Returns
+    -------
+    LearningResult or None
+    """
+    try:
+        DMP = import_module('movement_primitives.dmp').DMP
+    except ImportError:
+        return None
+    times = demonstration.times - demonstration.times[0]
+
+    def fit() -> Any:
+        dmp = DMP(demonstration.dofs, float(times[-1]), float(times[1]), bases)
+        dmp.imitate(times, demonstration.positions)
+        return dmp
+
+    dmp, seconds = _fastest(fit)
+    made_at, made = dmp.open_loop()
+    columns = [np.interp(times, made_at, column) for column in made.T]
+    errors = np.abs(np.stack(columns, axis=1) - demonstration.positions).max(axis=0)
+    return LearningResult(float((errors / ranges([demonstration])).max()), seconds)
+
+
+def table(rows: dict[str, tuple[str, Demonstration]], bases: int) -> str:
+    """Markdown table of both libraries.
+
+    Parameters
+    ----------
+    rows : dict
+        Name → kind and demonstration.
+    bases : int
+
+    Returns
+    -------
+    str
+    """
+    lines = [
+        '| demonstration | samples | degrees of freedom | error | fit | '
+        'error, movement_primitives | fit, movement_primitives |',
+        '|---|---|---|---|---|---|---|',
+    ]
+    for name, (kind, demonstration) in rows.items():
+        ours = learn_ours(kind, demonstration, bases)
+        theirs = learn_theirs(demonstration, bases) if kind == 'discrete' else None
+        lines.append(
+            f'| {name} | {len(demonstration.times)} | {demonstration.dofs} | {_cells(ours)} | '
+            f'{_cells(theirs)} |'
+        )
+    return '\n'.join(lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the comparison and print its table; returns the exit status."""
+    parser = argparse.ArgumentParser(prog='bench_learning', description=__doc__)
+    parser.add_argument('--bases', type=int, default=25, help='default: 25')
+    parser.add_argument('--bag', type=Path, help='a recorded walk to learn the joints of, too')
+    parser.add_argument('--start', type=float, help='of the bag, after its first sample [s]')
+    parser.add_argument('--end', type=float, help='of the bag, after its first sample [s]')
+    options = parser.parse_args(arguments)
+    rows = demonstrations()
+    try:
+        if options.bag is not None:
+            walk = read_demonstration(options.bag, start=options.start, end=options.end)
+            rows['recorded walk'] = ('rhythmic', Demonstration(walk.times, walk.positions))
+        print(table(rows, options.bases))
+    except DmpCpgError as error:
+        print(f'bench_learning: {error}', file=sys.stderr)
+        return 2
+    return 0
+
+
+def _fastest(fit: Callable[[], Any]) -> tuple[Any, float]:
+    """Result and the shortest of several durations, the least disturbed by other processes."""
+    durations = []
+    for _ in range(_REPEATS):
+        began = perf_counter()
+        result = fit()
+        durations.append(perf_counter() - began)
+    return result, min(durations)
+
+
+def _cells(result: LearningResult | None) -> str:
+    if result is None:
+        return '– | –'
+    return f'{100.0 * result.error:.3g} % | {1e3 * result.seconds:.2g} ms'
+
+
+if __name__ == '__main__':
+    sys.exit(main())

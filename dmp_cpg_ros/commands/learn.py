@@ -1,0 +1,157 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``learn``: from demonstrations to the weights of a discrete or rhythmic primitive."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from dmp_cpg_ros.commands.demonstration_files import read_demonstration
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.primitives import learning_discrete, learning_rhythmic
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
+from dmp_cpg_ros.core.primitives.learning import METHODS, FitOptions
+from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
+from dmp_cpg_ros.core.primitives.transformation import FORMS
+from dmp_cpg_ros.primitive_files import save_primitive
+
+BAD_INPUT = 2
+"""Exit status for files and arguments that cannot be used."""
+
+_EXAMPLES = """\
+files:
+  CSV    first column time [s]; the others NAME, and NAME_velocity, NAME_acceleration if recorded
+  .npy   array (m, 1 + n), first column time [s]
+  .npz   arrays times (m,), positions (m, n); velocities, accelerations, names if there are any
+  bag    rosbag2 folder (MCAP or SQLite) or a run's folder; joint names from JointState messages
+
+examples:
+  learn reach.csv --out reach.yaml
+  learn first.csv second.csv --bases auto --out reach.yaml
+  learn runs/latest --kind rhythmic --joints fl_hip,fl_knee --start 5 --end 9 --out trot.yaml
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(_without_ros_arguments(given))
+    try:
+        demonstrations = [_read(path, options) for path in options.demonstrations]
+        began = perf_counter()
+        primitive, errors = _learn(demonstrations, options)
+        seconds = perf_counter() - began
+        save_primitive(primitive, options.out)
+    except DmpCpgError as error:
+        print(f'learn: {error}', file=sys.stderr)
+        return BAD_INPUT
+    _report(primitive, errors, seconds, options.out)
+    return 0
+
+
+def _read(path: Path, options: argparse.Namespace) -> Demonstration:
+    read = read_demonstration(path, options.joints, options.topic, options.start, options.end)
+    if options.positions_only:
+        return Demonstration(read.times, read.positions, names=read.names)
+    return read
+
+
+def _learn(
+    demonstrations: list[Demonstration], options: argparse.Namespace
+) -> tuple[DiscretePrimitive | RhythmicPrimitive, np.ndarray]:
+    fit = FitOptions(options.method, options.ridge, options.overlap)
+    bases = None if options.bases == 'auto' else options.bases
+    common = {'stiffness': options.stiffness, 'damping': options.damping, 'form': options.form}
+    if options.kind == 'discrete':
+        reach = learning_discrete.learn_discrete(demonstrations, bases, options=fit, **common)
+        return reach, learning_discrete.reproduction_errors(reach, demonstrations)
+    cycle = learning_rhythmic.learn_rhythmic(
+        demonstrations, bases, period=options.period, options=fit, **common
+    )
+    return cycle, learning_rhythmic.reproduction_errors(cycle, demonstrations, options.period)
+
+
+def _report(
+    primitive: DiscretePrimitive | RhythmicPrimitive,
+    errors: np.ndarray,
+    seconds: float,
+    out: Path,
+) -> None:
+    if isinstance(primitive, DiscretePrimitive):
+        kind, time = 'discrete', f'duration {primitive.duration:.6g} s'
+    else:
+        kind, time = 'rhythmic', f'period {primitive.period:.6g} s'
+    names = primitive.names or tuple(str(i + 1) for i in range(primitive.dofs))
+    listed = ', '.join(f'{name} {100.0 * e:.3g} %' for name, e in zip(names, errors, strict=True))
+    print(f'{kind} primitive, {primitive.bases.count} bases, {time}')
+    print(f'largest reproduction error in % of the range: {listed}')
+    print(f'learned and checked in {seconds:.3g} s')
+    print(f'wrote {out}')
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='learn',
+        description='Learn a discrete or rhythmic movement primitive from demonstrations.',
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add('demonstrations', metavar='DEMO', nargs='+', type=Path, help='CSV or NumPy file, or bag')
+    add('--out', metavar='FILE', type=Path, required=True, help='YAML file to write')
+    add('--kind', choices=('discrete', 'rhythmic'), default='discrete', help='default: discrete')
+    add(
+        '--bases',
+        type=_bases,
+        default=25,
+        help="number of bases, or 'auto' to choose it by the held-out error (default: 25)",
+    )
+    add('--period', metavar='S', type=float, help='period of a rhythm (default: found from data)')
+    add('--joints', metavar='A,B', type=_names, default=(), help='joints to take (default: all)')
+    add('--topic', default='joint_states', help='topic of a bag (default: joint_states)')
+    add('--start', metavar='S', type=float, help='take samples from here on, after the first [s]')
+    add('--end', metavar='S', type=float, help='take samples up to here, after the first [s]')
+    add('--positions-only', action='store_true', help='leave recorded derivatives aside')
+    add('--method', choices=METHODS, default=METHODS[0], help=f'default: {METHODS[0]}')
+    add('--ridge', type=float, default=FitOptions.ridge, help='relative (default: %(default)g)')
+    add('--overlap', type=float, help='value of a basis at the centre of its neighbour')
+    add('--stiffness', metavar='K', type=float, help='[1/s^2] (default: suits the duration)')
+    add('--damping', metavar='B', type=float, help='[1/s] (default: critical)')
+    add('--form', choices=FORMS, default=FORMS[0], help='reading of tau (default: scaled)')
+    add('--ros-args', nargs='*', help="accepted as ROS tools add it; 'learn' uses no ROS")
+    return parser
+
+
+def _without_ros_arguments(arguments: list[str]) -> list[str]:
+    """Drop --ros-args up to a closing -- or the end; argparse would reject what they hold."""
+    if '--ros-args' not in arguments:
+        return arguments
+    begin = arguments.index('--ros-args')
+    rest = arguments[begin:]
+    after = rest[rest.index('--') + 1 :] if '--' in rest else []
+    return [*arguments[:begin], *_without_ros_arguments(after)]
+
+
+def _bases(text: str) -> int | str:
+    if text == 'auto':
+        return text
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(
+            f"must be a whole number of at least 1 or 'auto', not {text!r}"
+        )
+    return int(text)
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(',') if name.strip())
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,277 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``learn``: every kind of file gives the same primitive, and what cannot be used is named."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from dmp_cpg_ros.commands import bench_learning
+from dmp_cpg_ros.commands.demonstration_files import read_demonstration
+from dmp_cpg_ros.commands.learn import BAD_INPUT, main
+from dmp_cpg_ros.core.primitives.demonstrations import joint_angles, walking_joints
+from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
+from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
+from dmp_cpg_ros.primitive_files import load_primitive
+
+WALK, REACH = walking_joints(0.5, 2.6, dt=0.005), joint_angles(dt=0.004)
+EPOCH = 1_700_000_000
+
+
+def write_csv(path, demonstration, derived=True):
+    names = list(demonstration.names)
+    columns = [demonstration.times[:, None], demonstration.positions]
+    header = ['time', *names]
+    if derived:
+        columns += [demonstration.velocities, demonstration.accelerations]
+        header += [f'{n}_velocity' for n in names] + [f'{n}_acceleration' for n in names]
+    np.savetxt(
+        path, np.hstack(columns), delimiter=',', header=','.join(header), comments='', fmt='%.17g'
+    )
+    return path
+
+
+def write_bag(folder, demonstration, *, stamped=True, velocities=True, one_by_one=False):
+    rosbag2 = pytest.importorskip('rosbags.rosbag2')
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kind = 'sensor_msgs/msg/JointState'
+    make, header = store.types[kind], store.types['std_msgs/msg/Header']
+    time = store.types['builtin_interfaces/msg/Time']
+    with rosbag2.Writer(folder, version=9) as writer:
+        connection = writer.add_connection('/robot/joint_states', kind, typestore=store)
+        other = writer.add_connection('/clock', 'rosgraph_msgs/msg/Clock', typestore=store)
+        clock = store.types['rosgraph_msgs/msg/Clock'](clock=time(sec=0, nanosec=1))
+        writer.write(other, 1, store.serialize_cdr(clock, 'rosgraph_msgs/msg/Clock'))
+        for t, y, v in zip(
+            demonstration.times, demonstration.positions, demonstration.velocities, strict=True
+        ):
+            stamp = round(t * 1e9)
+            sent = (
+                time(sec=EPOCH + stamp // 10**9, nanosec=stamp % 10**9)
+                if stamped
+                else time(sec=0, nanosec=0)
+            )
+            groups = [[i] for i in range(len(y))] if one_by_one else [list(range(len(y)))[::-1]]
+            for group in groups:
+                message = make(
+                    header=header(stamp=sent, frame_id=''),
+                    name=[demonstration.names[i] for i in group],
+                    position=y[group],
+                    velocity=v[group] if velocities else np.zeros(0),
+                    effort=np.zeros(0),
+                )
+                writer.write(connection, 10**9 + stamp, store.serialize_cdr(message, kind))
+    return folder
+
+
+def test_csv_npy_npz_and_bag_give_the_same_demonstration(tmp_path):
+    np.save(tmp_path / 'a.npy', np.hstack([WALK.times[:, None], WALK.positions]))
+    np.savez(
+        tmp_path / 'a.npz',
+        times=WALK.times,
+        positions=WALK.positions,
+        velocities=WALK.velocities,
+        names=np.array(WALK.names),
+    )
+    paths = [
+        write_csv(tmp_path / 'a.csv', WALK),
+        tmp_path / 'a.npz',
+        write_bag(tmp_path / 'a_bag', WALK),
+    ]
+    for path in paths:
+        read = read_demonstration(path, joints=('knee', 'hip'))
+        assert read.names == ('knee', 'hip')
+        np.testing.assert_allclose(read.times, WALK.times, atol=1e-9)
+        np.testing.assert_array_equal(read.positions, WALK.positions[:, [2, 1]])
+        np.testing.assert_array_equal(read.velocities, WALK.velocities[:, [2, 1]])
+    plain = read_demonstration(tmp_path / 'a.npy')
+    np.testing.assert_array_equal(plain.positions, WALK.positions)
+    np.testing.assert_array_equal(read_demonstration(paths[0]).accelerations, WALK.accelerations)
+
+
+def test_joints_that_come_in_separate_messages_are_put_together(tmp_path):
+    read = read_demonstration(write_bag(tmp_path / 'bag', WALK, one_by_one=True, velocities=False))
+    assert read.names == WALK.names
+    assert read.velocities is None
+    np.testing.assert_array_equal(read.positions, WALK.positions)
+
+
+def test_messages_without_a_stamp_take_the_time_of_recording(tmp_path):
+    read = read_demonstration(write_bag(tmp_path / 'bag', WALK, stamped=False))
+    np.testing.assert_allclose(read.times, WALK.times, atol=1e-9)
+
+
+def test_a_part_of_a_recording_is_cut_out(tmp_path):
+    read = read_demonstration(write_csv(tmp_path / 'a.csv', WALK), start=0.2, end=0.7)
+    inside = (WALK.times >= 0.2) & (WALK.times <= 0.7)
+    np.testing.assert_array_equal(read.positions, WALK.positions[inside])
+
+
+def test_a_table_without_a_header_is_numbered(tmp_path):
+    np.savetxt(
+        tmp_path / 'a.csv', np.hstack([REACH.times[:, None], REACH.positions]), delimiter=','
+    )
+    assert read_demonstration(tmp_path / 'a.csv').names == ('joint_1', 'joint_2', 'joint_3')
+
+
+def test_a_discrete_primitive_is_learned_and_written(tmp_path, capsys):
+    path, out = (
+        write_csv(tmp_path / 'reach.csv', REACH, derived=False),
+        tmp_path / 'out' / 'reach.yaml',
+    )
+    assert main([str(path), str(path), '--out', str(out), '--bases', '20']) == 0
+    learned = load_primitive(out)
+    assert isinstance(learned, DiscretePrimitive)
+    assert learned.names == REACH.names
+    assert learned.bases.count == 20
+    made = learned.rollout(REACH.times).positions
+    np.testing.assert_allclose(made, REACH.positions, atol=0.01 * np.ptp(REACH.positions))
+    said = capsys.readouterr().out
+    assert 'knee' in said
+    assert str(out) in said
+
+
+def test_a_rhythmic_primitive_is_learned_from_a_bag_with_its_period(tmp_path, capsys):
+    out = tmp_path / 'walk.yaml'
+    arguments = [
+        str(write_bag(tmp_path / 'bag', WALK)),
+        '--kind',
+        'rhythmic',
+        '--joints',
+        'hip,knee',
+        '--positions-only',
+        '--out',
+        str(out),
+    ]
+    assert main([*arguments, '--ros-args', '-r', '__node:=learn', '--log-level', 'warn']) == 0
+    learned = load_primitive(out)
+    assert isinstance(learned, RhythmicPrimitive)
+    assert learned.period == pytest.approx(0.5, rel=1e-6)
+    assert learned.names == ('hip', 'knee')
+    assert 'period 0.5 s' in capsys.readouterr().out
+
+
+def test_options_reach_the_primitive(tmp_path):
+    path, out = write_csv(tmp_path / 'reach.csv', REACH), tmp_path / 'reach.yaml'
+    options = [
+        '--bases',
+        'auto',
+        '--stiffness',
+        '400',
+        '--form',
+        'printed',
+        '--method',
+        'joint',
+        '--ridge',
+        '1e-8',
+    ]
+    assert main([str(path), '--out', str(out), *options]) == 0
+    spring = load_primitive(out).transformation
+    assert spring.form == 'printed'
+    np.testing.assert_allclose(spring.stiffness, 400.0)
+    np.testing.assert_allclose(spring.damping, 40.0)
+
+
+@pytest.mark.parametrize(
+    ('name', 'content', 'text'),
+    [
+        ('none.csv', None, 'does not exist'),
+        ('a.txt', 'x', 'no known kind'),
+        ('a.csv', '', 'empty'),
+        ('a.csv', 'hip,knee\n1,2\n', 'first column'),
+        ('a.csv', 'time,hip\n0,1\n1,x\n', 'no number'),
+        ('a.csv', 'time,hip\n0,1,2\n', 'numbers in every row'),
+        ('a.csv', 'time,hip\n0,1\n1,2\n', 'at least 8'),
+        ('a.npy', 'no array', 'NumPy'),
+        ('a.npz', 'no array', 'NumPy'),
+        ('a.csv', 'time,hip\n' + '0,1\n' * 9, 'must increase'),
+        ('a.csv', 'time,hip\n' + ''.join(f'{i},nan\n' for i in range(9)), 'finite'),
+    ],
+)
+def test_files_that_cannot_be_used_are_named(name, content, text, tmp_path, capsys):
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    assert main([str(tmp_path / name), '--out', str(tmp_path / 'out.yaml')]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert said.startswith('learn: ')
+    assert text in said
+    assert not (tmp_path / 'out.yaml').exists()
+
+
+def test_arrays_that_cannot_be_used_are_named(tmp_path, capsys):
+    np.save(tmp_path / 'flat.npy', np.zeros(9))
+    np.savez(tmp_path / 'bare.npz', positions=np.zeros((9, 1)))
+    for name, text in (('flat.npy', 'first column'), ('bare.npz', "no array 'times'")):
+        assert main([str(tmp_path / name), '--out', str(tmp_path / 'out.yaml')]) == BAD_INPUT
+        assert text in capsys.readouterr().err
+
+
+def test_unknown_joints_and_topics_are_answered_with_the_known_ones(tmp_path, capsys):
+    bag, out = str(write_bag(tmp_path / 'bag', WALK)), str(tmp_path / 'out.yaml')
+    table = str(write_csv(tmp_path / 'a.csv', WALK))
+    for arguments in ([bag, '--joints', 'elbow'], [table, '--joints', 'elbow']):
+        assert main([*arguments, '--out', out]) == BAD_INPUT
+        said = capsys.readouterr().err
+        assert 'elbow' in said
+        assert 'abduction, hip, knee' in said or 'knee, hip, abduction' in said
+    assert main([bag, '--topic', 'joint_targets', '--out', out]) == BAD_INPUT
+    assert '/robot/joint_states' in capsys.readouterr().err
+    assert main([bag, '--topic', 'clock', '--out', out]) == BAD_INPUT
+    (tmp_path / 'empty').mkdir()
+    assert main([str(tmp_path / 'empty'), '--out', out]) == BAD_INPUT
+
+
+def test_what_has_no_rhythm_is_refused(tmp_path, capsys):
+    path = write_csv(tmp_path / 'still.csv', REACH, derived=False)
+    noise = np.random.default_rng(0).normal(size=(200, 1))
+    np.save(tmp_path / 'noise.npy', np.hstack([np.arange(200.0)[:, None], noise]))
+    out = str(tmp_path / 'out.yaml')
+    assert main([str(tmp_path / 'noise.npy'), '--kind', 'rhythmic', '--out', out]) == BAD_INPUT
+    assert 'period' in capsys.readouterr().err
+    assert main([str(path), '--kind', 'rhythmic', '--period', '-1', '--out', out]) == BAD_INPUT
+    assert 'period' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    'arguments', [['--bases', 'many'], ['--bases', '0'], ['--kind', 'wild'], ['--method', 'x']]
+)
+def test_arguments_that_mean_nothing_end_with_status_2(arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main(['a.csv', '--out', 'b.yaml', *arguments])
+    assert stopped.value.code == BAD_INPUT
+
+
+def test_help_answers_without_ros():
+    probe = (
+        'import sys; sys.modules["rclpy"] = None; '
+        'from dmp_cpg_ros.commands.learn import main; main(["--help"])'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', probe], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert '--kind' in done.stdout
+
+
+def test_the_comparison_keeps_our_error_below_one_percent():
+    for name, (kind, demonstration) in bench_learning.demonstrations().items():
+        assert bench_learning.learn_ours(kind, demonstration, 25).error < 0.01, name
+
+
+def test_the_comparison_runs_without_the_other_library(monkeypatch):
+    monkeypatch.setitem(sys.modules, 'movement_primitives', None)
+    monkeypatch.setitem(sys.modules, 'movement_primitives.dmp', None)
+    rows = {
+        name: row
+        for name, row in bench_learning.demonstrations().items()
+        if name == 'minimum jerk'
+    }
+    text = bench_learning.table(rows, 10)
+    assert '– | –' in text
+    assert text.count('\n') == 2
