@@ -66,10 +66,11 @@ class FootPath:
             ∂p/∂c [m per cycle]; the velocity is slope · φ̇ / 2π.
         """
         period, swing = 6.283185307179586 / self.omega, 1.0 - self.duty
+        height = float(self.foothold_in_base[2])
         if abs(cycle_position) >= 0.5 * swing:
             from_mid_stance = cycle_position - 0.5 if cycle_position > 0.0 else cycle_position + 0.5
             x, y, x_dot, y_dot = self._stance(from_mid_stance * period)
-            return (np.array((x, y, self.foothold_in_base[2])),
+            return (np.array((x, y, height)),
                     np.array((x_dot * period, y_dot * period, 0.0)))
         half_stance = 0.5 * self.duty * period
         x0, y0, dx0, dy0 = self._stance(half_stance)
@@ -80,8 +81,8 @@ class FootPath:
         rest = 1.0 - s
         bump = 16.0 * s * s * rest * rest
         bump_slope = 32.0 * s * rest * (rest - s)
-        return (np.array((x, y, self.foothold_in_base[2] + self.clearance * bump)),
-                np.array((x_slope, y_slope, self.clearance * bump_slope)) / swing)
+        return (np.array((x, y, height + self.clearance * bump)),
+                np.array((x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing)))
 
     def _stance(self, t: float) -> tuple[float, float, float, float]:
         """Planar position and velocity of a foot that stands, t seconds after mid-stance."""
@@ -91,7 +92,7 @@ class FootPath:
             along, across = s / self.gamma, (1.0 - c) / self.gamma
         else:
             along, across = t, 0.5 * angle * t
-        x0, y0 = self.foothold_in_base[0], self.foothold_in_base[1]
+        x0, y0, _ = self.foothold_in_base.tolist()
         x = c * x0 + s * y0 - along * self.v_x - across * self.v_y
         y = c * y0 - s * x0 - along * self.v_y + across * self.v_x
         share_x, share_y = self.rolling

@@ -8,7 +8,8 @@ of any size: speed û = u / sqrt(g l), cadence f̂ = f sqrt(l / g), with l the s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -69,6 +70,7 @@ class Gait:
     cadence: Array
     duty_factor: Array
     rest: float = field(init=False)
+    _tables: tuple[list[float], list[float], list[float]] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Validate and find the rest phase."""
@@ -83,6 +85,8 @@ class Gait:
         if not np.all((self.cadence > 0.0) & np.isfinite(self.cadence)):
             raise ParameterError(f"gait '{self.name}': cadence must be positive")
         object.__setattr__(self, 'rest', _rest_phase(self.lag))
+        object.__setattr__(self, '_tables', tuple(
+            table.tolist() for table in (self.speed, self.cadence, self.duty_factor)))
 
     @classmethod
     def from_mapping(cls, name: str, values: Mapping[str, Any]) -> Gait:
@@ -122,12 +126,16 @@ class Gait:
         """
         root = (GRAVITY / scale.leg_length) ** 0.5
         return 2.0 * np.pi * root * _interpolated(
-            foot_speed / (root * scale.leg_length), self.speed, self.cadence)
+            foot_speed / (root * scale.leg_length), self._tables[0], self._tables[1])
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed."""
         return _interpolated(
-            foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self.speed, self.duty_factor)
+            foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self._tables[0], self._tables[2])
+
+    def scalar_cycle_position(self, phi: float) -> float:
+        """As :meth:`cycle_position` for one leg, without arrays."""
+        return (phi / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
 
     def cycle_position(self, phi: Array | float) -> Array:
         """Where legs are in their cycle: 0 at mid-swing, in [−1/2, 1/2).
@@ -143,8 +151,15 @@ class Gait:
         return wrapped(np.asarray(phi) + 2.0 * np.pi * self.rest) / (2.0 * np.pi)
 
 
-def _interpolated(at: float, xs: Array, ys: Array) -> float:
-    return float(np.interp(at, xs, ys))
+def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:
+    """Piecewise linear interpolation, constant outside; plain floats, because it runs in every node at every tick."""
+    place = bisect_right(xs, at)
+    if place == 0:
+        return ys[0]
+    if place == len(xs):
+        return ys[-1]
+    share = (at - xs[place - 1]) / (xs[place] - xs[place - 1])
+    return ys[place - 1] + share * (ys[place] - ys[place - 1])
 
 
 def _rest_phase(lag: Array) -> float:

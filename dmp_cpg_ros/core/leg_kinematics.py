@@ -96,7 +96,8 @@ class LegKinematics:
         ndarray (3,)
             Abduction, hip, knee [rad].
         """
-        px, py, pz = (float(value) - hip for value, hip in zip(foot_in_base, self._hip, strict=True))
+        px, py, pz = np.asarray(foot_in_base, dtype=float).tolist()
+        px, py, pz = px - self._hip[0], py - self._hip[1], pz - self._hip[2]
         depth = -sqrt(max(py * py + pz * pz - self._lateral * self._lateral, 1e-8))
         q0 = atan2(pz, py) - atan2(depth, self._lateral)
         q0 = (q0 + 3.141592653589793) % 6.283185307179586 - 3.141592653589793
@@ -112,7 +113,7 @@ class LegKinematics:
         return np.array((self._s[0] * q0, self._s[1] * _wrapped(q1), self._s[2] * _wrapped(q2)))
 
     def _chain(self, q: ArrayLike) -> tuple[float, ...]:
-        q0, q1, q2 = q  # type: ignore[misc]
+        q0, q1, q2 = q.tolist() if isinstance(q, np.ndarray) else q  # type: ignore[misc]
         s0, c0 = sin(self._s[0] * q0), cos(self._s[0] * q0)
         angle_1 = self._s[1] * q1
         s1, c1 = sin(angle_1), cos(angle_1)

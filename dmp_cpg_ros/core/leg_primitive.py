@@ -8,6 +8,7 @@ The goals g_θ(x_i, r), g_θ̇(x_i, r) are the foot path through the leg's inver
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import exp, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from dmp_cpg_ros.core.foot_path import FootPath, rolling_share
 from dmp_cpg_ros.core.gait import BodyScale, Gait
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.core.phase import phase, phase_rate
+from dmp_cpg_ros.core.phase import scalar_phase, scalar_phase_rate
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS, JointTargets
 from dmp_cpg_ros.core.swing_activity import activity_step
@@ -121,20 +122,22 @@ class LegPrimitive:
             g_θ [rad] and g_θ̇ [rad/s].
         """
         p, gait = self.parameters, self.gait
-        v_x, v_y, gamma = float(r[0]), float(r[1]), float(r[2])
+        v_x, v_y, gamma = r.tolist()
         speed = self.scale.foot_speed(v_x, v_y, gamma)
         omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
-        rate = float(phase_rate(x, x_dot))
-        position = float(gait.cycle_position(phase(x)))
-        activity = float(activity_step(state.activity, rate, omega, p.activity_rate, dt))
+        x_1, x_2 = x.tolist()
+        rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist())
+        position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
+        activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
         swinging = abs(position) < 0.5 * (1.0 - duty)
-        share = 1.0 - np.exp(-p.placement_rate * activity * dt) if swinging else 0.0
+        share = 1.0 - exp(-p.placement_rate * activity * dt) if swinging else 0.0
         shift_rate = (shift_in_base - state.shift_in_base) * (share / dt if dt > 0.0 else 0.0)
         shift = state.shift_in_base + shift_rate * dt
-        path = FootPath(self.foothold_in_base, v_x + float(correction[0]), v_y + float(correction[1]),
-                        gamma + float(correction[2]), omega, duty, activity * self.clearance, self.rolling)
+        more_x, more_y, more_gamma = correction.tolist()
+        path = FootPath(self.foothold_in_base, v_x + more_x, v_y + more_y, gamma + more_gamma, omega, duty,
+                        activity * self.clearance, self.rolling)
         foot, slope = path.at(position)
-        velocity = slope * (rate / (2.0 * np.pi))
+        velocity = slope * (rate / (2.0 * pi))
         foot[:2] += shift
         velocity[:2] += shift_rate
         goal = self.kinematics.inverse(foot)

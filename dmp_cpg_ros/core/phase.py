@@ -8,6 +8,8 @@ With the signs that the paper prints (eqs. hopf1, hopf2) the state turns clockwi
 
 from __future__ import annotations
 
+from math import atan2
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -66,6 +68,17 @@ def phase_rate(x: ArrayLike, x_dot: ArrayLike) -> Array:
     squared = x[..., 0] ** 2 + x[..., 1] ** 2
     turning = x[..., 1] * x_dot[..., 0] - x[..., 0] * x_dot[..., 1]
     return np.divide(turning, squared, out=np.zeros_like(turning), where=squared > 0.0)
+
+
+def scalar_phase(x_1: float, x_2: float) -> float:
+    """Phase of one state in (−π, π] [rad], without arrays: for code that runs per leg and tick."""
+    return atan2(-x_2, x_1)
+
+
+def scalar_phase_rate(x_1: float, x_2: float, x_1_dot: float, x_2_dot: float) -> float:
+    """Rate of the phase of one state [rad/s], without arrays; 0 at the origin."""
+    squared = x_1 * x_1 + x_2 * x_2
+    return (x_2 * x_1_dot - x_1 * x_2_dot) / squared if squared > 0.0 else 0.0
 
 
 def phase_rotation(phi: float) -> Array:

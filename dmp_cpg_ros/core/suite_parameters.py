@@ -95,6 +95,9 @@ class RobotParameters(Parameters):
                                       'this', unit='rad', minimum=0.0, maximum=0.3)
     target_timeout: float = parameter(0.2, 'age of a leg\'s targets after which the robot holds a stand by itself',
                                       unit='s', minimum=0.01, maximum=10.0)
+    longest_lag: float = parameter(0.02, "real time: age of a leg's targets beyond which the simulation waits for newer "
+                                   'ones, up to target_timeout of wall time; 0: it never waits', unit='s',
+                                   minimum=0.0, maximum=10.0)
     viewer: bool = parameter(False, 'whether to open a window with the robot')
 
 

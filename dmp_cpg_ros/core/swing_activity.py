@@ -9,21 +9,23 @@ factors below 3/4 no phase has all four feet down), through a first-order filter
 
 from __future__ import annotations
 
+from math import exp
+from typing import Any, TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+ActivityT = TypeVar('ActivityT', float, NDArray[np.float64])
 
 
-def activity_step(activity: Array | float, phase_rate: Array | float, omega: float, rate: float,
-                  dt: float) -> Array:
+def activity_step(activity: ActivityT, phase_rate: ActivityT, omega: float, rate: float, dt: float) -> ActivityT:
     """Advance ȧ = rate · (sat(φ̇/ω) − a) exactly for a held phase rate.
 
     Parameters
     ----------
-    activity : ndarray (...) or float
+    activity : float or ndarray (...)
         a in [0, 1].
-    phase_rate : ndarray (...) or float
+    phase_rate : float or ndarray (...)
         φ̇ [rad/s].
     omega : float
         Free-running ω > 0 [rad/s].
@@ -34,7 +36,8 @@ def activity_step(activity: Array | float, phase_rate: Array | float, omega: flo
 
     Returns
     -------
-    ndarray (...)
+    float or ndarray (...)
     """
-    wanted = np.clip(np.asarray(phase_rate) / omega, 0.0, 1.0)
-    return wanted + (activity - wanted) * np.exp(-rate * dt)
+    wanted: Any = (min(max(phase_rate / omega, 0.0), 1.0) if isinstance(phase_rate, float)
+                   else np.minimum(np.maximum(phase_rate / omega, 0.0), 1.0))
+    return wanted + (activity - wanted) * exp(-rate * dt)

@@ -132,7 +132,7 @@ TOPICS: tuple[Interface, ...] = (
     Interface('imu', Imu, 'inertial measurement in base_link', ('mujoco_robot',), ()),
     Interface('odom', Odometry, 'pose and twist of base_link in odom', ('mujoco_robot',), ('posture_control',)),
     Interface('foot_contacts', JointState, 'effort = normal force of each foot', ('mujoco_robot',),
-              ('posture_control',)),
+              ()),
     Interface('/clock', Clock, 'the clock of the robot', ('mujoco_robot',), ()),
     Interface('inhibition_state', DiagnosticArray, 'stop and start: state word, gains, times', ('inhibition',),
               ('reference_filter', 'canonical_oscillators'), latched=True),

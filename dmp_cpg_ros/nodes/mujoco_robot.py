@@ -55,7 +55,7 @@ class MujocoRobotNode(ManagedNode):
         self._guard = TargetGuard(stand, round(self._options.target_timeout * 1e9))
         self._timing, self._writer, self._reader = RobotTiming(), RobotStateWriter(), JointTargetsReader()
         self._state: RobotState = self._robot.reset()
-        self._fell, self._holding, self._open_until = False, True, -1
+        self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._state_publishers = [self.publisher(name) for name in STATE_TOPICS]
         self.listen('joint_targets', self._on_targets)
         if self._options.gated:
@@ -169,9 +169,24 @@ class MujocoRobotNode(ManagedNode):
                                         clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _on_timer(self) -> None:
+        if self._wait_for_targets():
+            return
         self._timing.deadline(self._state.time_ns)
         self._step()
         self._publish_state()
+
+    def _wait_for_targets(self) -> bool:
+        """Whether to let wall time pass: a machine too slow for real time shall not make the robot fall."""
+        now = self._state.time_ns
+        lag = round(self._options.longest_lag * 1e9)
+        if lag == 0 or self._guard.age_ns(now) <= lag or self._guard.silent(now):
+            self._waits = 0
+            return False
+        self._waits += 1
+        if self._waits * self._tick_ns > self._options.target_timeout * 1e9:
+            return False
+        self._timing.waited()
+        return True
 
     # Inside --------------------------------------------------------------------------------------------------
 

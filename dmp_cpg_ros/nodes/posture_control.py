@@ -7,11 +7,13 @@ from __future__ import annotations
 import sys
 from typing import Any
 
+import numpy as np
+
 from dmp_cpg_ros.core.posture import PostureController, PostureParameters
+from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.nodes.conversions import (
     CanonicalStateReader,
-    FootContactsReader,
     JointsReader,
     PostureFeedbackWriter,
     header_ns,
@@ -39,10 +41,10 @@ class PostureControl(ManagedNode):
         self._memory, self._last_ns = self._controller.initial_state(), -1
         self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
         self._ticks = self.match(
-            ('joint_states', 'odom', 'foot_contacts', 'reference', 'canonical_state'), 'canonical_state',
+            ('joint_states', 'odom', 'reference', 'canonical_state'), 'canonical_state',
             lock_step=self.parameters_of(LockStepParameters).lock_step)
-        canonical, joints, feet = CanonicalStateReader(), JointsReader(), FootContactsReader()
-        for name, read in (('joint_states', joints.read), ('odom', read_odom), ('foot_contacts', feet.read),
+        canonical, joints = CanonicalStateReader(), JointsReader()
+        for name, read in (('joint_states', joints.read), ('odom', read_odom),
                            ('reference', read_reference), ('canonical_state', canonical.read)):
             self.listen(name, lambda message, name=name, read=read: self._ticks.add(
                 name, header_ns(message), read(message)))
@@ -55,7 +57,7 @@ class PostureControl(ManagedNode):
         """Compute the feedback for the stamp of the canonical state."""
         dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
         self._last_ns = stamp_ns
-        state = robot_state(stamp_ns, values['joint_states'], values['odom'], values['foot_contacts'])
+        state = robot_state(stamp_ns, values['joint_states'], values['odom'], np.zeros(len(LEGS)))
         x, x_dot = values['canonical_state']
         self._memory, feedback = self._controller.step(self._memory, state, x, x_dot, values['reference'], dt)
         self._publisher.publish(self._writer.fill(stamp_ns, feedback))

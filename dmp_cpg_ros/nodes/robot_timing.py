@@ -23,6 +23,7 @@ class RobotTiming:
         self._last: tuple[float, int] | None = None
         self.ticks = 0
         self.misses = 0
+        self.waits = 0
 
     def published(self, stamp_ns: int) -> None:
         """Note that the state of a tick has been published."""
@@ -49,9 +50,14 @@ class RobotTiming:
         if entry is not None and entry[1] < len(LEGS):
             self.misses += 1
 
+    def waited(self) -> None:
+        """Note that the simulation let a period of wall time pass."""
+        self.waits += 1
+
     def values(self) -> dict[str, float | int]:
         """Rate [Hz], real-time factor, latency [ms] and misses since the start; NaN without ticks."""
-        values: dict[str, float | int] = {'deadline_misses': self.misses, 'timed_ticks': self.ticks}
+        values: dict[str, float | int] = {
+            'deadline_misses': self.misses, 'waits': self.waits, 'timed_ticks': self.ticks}
         wall = robot = float('nan')
         if self._first is not None and self._last is not None and self._last[0] > self._first[0]:
             wall, robot = self._last[0] - self._first[0], (self._last[1] - self._first[1]) * 1e-9

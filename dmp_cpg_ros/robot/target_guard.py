@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the joints are told when legs fall silent: the robot holds a stand by itself and does not fall."""
+"""What the joints are told when legs fall silent: the robot holds a stand and does not fall."""
 
 from __future__ import annotations
 
@@ -48,6 +48,11 @@ class TargetGuard:
         """Legs whose targets are missing or too old."""
         return [leg for leg, stamp in zip(LEGS, self.stamps, strict=True)
                 if stamp is None or now_ns - stamp > self._timeout_ns]
+
+    def age_ns(self, now_ns: int) -> int:
+        """Age of the oldest leg's targets [ns]; 0 while a leg has never sent any."""
+        known = [stamp for stamp in self.stamps if stamp is not None]
+        return now_ns - min(known) if len(known) == len(self.stamps) else 0
 
     def targets(self, now_ns: int, joint_position: Array) -> JointTargets:
         """Targets of all joints at a time.
