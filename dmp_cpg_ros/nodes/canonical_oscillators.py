@@ -14,16 +14,12 @@ from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initia
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.core.walking_loop import initial_canonical_state
-from dmp_cpg_ros.nodes.conversions import (
-    CanonicalStateWriter,
-    InhibitionMessage,
-    header_ns,
-    read_inhibition_state,
-    read_reference,
-)
+from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, read_reference
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import network_of
+from dmp_cpg_ros.nodes.inhibition_messages import InhibitionMessage, read_inhibition_state
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 

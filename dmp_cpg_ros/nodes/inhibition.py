@@ -18,17 +18,13 @@ from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, Referen
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters, TickParameters
-from dmp_cpg_ros.nodes.conversions import (
-    CanonicalStateReader,
-    InhibitionStateWriter,
-    header_ns,
-    read_reference,
-    read_twist,
-)
+from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference, read_twist
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import network_of
+from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 

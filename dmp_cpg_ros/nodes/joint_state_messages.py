@@ -18,6 +18,9 @@ from sensor_msgs.msg import JointState
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.message_values import Array, checked, set_stamp
 
+FIELDS = ('position', 'velocity', 'effort')
+"""The arrays of a ``JointState``."""
+
 
 class NameOrder:
     """Puts the entries of messages into our order, by name.

@@ -15,15 +15,15 @@ from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, LegChoice
 from dmp_cpg_ros.core.transformation import TransformationState
 from dmp_cpg_ros.nodes.conversions import (
     CanonicalStateReader,
-    JointsReader,
     JointTargetsWriter,
     PostureFeedbackReader,
-    header_ns,
     read_reference,
 )
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import description_of, gait_of
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.message_values import header_ns
+from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 

@@ -31,6 +31,11 @@ def stamp_ns(stamp: Time) -> int:
     return seconds * NS + rest
 
 
+def header_ns(message: Any) -> int:
+    """Stamp of a message's header [ns]; raises DataError when it is not valid."""
+    return stamp_ns(message.header.stamp)
+
+
 def set_stamp(stamp: Time, time_ns: int) -> None:
     """Write nanoseconds into a stamp."""
     stamp.sec, stamp.nanosec = divmod(time_ns, NS)
@@ -69,3 +74,8 @@ def checked_numbers(values: tuple[float, ...], what: str) -> tuple[float, ...]:
         if not -LARGEST <= value <= LARGEST:
             raise DataError(f'{what} = {values} must be finite and at most {LARGEST:g}')
     return values
+
+
+def finite_list(values: Array, what: str) -> list[float]:
+    """Return an array as a list, or raise DataError as :func:`checked` does."""
+    return list(checked(values, what).tolist())

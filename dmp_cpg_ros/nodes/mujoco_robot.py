@@ -20,10 +20,11 @@ from dmp_cpg_ros.core.suite_parameters import (
     RobotParameters,
     TickParameters,
 )
-from dmp_cpg_ros.nodes.conversions import JointTargetsReader, RobotStateWriter, header_ns
+from dmp_cpg_ros.nodes.conversions import JointTargetsReader
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
 from dmp_cpg_ros.nodes.robot_timing import RobotTiming
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 from dmp_cpg_ros.robot.home_pose import home_joint_position

@@ -14,16 +14,14 @@ from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.nodes.conversions import (
     CanonicalStateReader,
-    JointsReader,
     PostureFeedbackWriter,
-    header_ns,
-    read_odom,
     read_reference,
-    robot_state,
 )
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import description_of, gait_of
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.message_values import header_ns
+from dmp_cpg_ros.nodes.robot_state_messages import JointsReader, read_odom, robot_state
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 

@@ -12,10 +12,12 @@ import numpy as np
 
 from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters
-from dmp_cpg_ros.nodes.conversions import ReferenceWriter, header_ns, read_inhibition_state, read_twist
+from dmp_cpg_ros.nodes.conversions import ReferenceWriter, read_twist
 from dmp_cpg_ros.nodes.executors import run_node
+from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 

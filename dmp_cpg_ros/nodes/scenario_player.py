@@ -16,9 +16,9 @@ from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario import Action, Command, Scenario
-from dmp_cpg_ros.nodes.conversions import header_ns, read_inhibition_state
+from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.interfaces import GATE_OWNER, interface
-from dmp_cpg_ros.nodes.message_values import set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
 
 FAR_NS = 2**31 * 10**9 - 1
 """A stamp later than every run [ns]."""

@@ -1,0 +1,93 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``inhibition_state``: what stops the gait, as words and decimal text that reads back to the same numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.nodes.message_values import set_stamp, text
+
+
+class InhibitionStateWriter:
+    """Writes ``inhibition_state``; entries that do not change keep their texts."""
+
+    def __init__(self) -> None:
+        """Build the message."""
+        self._status = DiagnosticStatus(name='inhibition', hardware_id='dmp_cpg_ros')
+        self.message = DiagnosticArray(status=[self._status])
+        self._values: dict[str, Any] = {}
+        self._entries: dict[str, KeyValue] = {}
+
+    def fill(self, time_ns: int, word: str, values: Mapping[str, Any], *, level: bytes = DiagnosticStatus.OK,
+             ) -> DiagnosticArray:
+        """Refill.
+
+        Parameters
+        ----------
+        time_ns : int
+            Stamp [ns].
+        word : str
+            State.
+        values : mapping of str to value
+            Numbers become decimal text that reads back to the same float. The keys must not change between calls.
+        level : bytes
+            Level of :class:`DiagnosticStatus`.
+        """
+        if values.keys() != self._entries.keys():
+            self._entries = {key: KeyValue(key=key) for key in values}
+            self._values = {}
+            self._status.values = list(self._entries.values())
+        for key, value in values.items():
+            if key not in self._values or self._values[key] != value:
+                self._entries[key].value, self._values[key] = text(value), value
+        self._status.message, self._status.level = word, level
+        set_stamp(self.message.header.stamp, time_ns)
+        return self.message
+
+
+@dataclass(frozen=True)
+class InhibitionMessage:
+    """Content of ``inhibition_state``.
+
+    Attributes
+    ----------
+    word : str
+        State.
+    values : dict of str to str
+        Values by key.
+    """
+
+    word: str
+    values: dict[str, str]
+
+    def number(self, key: str) -> float:
+        """Value of a key as a float; raises DataError when it is absent or not a finite number."""
+        try:
+            value = float(self.values[key])
+        except (KeyError, ValueError):
+            raise DataError(f"'{key}' must be a number, not {self.values.get(key)!r}") from None
+        if not np.isfinite(value):
+            raise DataError(f"'{key}' = {value} must be finite")
+        return value
+
+    def flag(self, key: str) -> bool:
+        """Value of a key as a bool; raises DataError unless it is ``true`` or ``false``."""
+        value = self.values.get(key)
+        if value not in ('true', 'false'):
+            raise DataError(f"'{key}' must be true or false, not {value!r}")
+        return value == 'true'
+
+
+def read_inhibition_state(message: DiagnosticArray) -> InhibitionMessage:
+    """Read ``inhibition_state``; raises DataError when it holds no status named ``inhibition``."""
+    for status in message.status:
+        if status.name == 'inhibition':
+            return InhibitionMessage(status.message, {entry.key: entry.value for entry in status.values})
+    raise DataError(f"no status named 'inhibition' among {[status.name for status in message.status]}")
