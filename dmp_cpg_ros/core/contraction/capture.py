@@ -1,0 +1,216 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Does capture hold? A set that the inhibited network cannot leave, in closed form (Section 4.2).
+
+Contraction on C is not enough: at rest one node holds all N rotors, so that C must be shown
+forward invariant. In locked coordinates let u_i = |x_i − x_d|. Because the couplings average,
+
+    u̇_i ≤ g_i(u_i) + Σ_j k_ij (u_j − u_i) − α_i u_i,
+    g_i(u) = sup over |n| = 1 of n·f_i(x_d + u n) ≤ ω_i |x_d| + ρ_i max_c (r_i² − |x|²)(c + u)
+
+and the box {u ≤ ū} is invariant when the right side is not positive on its faces. With ū = r0 at
+the inhibited nodes the others take ū_f = r0 + (what their rotation is worth), and what remains is
+one inequality for each inhibited node: *the* condition, N ω r / k_inh < r0 made exact. Every state
+that enters C with its nodes in their places lies in the box.
+
+Inside the box a half-plane n·x_i ≥ c_i is invariant too (same argument for −n·x_i); it keeps the
+nodes away from the origin, where oscillators diverge, and gives contraction on the region.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian, slowest_rate
+from dmp_cpg_ros.core.contraction.hopf_bounds import growth
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.phase import phase_rotation
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+RADIUS_TOLERANCE = 0.02
+"""Deviation from the limit cycle's radius that the set allows at capture, as a fraction of r."""
+
+PLACE_TOLERANCE = 0.02
+"""Distance of a node from its place that the set allows at capture, as a fraction of r."""
+
+
+@dataclass(frozen=True)
+class CaptureSet:
+    """The box {|x_i − x_d| ≤ ū_i} with its half-planes, and what makes it invariant.
+
+    Attributes
+    ----------
+    distance : ndarray (N,)
+        ū_i: r0 at the inhibited nodes.
+    smallest_radius : ndarray (N,)
+        Lower bound on |x_i| inside; 0 where the origin is not excluded.
+    needed_gain : ndarray (N,)
+        Gain above which each inhibited node keeps its state in C [1/s]; NaN at the others.
+    gains : ndarray (N,)
+        α_i [1/s].
+    tolerance : float
+        Distance from the leader's place that each follower may have at capture.
+    rate : float
+        Contraction rate inside the set, in a weighted norm max_i |δx_i|/v_i [1/s].
+    """
+
+    distance: Array
+    smallest_radius: Array
+    needed_gain: Array
+    gains: Array
+    tolerance: float
+    rate: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether every inhibited node's gain exceeds what it needs."""
+        held = ~np.isnan(self.needed_gain)
+        return bool(np.any(held) and np.all(self.gains[held] > self.needed_gain[held]))
+
+
+def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
+                region_radius: float) -> CaptureSet:
+    """Build the invariant set of an inhibited network.
+
+    Parameters
+    ----------
+    system : CanonicalSystem
+        Coupled oscillators; the targets of the inhibited nodes must be in their places.
+    omega : float or ndarray (N,)
+        Upper bounds on the angular frequencies, which may vary below [rad/s].
+    gains : ndarray (N,)
+        Inhibition gains α_i [1/s]; those above zero are switched on inside C_i.
+    region_radius : float
+        r0 of C_i = {|x_i − x_{i,d}| ≤ r0}.
+
+    Returns
+    -------
+    CaptureSet
+
+    Raises
+    ------
+    ParameterError
+        If no node is inhibited or the targets of inhibited nodes are not in their places.
+    """
+    size, inhibited = system.graph.size, np.asarray(gains) > 0.0
+    omega = np.broadcast_to(np.abs(omega), (size,)).astype(float)
+    D = _target_radius(system, inhibited)
+    L = comparison_laplacian(system.graph)
+    largest = max(float(system.radius.max()), D)
+    u = _distances(system, L, omega, inhibited, D, region_radius, largest + D)
+    pull = outward_growth(system, omega, D, u) - L @ u
+    needed = np.where(inhibited, pull / region_radius, np.nan)
+    tolerance = PLACE_TOLERANCE * D
+    if np.any(~inhibited):
+        tolerance = min(tolerance, float(u[~inhibited].min()) - region_radius)
+    M = L + np.diag(gains)
+    inner = _smallest_radii(system, M, omega, u, D, region_radius, largest, tolerance)
+    rate = slowest_rate(M - np.diag(growth(system.rho, system.radius, inner)))
+    return CaptureSet(u, inner, needed, np.asarray(gains, float), tolerance, rate)
+
+
+def outward_growth(system: CanonicalSystem, omega: Array, D: float, u: Array) -> Array:
+    """g_i(u_i): fastest that an uncoupled oscillator moves away from x_d at the distance u_i.
+
+    With c = n·x_d ∈ [−|x_d|, |x_d|] the radial part is ρ (r² − |x_d|² − 2uc − u²)(c + u), a
+    parabola in c; for r = |x_d| its maximum is ρu³/8.
+
+    Returns
+    -------
+    ndarray (N,)
+        Upper bound [1/s].
+    """
+    u = np.maximum(u, 1e-300)
+    offset = system.radius**2 - D**2 - u**2
+    c = np.clip((offset - 2.0 * u**2) / (4.0 * u), -D, D)
+    radial = system.rho * (offset - 2.0 * u * c) * (c + u)
+    return np.abs(omega) * D + np.maximum(radial, 0.0)
+
+
+def _target_radius(system: CanonicalSystem, inhibited: Mask) -> float:
+    """D = |x_d|; the inhibited nodes must be pulled to one state in locked coordinates."""
+    if not np.any(inhibited):
+        raise ParameterError('no node is inhibited: at least one gain must be positive')
+    places = np.array([phase_rotation(float(phi)).T @ target for phi, target in zip(
+        system.graph.phases[inhibited], system.target[inhibited], strict=True)])
+    if np.abs(places - places[0]).max() > 1e-9 * (1.0 + np.abs(places).max()):
+        raise ParameterError('the targets of inhibited nodes must be in their places relative to '
+                             f'each other; in locked coordinates they are {places.tolist()}')
+    return float(np.hypot(*places[0]))
+
+
+def _distances(system: CanonicalSystem, L: Array, omega: Array, inhibited: Mask, D: float,
+               region_radius: float, largest: float) -> Array:
+    """Least fixed point of u_f = L_ff⁻¹(g_f − L_fi r0), and r0 at the inhibited nodes.
+
+    Every iterate from above is a valid box. A node that the inhibited ones do not reach, or
+    not firmly, may be anywhere in the invariant disc.
+    """
+    u = np.where(inhibited, region_radius, largest)
+    free = ~inhibited
+    for _ in range(12):
+        solved = _grounded_solution(L, outward_growth(system, omega, D, u), u, free)
+        beyond = free & (solved >= largest)
+        if np.any(beyond):                                  # fixed at the edge of the disc
+            free = free & ~beyond
+            u = np.where(beyond, largest, u)
+            continue
+        new = np.minimum(u, solved)
+        if np.abs(new - u).max() < 1e-12:
+            break
+        u = new
+    return u
+
+
+def _grounded_solution(L: Array, g: Array, u: Array, free: Mask) -> Array:
+    """Solve (L u)_i = g_i at the free nodes, u kept at the others; ∞ where unbounded."""
+    solved, heard = u.copy(), ~free
+    for _ in range(len(u)):
+        heard = heard | ((L < 0.0) @ heard)
+    solved[~heard] = np.inf                                 # no kept node acts on these
+    free = free & heard
+    if not np.any(free):
+        return solved
+    grounded, kept = L[np.ix_(free, free)], ~free & heard
+    if slowest_rate(grounded) <= 0.0 or np.any(~heard):
+        solved[free] = np.inf if np.all(heard) else solved[free]
+        return solved
+    solved[free] = np.linalg.solve(grounded, g[free] - L[np.ix_(free, kept)] @ u[kept])
+    return solved
+
+
+def _smallest_radii(system: CanonicalSystem, M: Array, omega: Array, u: Array, D: float,
+                    region_radius: float, largest: float, tolerance: float) -> Array:
+    """Lower bounds on |x_i|: the box itself, and invariant half-planes n_β·x_i ≥ c_i.
+
+    On the face of a half-plane the rotation takes away ω t, t the largest extent along the flow,
+    the coupling averages the c_j and inhibition pulls towards n_β·x_d; so c = n_β·x_d − s with
+    M s ≥ ω t suffices, as long as every state at capture is inside.
+    """
+    inner = np.maximum(0.0, D - u)
+    if np.any(M.sum(axis=1) < -1e-9 * np.abs(M).max()) or slowest_rate(M) <= 0.0:
+        return inner
+    beta = np.linspace(0.0, 1.2, 13)[:, None]                                # (13, 1) [rad]
+    extent = np.clip(u - D * np.sin(beta), 0.0, largest)                 # (13, N)
+    loss = omega * extent + system.rho * np.maximum(largest**2 - system.radius**2, 0.0) * largest
+    s = np.linalg.solve(M, loss.T).T
+    entry = _entry_height(beta, D, region_radius) - tolerance
+    s = s + np.maximum(0.0, (D * np.cos(beta) - entry - s).max(axis=1, keepdims=True))
+    return np.maximum(inner, (D * np.cos(beta) - s).max(axis=0))
+
+
+def _entry_height(beta: Array, D: float, region_radius: float) -> Array:
+    """Smallest n_β·x over the states of C on which |x| ≥ (1 − RADIUS_TOLERANCE)|x_d|."""
+    inner = (1.0 - RADIUS_TOLERANCE) * D
+    cosine = (inner**2 + D**2 - region_radius**2) / (2.0 * inner * D)
+    corner = inner * np.cos(np.minimum(np.arccos(np.clip(cosine, -1.0, 1.0)) + beta, np.pi))
+    lowest = D * np.cos(beta) - region_radius                            # of all of C
+    radius_there = np.sqrt(D**2 + region_radius**2 - 2.0 * D * region_radius * np.cos(beta))
+    return np.where(radius_there >= inner, lowest, np.maximum(corner, lowest))

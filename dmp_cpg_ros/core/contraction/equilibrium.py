@@ -1,0 +1,109 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where an inhibited network comes to rest: per oscillator a phase and a radius.
+
+An inhibited node holds all the others against their own rotation, so that it rests ahead of its
+target, and a follower solves f(x_i) + Σ_j K_ij (R(φ_ij) x_j − x_i) = 0: it rests ahead of its
+place by about atan(ω/k) with a smaller radius. Locked legs at rest are therefore not in their
+places.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.phase import phase, wrapped
+
+Array = NDArray[np.float64]
+
+_CONVERGED = 1e-11
+_SMALLEST_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class InhibitedEquilibrium:
+    """An equilibrium of the inhibited network.
+
+    Attributes
+    ----------
+    state : ndarray (N, 2)
+        x_i*.
+    phase_ahead : ndarray (N,)
+        Phase by which each oscillator rests ahead of its place [rad].
+    radius : ndarray (N,)
+        |x_i*|.
+    distance : ndarray (N,)
+        |x_i* − x_{i,d}|.
+    residual : float
+        Largest |ẋ| that is left by the iteration [1/s].
+    slowest_rate : float
+        Smallest decay rate of its linearisation [1/s]; positive when it is stable.
+    """
+
+    state: Array
+    phase_ahead: Array
+    radius: Array
+    distance: Array
+    residual: float
+    slowest_rate: float
+
+
+def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array,
+                          gains: Array) -> InhibitedEquilibrium | None:
+    """Equilibrium that grows out of the resting targets as ω rises from zero, by Newton's method.
+
+    Parameters
+    ----------
+    system : CanonicalSystem
+        Coupled oscillators.
+    omega : float or ndarray (N,)
+        Angular frequencies [rad/s].
+    gains : ndarray (N,)
+        Inhibition gains α_i that act [1/s].
+
+    Returns
+    -------
+    InhibitedEquilibrium or None
+        None when the equilibrium ceases to exist before ω is reached: the oscillators break free.
+    """
+    x = _newton(system, system.target.copy(), 0.0 * np.asarray(omega), gains)
+    if x is None:
+        return None
+    share, step = 0.0, 0.5
+    while share < 1.0:
+        ahead = min(1.0, share + step)
+        following = _newton(system, x, ahead * np.asarray(omega), gains)
+        if following is None:
+            step *= 0.5
+            if step < _SMALLEST_STEP:
+                return None
+        else:
+            x, share = following, ahead
+    rates = np.linalg.eigvals(system.jacobian(x, omega, gains)).real
+    return InhibitedEquilibrium(
+        x, wrapped(phase(x) - system.graph.phases), np.hypot(x[:, 0], x[:, 1]),
+        np.linalg.norm(x - system.target, axis=1),
+        float(np.linalg.norm(system.field(x, omega, gains), axis=1).max()), -float(rates.max()))
+
+
+def _newton(system: CanonicalSystem, x: Array, omega: Array, gains: Array) -> Array | None:
+    """Newton's iteration; None when it does not settle close to where it began."""
+    start, size = x, system.graph.size
+    scale = float(np.abs(system.linear_part(gains)[0]).max()) + 1.0
+    for _ in range(12):
+        residual = system.field(x, omega, gains)
+        if np.abs(residual).max() < _CONVERGED * scale:
+            return x
+        try:
+            step = np.linalg.solve(system.jacobian(x, omega, gains), residual.ravel())
+        except np.linalg.LinAlgError:
+            return None
+        x = x - step.reshape(size, 2)
+        if np.abs(x - start).max() > 0.5 * float(system.radius.max()):
+            return None
+    return None

@@ -1,0 +1,62 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a contraction test found, and how much it is worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dmp_cpg_ros.core.errors import ParameterError
+
+PROVED = 'proved'
+"""Grade of a bound that holds at every point: a closed form, or intervals rounded outwards."""
+
+SAMPLED = 'sampled'
+"""Grade of a bound that was evaluated at points, and may fail between them."""
+
+GRADES = (PROVED, SAMPLED)
+"""All grades, the stronger one first."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Outcome of a contraction test on a region.
+
+    Attributes
+    ----------
+    rate : float
+        λ of the definitions in Section 3.1 [1/s]: distances shrink at least like exp(−λt).
+        Negative where the test found no contraction.
+    grade : str
+        ``proved`` or ``sampled``.
+    evaluations : int
+        Points (sampled) or boxes (proved) at which the Jacobian was evaluated; 0 for closed forms.
+    statement : str
+        The result in one sentence.
+
+    Raises
+    ------
+    ParameterError
+        If the grade is neither of the two.
+    """
+
+    rate: float
+    grade: str
+    evaluations: int
+    statement: str
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        if self.grade not in GRADES:
+            raise ParameterError(f"grade '{self.grade}' is not known; valid are "
+                                 f"{', '.join(GRADES)}")
+
+    @property
+    def contracting(self) -> bool:
+        """Whether the rate is positive."""
+        return self.rate > 0.0
+
+
+def weakest(grades: tuple[str, ...]) -> str:
+    """Grade of a conclusion from several premises: proved only when all of them are."""
+    return PROVED if all(grade == PROVED for grade in grades) else SAMPLED

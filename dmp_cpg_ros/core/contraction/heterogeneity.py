@@ -1,0 +1,163 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Coupled oscillators of unequal frequencies: the bound (r/λ) d̄ on their disagreement (Section 3.4).
+
+With ω_i = ω + δ_i the mismatch d_i = δ_i S x_i is a disturbance of the homogeneous network. In the
+norm of Theorem 4, (Σ ξ_i |x_i − x̄|²)^½ =: ε with Σ ξ_i = 1, disagreement obeys ε̇ ≤ −λε + d̄, so
+that ε ≤ d̄/λ in the end. Once ε is small the oscillators are near their cycle, where they grow
+apart less than at the origin; the bound is applied again with that growth until it settles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
+from dmp_cpg_ros.core.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MismatchBound:
+    """What the oscillators' disagreement stays below, after a transient.
+
+    Attributes
+    ----------
+    disagreement : float
+        ε = (Σ ξ_i |x_i − x̄|²)^½.
+    distance : float
+        Largest |x_i − x_j|; the paper's (r/λ) d̄ with r = (1/ξ_i + 1/ξ_j)^½.
+    smallest_radius : float
+        Lower bound on every |x_i|; 0 where nothing is known.
+    phase_spread : float
+        Largest difference of two oscillators' phases from their places [rad]; π without a bound.
+    """
+
+    disagreement: float
+    distance: float
+    smallest_radius: float
+    phase_spread: float
+
+
+def disagreement_bound(rate: float, disturbance: float, weights: Array) -> tuple[float, float]:
+    """(r/λ) d̄: bounds on ε and on every |x_i − x_j| under a disturbance.
+
+    Parameters
+    ----------
+    rate : float
+        λ > 0 of :class:`~dmp_cpg_ros.core.contraction.synchronisation.Synchronisation` [1/s].
+    disturbance : float
+        d̄ ≥ (Σ ξ_i |d_i|²)^½ at all times [1/s].
+    weights : ndarray (N,)
+        ξ, adding up to 1.
+
+    Returns
+    -------
+    disagreement, distance : float
+
+    Raises
+    ------
+    ParameterError
+        If the rate is not positive.
+    """
+    if not rate > 0.0:
+        raise ParameterError(f'rate = {rate!r} 1/s must be positive: the network is not certified '
+                             'to synchronise')
+    disagreement = disturbance / rate
+    two_smallest = np.sort(weights)[:2]
+    return disagreement, disagreement * float(np.sqrt(np.sum(1.0 / two_smallest)))
+
+
+def mismatch_bound(found: Synchronisation, rho: float, radius: float,
+                   mismatch: float) -> MismatchBound:
+    """Bound for frequencies that differ from a common one by at most δ.
+
+    Parameters
+    ----------
+    found : Synchronisation
+        Of the homogeneous network, with weights.
+    rho, radius : float
+        ρ [1/s] and r of the oscillators; the disc |x| ≤ r is forward invariant.
+    mismatch : float
+        δ ≥ |ω_i − ω| [rad/s].
+
+    Returns
+    -------
+    MismatchBound
+        With an infinite disagreement when the network is not certified to synchronise or its
+        components only follow one another.
+    """
+    if not found.synchronises or found.weights is None:
+        return MismatchBound(float('inf'), float('inf'), 0.0, float(np.pi))
+    bound = MismatchBound(float('inf'), float('inf'), 0.0, float(np.pi))
+    for _ in range(20):
+        growth = min(found.growth, rho * (radius**2 - bound.smallest_radius**2))
+        epsilon, distance = disagreement_bound(found.connectivity - growth, mismatch * radius,
+                                               found.weights)
+        smallest = float(found.weights.min())
+        farthest = epsilon * ((1.0 - smallest) / smallest) ** 0.5            # bounds |x_i − x̄|
+        mean = _mean_radius(rho, radius, mismatch, epsilon, farthest)
+        inner = max(0.0, mean - farthest)
+        half = distance / (2.0 * inner) if inner > 0.0 else 1.0
+        spread = 2.0 * float(np.arcsin(half)) if half < 1.0 else float(np.pi)
+        new = MismatchBound(epsilon, distance, inner, spread)
+        if abs(new.smallest_radius - bound.smallest_radius) < 1e-9:
+            return new
+        bound = new
+    return bound
+
+
+def mismatch_margin(found: Synchronisation, rho: float, radius: float,
+                    phase_spread: float) -> float:
+    """Largest mismatch for which the phases stay together: the margin for unequal leg frequencies.
+
+    Parameters
+    ----------
+    found : Synchronisation
+        Of the homogeneous network.
+    rho, radius : float
+        Parameters of the oscillators.
+    phase_spread : float
+        What the phases may differ by [rad].
+
+    Returns
+    -------
+    float
+        δ with |ω_i − ω| ≤ δ [rad/s]; 0 when nothing is certified.
+    """
+    low, high = 0.0, max(found.rate, 0.0)
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        if mismatch_bound(found, rho, radius, middle).phase_spread <= phase_spread:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _mean_radius(rho: float, radius: float, mismatch: float, epsilon: float,
+                 farthest: float) -> float:
+    """Lower bound that R = |x̄| comes to, from Ṙ ≥ ρ(r²R − R³ − 3ε²R − ε² max|e|) − δε.
+
+    x̄ = Σ ξ_i x_i feels no coupling; the terms in ε are what the spread e_i = x_i − x̄ does to the
+    means of −ρ|x_i|²x_i and of δ_i S x_i. The right side is concave and positive between two
+    roots; R passes the lower one from all initial states but those with x̄ near 0. Newton's
+    iteration from r falls towards the upper one.
+    """
+    linear = radius**2 - 3.0 * epsilon**2
+    constant = epsilon**2 * farthest + mismatch * epsilon / rho
+    R = radius
+    for _ in range(50):
+        slope = linear - 3.0 * R * R
+        if not slope < 0.0:
+            return 0.0
+        step = (linear * R - R**3 - constant) / slope
+        R -= step
+        if abs(step) < 1e-13 * radius:
+            return max(0.0, R - 1e-9 * radius)
+    return 0.0

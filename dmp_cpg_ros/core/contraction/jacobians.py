@@ -1,0 +1,125 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Jacobians of a user's own field, and the generalized Jacobian of a metric (Section 3.1).
+
+What this package ships has analytic Jacobians. For any other field the complex step (Squire &
+Trapp, SIAM Review 40, 1998) is exact to rounding where the field is analytic code; where it is not
+(an absolute value, an arctangent of two arguments) central differences take over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dmp_cpg_ros.core.errors import DataError
+
+Array = NDArray[np.float64]
+Field = Callable[[Array], Array]
+
+_COMPLEX_STEP = 1e-30
+_DIFFERENCE_STEP = 6e-6  # about the cube root of the machine's precision
+_AGREEMENT = 1e-5
+
+
+def complex_step_jacobian(field: Field, x: ArrayLike) -> Array:
+    """∂f/∂x by the complex step, for fields that are made of analytic operations.
+
+    Parameters
+    ----------
+    field : callable
+        f: ndarray (n,) → ndarray (m,); it is called with complex numbers.
+    x : array_like (n,)
+        State.
+
+    Returns
+    -------
+    ndarray (m, n)
+    """
+    x = np.asarray(x, dtype=float)
+    columns = []
+    for k in range(x.size):
+        shifted = x.astype(complex)
+        shifted[k] += 1j * _COMPLEX_STEP
+        columns.append(np.imag(np.asarray(field(shifted))) / _COMPLEX_STEP)
+    return np.stack(columns, axis=-1)
+
+
+def difference_jacobian(field: Field, x: ArrayLike) -> Array:
+    """∂f/∂x by central differences, with an error of about 1e-10 of the field's scale.
+
+    Parameters
+    ----------
+    field : callable
+        f: ndarray (n,) → ndarray (m,).
+    x : array_like (n,)
+        State.
+
+    Returns
+    -------
+    ndarray (m, n)
+    """
+    x = np.asarray(x, dtype=float)
+    columns = []
+    for k in range(x.size):
+        step = _DIFFERENCE_STEP * max(1.0, abs(float(x[k])))
+        ahead, behind = x.copy(), x.copy()
+        ahead[k] += step
+        behind[k] -= step
+        columns.append((np.asarray(field(ahead)) - np.asarray(field(behind)))
+                       / (ahead[k] - behind[k]))
+    return np.stack(columns, axis=-1)
+
+
+def numerical_jacobian(field: Field, x: ArrayLike) -> Array:
+    """∂f/∂x of any smooth field: the complex step where it agrees with differences.
+
+    Parameters
+    ----------
+    field : callable
+        f: ndarray (n,) → ndarray (m,).
+    x : array_like (n,)
+        State.
+
+    Returns
+    -------
+    ndarray (m, n)
+
+    Raises
+    ------
+    DataError
+        If the field is not finite around the state.
+    """
+    differences = difference_jacobian(field, x)
+    if not np.all(np.isfinite(differences)):
+        raise DataError(f'the field is not finite around x = {np.asarray(x).tolist()}')
+    try:
+        exact = complex_step_jacobian(field, x)
+    except TypeError:  # the field has a function that takes real numbers only
+        return differences
+    scale = 1.0 + np.abs(differences).max(initial=0.0)
+    return exact if np.abs(exact - differences).max(initial=0.0) < _AGREEMENT * scale \
+        else differences
+
+
+def generalized_jacobian(A: Array, Theta: Array, Theta_dot: Array | None = None) -> Array:
+    """F = (Θ A + Θ̇) Θ⁻¹, the Jacobian in the differential coordinates δz = Θ δx.
+
+    Parameters
+    ----------
+    A : ndarray (..., n, n)
+        Jacobian [1/s].
+    Theta : ndarray (..., n, n)
+        Change of coordinates, a factor of the metric M = ΘᵀΘ.
+    Theta_dot : ndarray (..., n, n), optional
+        Its rate along the flow [1/s]; zero without.
+
+    Returns
+    -------
+    ndarray (..., n, n)
+    """
+    turned = Theta @ A if Theta_dot is None else Theta @ A + Theta_dot
+    return turned @ np.linalg.inv(Theta)

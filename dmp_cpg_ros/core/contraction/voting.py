@@ -1,0 +1,164 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Stopping by vote: every oscillator inhibits with a weight α_i ≥ 0 (the paper's discussion).
+
+f_inh = −L x + [α_1 g_1(x_1), …, α_N g_N(x_N)] contracts faster the larger the weights. Clamped to
+a common α, the votes of a majority hold all rotors inside their regions C_i while fewer votes do
+not. The nodes must be in their places when they vote, so that they enter their regions together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.contraction.capture import capture_set
+from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
+from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
+from dmp_cpg_ros.core.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+_PRECISION = 1e-4
+
+
+@dataclass(frozen=True)
+class MajorityClamp:
+    """Clamp of the voters' weights for which a majority stops the gait and fewer do not.
+
+    Attributes
+    ----------
+    lowest : float
+        Certified: with this α any majority stops the gait [1/s].
+    highest : float
+        Below this α no smaller vote has an equilibrium inside its regions [1/s].
+    majority : int
+        Number of votes that is needed.
+    """
+
+    lowest: float
+    highest: float
+    majority: int
+
+    @property
+    def possible(self) -> bool:
+        """Whether there is a clamp between the two."""
+        return self.lowest < self.highest
+
+
+def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequence[int],
+                   region_radius: float) -> float:
+    """Smallest common α at which the voters' network can rest inside their regions.
+
+    Parameters
+    ----------
+    system : CanonicalSystem
+        Coupled oscillators.
+    omega : float or ndarray (N,)
+        Angular frequencies [rad/s].
+    voters : sequence of int
+        Nodes that vote.
+    region_radius : float
+        r0 of the regions C_i.
+
+    Returns
+    -------
+    float
+        Found by bisection on the equilibrium [1/s]: necessary for a stop, and tight; infinite when
+        no weight is enough.
+    """
+    def rests(alpha: float) -> bool:
+        gains = _votes(system, voters, alpha)
+        rest = inhibited_equilibrium(system, omega, gains)
+        return (rest is not None and rest.slowest_rate > 0.0
+                and bool(np.all(rest.distance[gains > 0.0] <= region_radius)))
+
+    return _threshold(rests, _scale(system, omega, region_radius))
+
+
+def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequence[int],
+                        region_radius: float) -> float:
+    """Smallest common α for which capture by the voters is proved to hold and to contract.
+
+    Parameters are those of :func:`rest_threshold`.
+
+    Returns
+    -------
+    float
+        Sufficient for a stop [1/s]; infinite when no weight is certified.
+    """
+    def certified(alpha: float) -> bool:
+        capture = capture_set(system, omega, _votes(system, voters, alpha), region_radius)
+        return capture.holds and inhibited_contraction(system, capture).reach != NONE
+
+    return _threshold(certified, _scale(system, omega, region_radius))
+
+
+def majority_clamp(system: CanonicalSystem, omega: float | Array, region_radius: float,
+                   majority: int) -> MajorityClamp:
+    """Clamp for which ``majority`` votes are enough, whoever casts them, and one less is not.
+
+    Parameters
+    ----------
+    system : CanonicalSystem
+        Coupled oscillators.
+    omega : float or ndarray (N,)
+        Angular frequencies [rad/s].
+    region_radius : float
+        r0 of the regions C_i.
+    majority : int
+        Number of votes, 1 to N.
+
+    Returns
+    -------
+    MajorityClamp
+
+    Raises
+    ------
+    ParameterError
+        If the number of votes is impossible.
+    """
+    size = system.graph.size
+    if not 1 <= majority <= size:
+        raise ParameterError(f'majority = {majority} must lie between 1 and {size}, the number of '
+                             'oscillators')
+    lowest = max(certified_threshold(system, omega, voters, region_radius)
+                 for voters in _subsets(size, majority))
+    highest = min((rest_threshold(system, omega, voters, region_radius)
+                   for voters in _subsets(size, majority - 1)), default=np.inf)
+    return MajorityClamp(lowest, highest, majority)
+
+
+def _subsets(size: int, count: int) -> Iterable[tuple[int, ...]]:
+    return combinations(range(size), count) if count > 0 else ()
+
+
+def _votes(system: CanonicalSystem, voters: Sequence[int], alpha: float) -> Array:
+    gains = np.zeros(system.graph.size)
+    gains[list(voters)] = alpha
+    return gains
+
+
+def _scale(system: CanonicalSystem, omega: float | Array, region_radius: float) -> float:
+    """Order of magnitude of what one node needs to hold all others [1/s]."""
+    omega = np.broadcast_to(np.abs(omega), (system.graph.size,))
+    return float(np.sum(omega * system.radius)) / region_radius + 1e-3
+
+
+def _threshold(works: Callable[[float], bool], scale: float) -> float:
+    """Smallest α at which something starts to work, searched from 1/30 to 1000 times a scale."""
+    low, high = scale / 30.0, 3.0 * scale
+    while not works(high):
+        low, high = high, 3.0 * high
+        if high > 1000.0 * scale:
+            return float('inf')
+    while high > low * (1.0 + _PRECISION):
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if works(middle) else (middle, high)
+    return high
