@@ -131,6 +131,11 @@ def test_impossible_graphs_are_refused(
         graph_from_edges(4, edges, gain)
 
 
+def test_sparse_graphs_of_many_nodes_are_made_without_the_dense_one() -> None:
+    for name, edges in (('ring', 100_000), ('path', 99_998), ('directed_ring', 50_000)):
+        assert len(topology(name, 50_000)) == edges
+
+
 def test_shapes_must_fit() -> None:
     with pytest.raises(ParameterError, match='need gains'):
         CouplingGraph(2, ((0, 1),), np.eye(2), np.zeros(2))

@@ -138,8 +138,9 @@ def topology(name: str, size: int) -> Edges:
     """
     following = [(i, i + 1) for i in range(size - 1)]
     closing = [(size - 1, 0)] if size > 2 else []
-    undirected = {
-        'all_to_all': [(i, j) for i in range(size) for j in range(i + 1, size)],
+    undirected: dict[str, Iterable[tuple[int, int]]] = {
+        # lazy, for it is long where the others are short
+        'all_to_all': ((i, j) for i in range(size) for j in range(i + 1, size)),
         'ring': following + closing,
         'path': following,
         'star': [(0, i) for i in range(1, size)],
