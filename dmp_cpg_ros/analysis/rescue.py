@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes a sound rosbag2 folder of an MCAP recording that was not closed.
 
-The usual readers refuse a file without its summary. The file is therefore read as a stream, record by record, up to
-where it breaks off, and written anew.
+The usual readers refuse a file without its summary. The file is therefore read as a stream, record
+by record, up to where it breaks off, and written anew.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from dmp_cpg_ros.core.errors import DataError, MissingFileError
 def rescue(bag: Path | str) -> Path:
     """Rewrite an MCAP bag from every record of it that is complete.
 
-    The damaged file is replaced only when its replacement is complete, so that an interrupted rescue can be repeated.
+    The damaged file is replaced only when its replacement is complete, so that an interrupted
+    rescue can be repeated.
 
     Parameters
     ----------
@@ -102,7 +103,8 @@ class _Copier:
         if isinstance(record, Schema):
             self._schemas[record.id] = record
         elif isinstance(record, Channel):
-            self._connections[record.id] = self._connection(record, self._schemas[record.schema_id])
+            self._connections[record.id] = self._connection(
+                record, self._schemas[record.schema_id])
         elif isinstance(record, Message):
             self._writer.write(self._connections[record.channel_id], record.log_time, record.data)
             return 1

@@ -12,13 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock as RclpyClock
+from rclpy.clock import ClockType
 from rclpy.timer import Timer
+from rosgraph_msgs.msg import Clock
 
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.nodes.bag_writing import STORAGES, BagWriter
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL, TOPICS, Interface, interface
+from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL, TOPICS, Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.tick_inputs import drain
 
@@ -35,10 +37,11 @@ class RecorderParameters(Parameters):
     """Parameters of the recorder."""
 
     output: str = parameter('bag', 'folder of the recording; must not exist yet')
-    storage: str = parameter('mcap', 'kind of file; only mcap survives a killed recorder', choices=STORAGES)
+    storage: str = parameter('mcap', 'kind of file; only mcap survives a killed recorder',
+                             choices=STORAGES)
     topics: tuple[str, ...] = parameter((ALL,), 'topics to record', choices=(
         ALL, *(topic.name for topic in TOPICS)))
-    flush_period: float = parameter(0.25, 'time between flushes; what is older survives a killed recorder',
+    flush_period: float = parameter(0.25, 'time between flushes; what is older survives a kill',
                                     unit='s', minimum=0.02, maximum=60.0)
     stamped_cmd_vel: bool = parameter(False, 'whether cmd_vel is TwistStamped')
 
@@ -46,8 +49,8 @@ class RecorderParameters(Parameters):
 class BagRecorder(ManagedNode):
     """Records the suite's topics into a rosbag2 folder (MCAP or SQLite), bytes as received.
 
-    It records while it is active. The bag is opened when the node is configured and completed when it is cleaned up
-    or its process ends; a killed recorder leaves a bag that `analyze` can rescue.
+    It records while it is active. The bag is opened when the node is configured and completed when
+    it is cleaned up or its process ends; a killed recorder leaves a bag that `analyze` can rescue.
     """
 
     KIND = 'bag_recorder'
@@ -63,8 +66,9 @@ class BagRecorder(ManagedNode):
         self.serve('~/recorded', self._answer_recorded)
         self._started = time.monotonic()
         # The wall clock drives only how much a kill may cost.
-        self._flush_timer: Timer = self.create_timer(parameters.flush_period, self._bag.flush,
-                                                     clock=Clock(clock_type=ClockType.STEADY_TIME))
+        steady = RclpyClock(clock_type=ClockType.STEADY_TIME)
+        self._flush_timer: Timer = self.create_timer(
+            parameters.flush_period, self._bag.flush, clock=steady)
 
     def deactivate(self) -> None:
         """Take what has arrived."""
@@ -79,14 +83,16 @@ class BagRecorder(ManagedNode):
         self.destroy_timer(self._flush_timer)
         self._subscriptions_drained_at_end = []
         self._bag.close()
-        self.get_logger().info(f"{sum(self._bag.counts.values())} messages in '{self._bag.folder}'")
+        if self.context.ok():
+            count = sum(self._bag.counts.values())
+            self.get_logger().info(f"{count} messages in '{self._bag.folder}'")
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Messages per topic, messages on disk, seconds of wall time."""
-        if not hasattr(self, '_bag'):
-            return {}
-        values: dict[str, Any] = {f'messages.{topic}': count for topic, count in self._bag.counts.items()}
-        values |= {'messages': sum(self._bag.counts.values()), 'messages_on_disk': self._bag.flushed,
+        values: dict[str, Any] = {
+            f'messages.{topic}': count for topic, count in self._bag.counts.items()}
+        values |= {'messages': sum(self._bag.counts.values()),
+                   'messages_on_disk': self._bag.flushed,
                    'wall_s': time.monotonic() - self._started}
         return values
 
@@ -98,7 +104,7 @@ class BagRecorder(ManagedNode):
         return STAMPED_CMD_VEL if parameters.stamped_cmd_vel and topic.name == 'cmd_vel' else topic
 
     def _record(self, topic: Interface) -> Any:
-        """Subscribe to a topic; the writer needs the full name that only the subscription knows."""
+        """Subscribe; the writer needs the full name that only the subscription knows."""
         writers: list[Callable[[bytes], None]] = []
         is_tick = topic.name == TICK_TOPIC
 
@@ -112,7 +118,8 @@ class BagRecorder(ManagedNode):
         fields = topic.type.get_fields_and_field_types()
         writers.append(self._bag.add_topic(
             subscription.topic_name, topic.type_name, topic.publisher_qos,
-            stamped='header' in fields or topic.type is interface('/clock').type, clock=topic.name in CLOCK_TOPICS))
+            stamped='header' in fields or topic.type is Clock,
+            clock=topic.name in CLOCK_TOPICS))
         return subscription
 
 

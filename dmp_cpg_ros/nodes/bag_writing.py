@@ -2,14 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rosbag2 recording that stays readable when its process is killed.
 
-MCAP files consist of chunks; what lies in closed chunks survives. :meth:`BagWriter.flush` closes the chunk and hands it
-to the operating system, so that a killed recorder loses no more than what came after the last flush;
-:func:`~dmp_cpg_ros.analysis.rescue.rescue` makes a sound bag of the file. SQLite recordings are one transaction,
-which is committed when the bag is closed: a killed recorder leaves an empty one.
+MCAP files consist of chunks; what lies in closed chunks survives. :meth:`BagWriter.flush` closes
+the chunk and hands it to the operating system, so that a killed recorder loses no more than what
+came after the last flush; :func:`~dmp_cpg_ros.analysis.rescue.rescue` makes a sound bag of the
+file. SQLite recordings are one transaction, which is committed when the bag is closed: a killed
+recorder leaves an empty one.
 
-Time of a record: the stamp of the message. A recording then does not depend on when its messages happened to arrive,
-and in lock-step not on the machine. Messages without a stamp (``cmd_vel``, or stamp zero from a node that knows no
-time yet) bear the newest time of the robot's clock; those that arrive before the clock is known wait for it.
+Time of a record: the stamp of the message. A recording then does not depend on when its messages
+happened to arrive, and in lock-step not on the machine. Messages without a stamp (``cmd_vel``, or
+stamp zero from a node that knows no time yet) bear the newest time of the robot's clock; those
+that arrive before the clock is known wait for it.
 """
 
 from __future__ import annotations
@@ -73,7 +75,8 @@ class BagWriter:
 
     def __init__(self, folder: Path, storage: str = 'mcap') -> None:
         """Open the bag."""
-        self.folder, self.counts, self.flushed = folder, {}, 0
+        self.folder, self.flushed = folder, 0
+        self.counts: dict[str, int] = {}
         self.newest_ns: int | None = None
         self._waiting: list[tuple[Connection, bytes]] = []
         self._store = get_typestore(Stores.ROS2_JAZZY)
@@ -81,8 +84,8 @@ class BagWriter:
             self._writer = Writer(folder, version=9, storage_plugin=StoragePlugin[storage.upper()])
             self._writer.open()
         except (WriterError, OSError) as error:
-            raise ParameterError(f"output '{folder}' must be a folder that can be made and does not exist: "
-                                 f'{error}') from error
+            raise ParameterError(f"output '{folder}' must be a folder that does not exist and "
+                                 f'can be made: {error}') from error
         self._file = getattr(self._writer.storage, 'bio', None)
         if self._file is not None:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -128,7 +131,7 @@ class BagWriter:
         return write
 
     def flush(self) -> None:
-        """Hand everything that was written to the operating system (MCAP; nothing to do for SQLite)."""
+        """Hand what was written to the operating system (MCAP; nothing to do for SQLite)."""
         storage = self._writer.storage
         chunk, close_chunk = getattr(storage, 'chunk', None), getattr(storage, 'close_chunk', None)
         if self._file is None or chunk is None or close_chunk is None:
@@ -167,12 +170,13 @@ class BagWriter:
 
 def offered_qos(profile: QoSProfile) -> Qos:
     """Profile of rclpy as rosbags stores it; unset times are rosbag2's infinity."""
-    return Qos(QosHistory(int(profile.history)), profile.depth, QosReliability(int(profile.reliability)),
-               QosDurability(int(profile.durability)), _UNSET, _UNSET, QosLiveliness.SYSTEM_DEFAULT, _UNSET, False)
+    return Qos(QosHistory(int(profile.history)), profile.depth,
+               QosReliability(int(profile.reliability)), QosDurability(int(profile.durability)),
+               _UNSET, _UNSET, QosLiveliness.SYSTEM_DEFAULT, _UNSET, False)
 
 
 def _leading_stamp(data: bytes) -> int:
-    """Stamp at the beginning of a serialized message [ns]; 0 when there is none or it is negative."""
+    """Stamp that a serialized message begins with [ns]; 0 when it is absent or negative."""
     if len(data) < _STAMP_AT + 8:
         return 0
     seconds, rest = (_STAMP_LITTLE if data[1] & 1 else _STAMP_BIG).unpack_from(data, _STAMP_AT)

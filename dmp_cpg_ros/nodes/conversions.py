@@ -3,8 +3,9 @@
 """Between the suite's messages and the core's arrays.
 
 Values pass bit for bit. What enters is taken by name and checked;
-:class:`~dmp_cpg_ros.core.errors.DataError` is raised for what must not enter. The robot's state is in
-:mod:`~dmp_cpg_ros.nodes.robot_state_messages`, stop and start in :mod:`~dmp_cpg_ros.nodes.inhibition_messages`.
+:class:`~dmp_cpg_ros.core.errors.DataError` is raised for what must not enter. The robot's state is
+in :mod:`~dmp_cpg_ros.nodes.robot_state_messages`, stop and start in
+:mod:`~dmp_cpg_ros.nodes.inhibition_messages`.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ CORRECTION_NAMES = ('base_x', 'base_y', 'base_yaw')
 
 
 def read_twist(message: Twist) -> tuple[float, float, float]:
-    """(v_x, v_y, γ) of a velocity command [m/s, m/s, rad/s]; raises DataError when any number is not finite."""
+    """(v_x, v_y, γ) of a velocity command [m/s, m/s, rad/s]; raises DataError."""
     linear, angular = message.linear, message.angular
     v_x, v_y, gamma = linear.x, linear.y, angular.z
     checked_numbers((v_x, v_y, gamma, linear.z, angular.x, angular.y), 'velocity')
@@ -63,7 +64,7 @@ class CanonicalStateWriter:
         self._writer = JointStateWriter(CANONICAL_NAMES, ('position', 'velocity'))
 
     def fill(self, time_ns: int, x: Array, x_dot: Array) -> JointState:
-        """Refill with states and rates [1/s], ndarrays (4, 2); raises DataError when they are not finite."""
+        """Refill with states and rates [1/s], ndarrays (4, 2); raises DataError."""
         return self._writer.fill(time_ns, x, x_dot)
 
 
@@ -88,7 +89,7 @@ class JointTargetsWriter:
         self._writer = JointStateWriter([f'{leg}_{joint}' for joint in JOINTS_OF_LEG], FIELDS)
 
     def fill(self, time_ns: int, targets: JointTargets) -> JointState:
-        """Refill with the targets of the leg's joints; raises DataError when they are not finite."""
+        """Refill with the targets of the leg's joints; raises DataError."""
         return self._writer.fill(time_ns, targets.position, targets.velocity, targets.effort)
 
 
@@ -97,11 +98,12 @@ class JointTargetsReader:
 
     def __init__(self) -> None:
         """Prepare the order of the joints of every leg."""
-        self._readers = {leg: JointStateReader([f'{leg}_{joint}' for joint in JOINTS_OF_LEG], FIELDS)
-                         for leg in LEGS}
+        self._readers = {
+            leg: JointStateReader([f'{leg}_{joint}' for joint in JOINTS_OF_LEG], FIELDS)
+            for leg in LEGS}
 
     def read(self, message: JointState) -> tuple[str, JointTargets]:
-        """Name of the leg and its targets; raises DataError when the names are not those of one leg."""
+        """Name of the leg and its targets; raises DataError, also for names of no leg."""
         names = message.name
         leg = names[0].partition('_')[0] if names else ''
         if leg not in self._readers or len(names) != len(JOINTS_OF_LEG):
@@ -111,7 +113,7 @@ class JointTargetsReader:
 
 
 class PostureFeedbackWriter:
-    """Writes ``posture_feedback``: twelve torques, a shift in x and y for each foot, a correction of the velocity."""
+    """Writes ``posture_feedback``: torques, a shift in x and y per foot, a velocity correction."""
 
     def __init__(self) -> None:
         """Build the message."""
@@ -121,7 +123,8 @@ class PostureFeedbackWriter:
 
     def fill(self, time_ns: int, feedback: PostureFeedback) -> JointState:
         """Refill with a feedback; raises DataError when it is not finite."""
-        self._position[len(JOINT_NAMES):-len(CORRECTION_NAMES)] = feedback.shift_in_base.reshape(-1)
+        shift = feedback.shift_in_base.reshape(-1)
+        self._position[len(JOINT_NAMES):-len(CORRECTION_NAMES)] = shift
         self._velocity[-len(CORRECTION_NAMES):] = feedback.correction
         self._effort[:len(JOINT_NAMES)] = feedback.torque
         return self._writer.fill(time_ns, self._position, self._velocity, self._effort)

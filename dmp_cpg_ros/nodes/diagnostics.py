@@ -33,7 +33,7 @@ class NodeHealth:
     """
 
     def __init__(self, name: str) -> None:
-        """Start healthy; nodes report at different moments of a second, so that no tick bears all reports."""
+        """Start healthy; nodes report at different moments, so that no tick bears all reports."""
         self.name = name
         self.ticks = 0
         self.stamp_ns = 0
@@ -52,7 +52,7 @@ class NodeHealth:
         return True
 
     def reject(self, topic: str, problem: str) -> bool:
-        """Count a dropped message; returns whether to log it (the first of a topic and every hundredth)."""
+        """Count a dropped message; returns whether to log it: the first and every hundredth."""
         count = self.rejected[topic] = self.rejected.get(topic, 0) + 1
         self._recent[topic] = problem
         return count % LOG_EVERY == 1
@@ -78,14 +78,16 @@ class NodeHealth:
         values : mapping of str to value
             What the node adds.
         periodic : bool
-            Whether this report closes the second in which messages were rejected; later reports are healthy again.
+            Whether this report closes the second in which messages were rejected; later reports
+            are healthy again.
         """
         problems = dict(self._problems)
         for topic, problem in self._recent.items():
             problems.setdefault(topic, (DiagnosticStatus.WARN, f'{topic}: {problem}'))
         if periodic:
             self._recent = {}
-        entries: dict[str, Any] = {'state': state, 'ticks': self.ticks, 'last_stamp_ns': self.stamp_ns}
+        entries: dict[str, Any] = {
+            'state': state, 'ticks': self.ticks, 'last_stamp_ns': self.stamp_ns}
         entries.update((f'rejected.{topic}', count) for topic, count in self.rejected.items())
         entries.update(values)
         status = DiagnosticStatus(

@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from types import FrameType
 
 import rclpy
@@ -24,15 +24,18 @@ from rclpy.utilities import get_default_context, remove_ros_args
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.nodes.help_text import help_text
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
 
 FOREVER_S = 1e6
-"""A wait that is bounded, since unbounded waits of the events executor do not work in some builds [s]."""
+"""A bounded wait: unbounded ones of the events executor do not work in some builds [s]."""
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 
-_ARGUMENT_ERRORS = (rclpy_implementation.RCLInvalidROSArgsError, rclpy_implementation.UnknownROSArgsError)
+_BAD_ARGUMENTS = (ParameterError, MissingFileError, ParameterException,
+                  rclpy_implementation.RCLInvalidROSArgsError,
+                  rclpy_implementation.UnknownROSArgsError)
 
 
 def make_executor(kind: str, context: Context | None = None) -> Executor:
@@ -41,8 +44,8 @@ def make_executor(kind: str, context: Context | None = None) -> Executor:
     Parameters
     ----------
     kind : str
-        ``events`` or ``single``. Where the events executor is missing or does not run a first task, the
-        single-threaded one is returned, with a warning.
+        ``events`` or ``single``. Where the events executor is missing or does not run a first
+        task, the single-threaded one is returned, with a warning.
     context : Context, optional
         Default: the global one.
     """
@@ -57,7 +60,8 @@ def make_executor(kind: str, context: Context | None = None) -> Executor:
             reason = 'it did not run a first task'
         except (ImportError, AttributeError, TypeError, RuntimeError) as error:
             reason = str(error)
-        get_logger('executor').warning(f'no events executor ({reason}); using the single-threaded one')
+        get_logger('executor').warning(
+            f'no events executor ({reason}); using the single-threaded one')
     return SingleThreadedExecutor(context=context)
 
 
@@ -83,10 +87,11 @@ def spin(nodes: Node | Sequence[Node], kind: str = 'events', until: Future | Non
             begin = time.monotonic()
             executor.spin_until_future_complete(until, timeout_sec=FOREVER_S)
             if context.ok() and not until.done() and time.monotonic() - begin < 1.0:
-                raise RuntimeError('the executor returned at once; choose another with parameter executor')
+                raise RuntimeError("the executor returned at once; try parameter 'executor'")
     except ExternalShutdownException:
         pass
     except Exception:
+        # A signal that ends the context while a call is under way makes that call fail.
         if context.ok():
             raise
     finally:
@@ -107,64 +112,84 @@ def run_node(node_class: type[ManagedNode], arguments: Sequence[str] | None = No
     Returns
     -------
     int
-        Exit status: 0 after Ctrl-C or SIGTERM, 2 when a parameter or argument is bad, 1 when something else failed.
+        Exit status: 0 after Ctrl-C or SIGTERM, 2 when a parameter or argument is bad, 1 when
+        something else failed.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     if {'-h', '--help'} & set(_before_ros_args(arguments)):
         print(help_text(node_class))
         return OK
-    # rclpy's own handler ends the context; Python's would raise KeyboardInterrupt inside a callback.
+    return run_nodes(node_class.KIND, arguments,
+                     lambda: [node_class(node_class.default_name(arguments))])
+
+
+def run_nodes(program: str, arguments: Sequence[str],
+              make: Callable[[], Iterable[ManagedNode]]) -> int:
+    """Run nodes in one process and one executor, from ``rclpy.init`` to the exit status.
+
+    Parameters
+    ----------
+    program : str
+        Name for messages.
+    arguments : sequence of str
+        Command line without the program's name; all of it for ROS.
+    make : callable () → iterable of ManagedNode
+        Makes the nodes; called after ``rclpy.init``. The first node's parameter ``executor``
+        decides for all.
+
+    Returns
+    -------
+    int
+        As for :func:`run_node`.
+    """
+    # rclpy's own handler ends the context; Python's would raise KeyboardInterrupt in a callback.
     signal.signal(signal.SIGINT, _ignore)
     nodes: list[ManagedNode] = []
-    try:
-        status = _guarded(node_class, lambda: _run(node_class, arguments, nodes))
-        return max(status, _guarded(node_class, lambda: _end(nodes)))
-    finally:
-        rclpy.try_shutdown()
+    status = _status(program, lambda: _run(program, arguments, make, nodes))
+    rclpy.try_shutdown()
+    # From here on a second Ctrl-C must not break into what is being completed: a recording.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    for node in nodes:
+        status = max(status, _status(program, node.close), _status(program, node.destroy_node))
+    return status
 
 
-def _run(node_class: type[ManagedNode], arguments: list[str], nodes: list[ManagedNode]) -> None:
-    unknown = remove_ros_args([node_class.KIND, *arguments])[1:]
+def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[ManagedNode]],
+         nodes: list[ManagedNode]) -> None:
+    unknown = remove_ros_args([program, *arguments])[1:]
     if unknown:
-        raise ParameterError(f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
-    rclpy.init(args=[node_class.KIND, *arguments])
+        raise ParameterError(
+            f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
+    prepare_middleware()
+    rclpy.init(args=[program, *arguments])
     try:
-        nodes.append(node_class(node_class.default_name(arguments)))
-        nodes[0].start()
+        nodes.extend(make())
+        for node in nodes:
+            node.start()
         spin(nodes, nodes[0].parameters_of(NodeParameters).executor)
-    except ExternalShutdownException:
-        return
     except DmpCpgError:
         raise
     except Exception:
-        # A signal that ends the context while a call is under way makes that call fail.
         if rclpy.ok():
             raise
 
 
-def _end(nodes: list[ManagedNode]) -> None:
-    for node in nodes:
-        try:
-            node.close()
-        finally:
-            node.destroy_node()
-
-
-def _guarded(node_class: type[ManagedNode], body: Callable[[], None]) -> int:
+def _status(program: str, body: Callable[[], object]) -> int:
     """Run a body; what it raises becomes a message and an exit status."""
     try:
         body()
-        return OK
-    except (ParameterError, MissingFileError, ParameterException, *_ARGUMENT_ERRORS) as error:
-        return _failed(node_class, str(error), BAD_INPUT)
+    except _BAD_ARGUMENTS as error:
+        return _said(program, str(error), BAD_INPUT)
     except DmpCpgError as error:
-        return _failed(node_class, str(error), FAILED)
-    except Exception:
-        return _failed(node_class, traceback.format_exc(), FAILED)
+        return _said(program, str(error), FAILED)
+    except Exception:  # noqa: BLE001 - the last resort of a process
+        return _said(program, traceback.format_exc(), FAILED)
+    return OK
 
 
-def _failed(node_class: type[ManagedNode], message: str, status: int) -> int:
-    print(f'{node_class.KIND}: {message}', file=sys.stderr, flush=True)
+def _said(program: str, message: str, status: int) -> int:
+    print(f'{program}: {message}', file=sys.stderr, flush=True)
     return status
 
 

@@ -18,10 +18,11 @@ if TYPE_CHECKING:
 
 
 def help_text(node_class: type[ManagedNode]) -> str:
-    """Say what a node does, its topics and services, and its parameters with units, defaults and ranges."""
+    """Say what a node does, and name its topics, services and parameters."""
     kind = node_class.KIND
     summary = inspect.cleandoc(node_class.__doc__ or '').split('\n\n')[0]
-    parts = [f'usage: {kind} [--help] [--ros-args [-p NAME:=VALUE] [-r FROM:=TO] [--params-file FILE] ...]', summary]
+    parts = [f'usage: {kind} [--help] [--ros-args [-p NAME:=VALUE] [-r FROM:=TO] '
+             '[--params-file FILE] ...]', summary]
     for title, interfaces in (('subscribes to', read_by(kind)), ('publishes', published_by(kind)),
                               ('serves', served_by(kind))):
         if interfaces:
@@ -31,8 +32,8 @@ def help_text(node_class: type[ManagedNode]) -> str:
 
 
 def _interface_lines(interfaces: Iterable[Interface]) -> list[str]:
-    return [f'  {entry.name} ({entry.type_name}){", latched" if entry.latched else ""}\n      {entry.meaning}'
-            for entry in interfaces]
+    return [f'  {entry.name} ({entry.type_name}{", latched" if entry.latched else ""})\n'
+            f'      {entry.meaning}' for entry in interfaces]
 
 
 def _parameter_lines(table: ParameterTable) -> list[str]:

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``inhibition_state``: what stops the gait, as words and decimal text that reads back to the same numbers."""
+"""``inhibition_state``: stop and start as words and as text that reads back to the numbers."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class InhibitionStateWriter:
         self._values: dict[str, Any] = {}
         self._entries: dict[str, KeyValue] = {}
 
-    def fill(self, time_ns: int, word: str, values: Mapping[str, Any], *, level: bytes = DiagnosticStatus.OK,
-             ) -> DiagnosticArray:
+    def fill(self, time_ns: int, word: str, values: Mapping[str, Any], *,
+             level: bytes = DiagnosticStatus.OK) -> DiagnosticArray:
         """Refill.
 
         Parameters
@@ -36,7 +36,8 @@ class InhibitionStateWriter:
         word : str
             State.
         values : mapping of str to value
-            Numbers become decimal text that reads back to the same float. The keys must not change between calls.
+            Numbers become decimal text that reads back to the same float. The keys must not change
+            between calls.
         level : bytes
             Level of :class:`DiagnosticStatus`.
         """
@@ -89,5 +90,7 @@ def read_inhibition_state(message: DiagnosticArray) -> InhibitionMessage:
     """Read ``inhibition_state``; raises DataError when it holds no status named ``inhibition``."""
     for status in message.status:
         if status.name == 'inhibition':
-            return InhibitionMessage(status.message, {entry.key: entry.value for entry in status.values})
-    raise DataError(f"no status named 'inhibition' among {[status.name for status in message.status]}")
+            return InhibitionMessage(
+                status.message, {entry.key: entry.value for entry in status.values})
+    raise DataError(
+        f"no status named 'inhibition' among {[status.name for status in message.status]}")

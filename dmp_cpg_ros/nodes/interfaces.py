@@ -1,15 +1,17 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every topic and service of the suite in one table: name, type, quality of service, who writes and who reads.
+"""Every topic and service of the suite: name, type, quality of service, writers and readers.
 
-Quality of service. What is sent at every tick is reliable: in lock-step a single lost message would stop the run,
-and in a recording it would be a hole. REP-2003 asks *consumers* of sensor data to be best effort; a reliable
-publisher matches such consumers too, so users' tools lose nothing by this choice. Our own consumers are reliable.
-Nothing can block: keep-last publishers overwrite their oldest message when a reader hangs.
+Quality of service. What is sent at every tick is reliable: in lock-step a single lost message
+would stop the run, and in a recording it would be a hole. REP-2003 asks *consumers* of sensor data
+to be best effort; a reliable publisher matches such consumers too, so users' tools lose nothing by
+this choice. Our own consumers are reliable. Nothing can block: keep-last publishers overwrite
+their oldest message when a reader hangs.
 
-Depths. A publisher keeps ``PUBLISHER_DEPTH`` messages, because that is what can still be sent again to a reader that
-was not scheduled for a while (the recorder is on no tick's path and may lag). The suite's nodes are never more than
-two ticks apart in lock-step; their depth bounds how far a late node works through old ticks in real time.
+Depths. A publisher keeps ``PUBLISHER_DEPTH`` messages, because that is what can still be sent
+again to a reader that was not scheduled for a while (the recorder is on no tick's path and may
+lag). The suite's nodes are never more than two ticks apart in lock-step; their depth bounds how
+far a late node works through old ticks in real time.
 """
 
 from __future__ import annotations
@@ -28,8 +30,8 @@ from std_srvs.srv import SetBool, Trigger
 from dmp_cpg_ros.core.errors import ParameterError
 
 PUBLISHER_DEPTH = 2000
-"""Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the period of 3 s at which
-Fast DDS tells readers what they have missed."""
+"""Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the
+period of 3 s at which Fast DDS tells readers what they have missed."""
 
 READER_DEPTH = 10
 """Messages of one publisher that a node of the suite queues."""
@@ -40,8 +42,8 @@ RECORDER_DEPTH = 8000
 INSTANCES = {'leg_transformation': 4}
 """How many nodes of a kind make up the suite, where it is not one."""
 
-SUITE = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition', 'posture_control',
-         'mujoco_robot', 'bag_recorder')
+SUITE = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition',
+         'posture_control', 'mujoco_robot', 'bag_recorder')
 """Kinds of nodes in the order of the data flow."""
 
 GATE_OWNER = 'mujoco_robot'
@@ -67,8 +69,8 @@ class Interface:
     meaning : str
         What it carries, in a few words.
     publishers, subscribers : tuple of str
-        Kinds of nodes that write and read it; of a service: that serve and call it. The recorder reads every
-        topic and is named nowhere; ``user`` stands for whoever is outside the suite.
+        Kinds of nodes that write and read it; of a service: that serve and call it. The recorder
+        reads every topic and is named nowhere; ``user`` stands for whoever is outside the suite.
     sometimes : tuple of str
         Of both: those that write or read it with some parameters only.
     latched : bool
@@ -93,7 +95,7 @@ class Interface:
 
     @property
     def reader_qos(self) -> QoSProfile:
-        """Profile with which the suite's nodes read; deep enough for one tick's messages of every publisher."""
+        """Profile with which the suite's nodes read; deep enough for all of its publishers."""
         if self.latched:
             return _qos(1, latched=True)
         return _qos(READER_DEPTH * max(1, expected_count(self.publishers)))
@@ -115,43 +117,48 @@ def expected_count(kinds: tuple[str, ...] | list[str]) -> int:
     return sum(INSTANCES.get(kind, 1) for kind in kinds)
 
 
+_REFERENCE, _CANONICAL, _LEG, _INHIBITION, _POSTURE, _ROBOT, _RECORDER = SUITE
+
 TOPICS: tuple[Interface, ...] = (
-    Interface('cmd_vel', Twist, 'commanded speed and turn rate (TwistStamped with stamped_cmd_vel)',
-              ('user',), ('reference_filter', 'inhibition')),
-    Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z', ('reference_filter',),
-              ('canonical_oscillators', 'leg_transformation', 'inhibition', 'posture_control')),
+    Interface('cmd_vel', Twist,
+              'commanded speed and turn rate (TwistStamped with stamped_cmd_vel)',
+              ('user',), (_REFERENCE, _INHIBITION)),
+    Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z',
+              (_REFERENCE,), (_CANONICAL, _LEG, _INHIBITION, _POSTURE)),
     Interface('canonical_state', JointState, 'oscillators: position = x, velocity = its rate',
-              ('canonical_oscillators',), ('leg_transformation', 'inhibition', 'posture_control')),
-    Interface('posture_feedback', JointState, 'balance: effort = torques, position = foot placement shifts',
-              ('posture_control',), ('leg_transformation',)),
-    Interface('joint_targets', JointState, 'targets of the three joints of one leg', ('leg_transformation',),
-              ('mujoco_robot',)),
-    Interface('joint_states', JointState, 'measured joints; the tick of the suite', ('mujoco_robot',),
-              ('reference_filter', 'leg_transformation', 'posture_control'),
-              sometimes=('leg_transformation',)),
-    Interface('imu', Imu, 'inertial measurement in base_link', ('mujoco_robot',), ()),
-    Interface('odom', Odometry, 'pose and twist of base_link in odom', ('mujoco_robot',), ('posture_control',)),
-    Interface('foot_contacts', JointState, 'effort = normal force of each foot', ('mujoco_robot',),
-              ()),
-    Interface('/clock', Clock, 'the clock of the robot', ('mujoco_robot',), ()),
-    Interface('inhibition_state', DiagnosticArray, 'stop and start: state word, gains, times', ('inhibition',),
-              ('reference_filter', 'canonical_oscillators'), latched=True),
+              (_CANONICAL,), (_LEG, _INHIBITION, _POSTURE)),
+    Interface('posture_feedback', JointState,
+              'balance: effort = torques, position = foot placement shifts',
+              (_POSTURE,), (_LEG,)),
+    Interface('joint_targets', JointState, 'targets of the three joints of one leg',
+              (_LEG,), (_ROBOT,)),
+    Interface('joint_states', JointState, 'measured joints; the tick of the suite',
+              (_ROBOT,), (_REFERENCE, _LEG, _POSTURE), sometimes=(_LEG,)),
+    Interface('imu', Imu, 'inertial measurement in base_link', (_ROBOT,), ()),
+    Interface('odom', Odometry, 'pose and twist of base_link in odom', (_ROBOT,), (_POSTURE,)),
+    Interface('foot_contacts', JointState, 'effort = normal force of each foot', (_ROBOT,), ()),
+    Interface('/clock', Clock, 'the clock of the robot', (_ROBOT,), ()),
+    Interface('inhibition_state', DiagnosticArray,
+              'stop and start: state word, gains, times',
+              (_INHIBITION,), (_REFERENCE, _CANONICAL), latched=True),
     Interface('/diagnostics', DiagnosticArray, 'health of every node', SUITE, ()),
-    Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds', (GATE_OWNER,), ('user',),
-              latched=True, sometimes=(GATE_OWNER,)),
-    Interface(f'{GATE_OWNER}/advance_until', Clock, 'stamp up to which the gate lets ticks pass', ('user',),
-              (GATE_OWNER,)),
+    Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds',
+              (_ROBOT,), ('user',), latched=True, sometimes=(_ROBOT,)),
+    Interface(f'{GATE_OWNER}/advance_until', Clock,
+              'stamp up to which the gate lets ticks pass', ('user',), (_ROBOT,)),
 )
 """Topics of the suite."""
 
 SERVICES: tuple[Interface, ...] = (
-    Interface('inhibit', SetBool, 'true stops the gait, false resumes it', ('inhibition',), ('user',), service=True),
-    Interface('~/ready', Trigger, 'whether the node is active and connected with its neighbours', SUITE, ('user',),
-              service=True),
+    Interface('inhibit', SetBool, 'true stops the gait, false resumes it',
+              (_INHIBITION,), ('user',), service=True),
+    Interface('~/ready', Trigger,
+              'whether the node is active and connected with its neighbours',
+              SUITE, ('user',), service=True),
     Interface('~/commands_taken', Trigger, 'how many messages on cmd_vel the node has taken',
-              ('reference_filter', 'inhibition'), ('user',), service=True),
-    Interface('~/recorded', Trigger, 'how many messages of each topic are in the bag, as JSON', ('bag_recorder',),
-              ('user',), service=True),
+              (_REFERENCE, _INHIBITION), ('user',), service=True),
+    Interface('~/recorded', Trigger, 'how many messages of each topic are in the bag, as JSON',
+              (_RECORDER,), ('user',), service=True),
 )
 """Services of the suite."""
 
@@ -169,7 +176,8 @@ def interface(name: str) -> Interface:
     try:
         return INTERFACES[name]
     except KeyError:
-        raise ParameterError(f"there is no interface '{name}'; valid are {', '.join(INTERFACES)}") from None
+        raise ParameterError(
+            f"there is no interface '{name}'; valid are {', '.join(INTERFACES)}") from None
 
 
 def published_by(kind: str) -> tuple[Interface, ...]:
@@ -190,7 +198,7 @@ def served_by(kind: str) -> tuple[Interface, ...]:
 
 
 def partners(topic: Interface, *, readers: bool) -> tuple[str, ...]:
-    """Kinds of nodes of the suite that always read (the recorder included) or always write a topic."""
+    """Kinds of nodes that always read (the recorder included) or always write a topic."""
     kinds = (*topic.subscribers, 'bag_recorder') if readers else topic.publishers
     return tuple(kind for kind in kinds if kind in SUITE and kind not in topic.sometimes)
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """``JointState`` messages as arrays, by name.
 
-Writers keep one message and refill its arrays, because building a message costs more than all else. Values pass
-bit for bit.
+Writers keep one message and refill its arrays, because building a message costs more than all
+else. Values pass bit for bit.
 """
 
 from __future__ import annotations
@@ -52,7 +52,8 @@ class NameOrder:
         if missing or len(places) != len(names):
             problem = f"lack {', '.join(missing)}" if missing else 'are not unique'
             raise DataError(f"names {names} {problem}; needed are {', '.join(self.names)}")
-        self._index = None if names == self.names else np.array([places[name] for name in self.names], dtype=np.intp)
+        self._index = None if names == self.names else np.array(
+            [places[name] for name in self.names], dtype=np.intp)
         self._seen = list(names)
         return self._index
 
@@ -73,7 +74,7 @@ class JointStateReader:
         self._order, self._fields = NameOrder(names), tuple(fields)
 
     def read(self, message: JointState) -> list[Array]:
-        """Arrays (n,) of the needed fields in our order; raises DataError for bad names, sizes or numbers."""
+        """Arrays (n,) of the needed fields in our order; raises DataError."""
         names = message.name
         index, size = self._order.index(names), len(names)
         arrays = []
@@ -130,7 +131,7 @@ class JointStateWriter:
         DataError
             If a number is not finite: nothing of that kind leaves a node.
         """
-        for view, new, field in zip(self._views, values, self._fields):
+        for view, new, field in zip(self._views, values, self._fields, strict=True):
             view[:] = checked(new.reshape(-1), field)
         set_stamp(self.message.header.stamp, time_ns)
         return self.message

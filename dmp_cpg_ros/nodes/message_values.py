@@ -18,13 +18,13 @@ NS = 1_000_000_000
 """Nanoseconds of a second."""
 
 LARGEST = 1e6
-"""Numbers beyond this in SI units are a fault of the sender, for all that a walking robot measures."""
+"""Numbers beyond this are a fault of the sender; nothing about a walking robot is as large."""
 
 _LARGEST_SQUARED = LARGEST * LARGEST
 
 
 def stamp_ns(stamp: Time) -> int:
-    """Read a stamp as nanoseconds; raises DataError when it is negative or has no valid nanoseconds."""
+    """Read a stamp as nanoseconds; raises DataError when it is not a valid time."""
     seconds, rest = stamp.sec, stamp.nanosec
     if seconds < 0 or rest >= NS:
         raise DataError(f'stamp {seconds} s + {rest} ns must have sec >= 0 and nanosec < 1e9')
@@ -42,7 +42,7 @@ def set_stamp(stamp: Time, time_ns: int) -> None:
 
 
 def text(value: Any) -> str:
-    """Value as text that reads back to the same value: floats in full, booleans as true and false."""
+    """Value as text that reads back to it: floats in full, booleans as true and false."""
     if isinstance(value, (bool, np.bool_)):
         return 'true' if value else 'false'
     if isinstance(value, (float, np.floating)):
@@ -64,7 +64,8 @@ def checked(values: Array, what: str) -> Array:
         bad = ~(np.abs(values) <= LARGEST)
         if bad.any():
             where = int(np.argmax(bad))
-            raise DataError(f'{what}[{where}] = {values[where]} must be finite and at most {LARGEST:g}')
+            raise DataError(
+                f'{what}[{where}] = {values[where]} must be finite and at most {LARGEST:g}')
     return values
 
 

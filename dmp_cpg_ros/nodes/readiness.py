@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a node is connected with the nodes that it works with.
 
-Discovery is not symmetric in time: a reader may know a writer before the writer knows the reader, and a reliable
-volatile writer sends nothing to readers that it does not know yet. So each node answers for its own ends only: its
-expected partners are in the graph, and as many ends as the graph shows are matched here.
+Discovery is not symmetric in time: a reader may know a writer before the writer knows the reader,
+and a reliable volatile writer sends nothing to readers that it does not know yet. So each node
+answers for its own ends only: its expected partners are in the graph, and as many ends as the
+graph shows are matched here.
 """
 
 from __future__ import annotations
@@ -62,14 +63,16 @@ def missing_connections(node: Node, kind: str,
     return missing
 
 
-def _absent(ends: Sequence[Any], partners: Sequence[str], kind: str, expected: Collection[str]) -> list[str]:
+def _absent(ends: Sequence[Any], partners: Sequence[str],
+            kind: str, expected: Collection[str]) -> list[str]:
     """Partners that are expected and not, or not in full number, among the ends of a topic."""
     absent = []
     for partner in partners:
         if partner not in expected or partner == kind:
             continue
         needed = INSTANCES.get(partner, 1)
-        found = sum(end.node_name == partner or end.node_name.startswith(f'{partner}_') for end in ends)
+        found = sum(end.node_name == partner or end.node_name.startswith(f'{partner}_')
+                    for end in ends)
         if found < needed:
             absent.append(partner if needed == 1 else f'{partner} ({found} of {needed})')
     return absent

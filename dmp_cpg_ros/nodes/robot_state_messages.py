@@ -51,12 +51,14 @@ class RobotStateWriter:
         rate = finite_list(state.base_rate_in_base, 'base_rate_in_base')
         quaternion = finite_list(state.base_quaternion, 'base_quaternion')
         _set_vector(self.imu.angular_velocity, rate)
-        _set_vector(self.imu.linear_acceleration, finite_list(state.acceleration_in_base, 'acceleration_in_base'))
+        _set_vector(self.imu.linear_acceleration,
+                    finite_list(state.acceleration_in_base, 'acceleration_in_base'))
         _set_quaternion(self.imu.orientation, quaternion)
         _set_vector(self.odom.pose.pose.position,
                     finite_list(state.base_position_in_world, 'base_position_in_world'))
         _set_quaternion(self.odom.pose.pose.orientation, quaternion)
-        _set_vector(self.odom.twist.twist.linear, finite_list(state.base_velocity_in_base, 'base_velocity_in_base'))
+        _set_vector(self.odom.twist.twist.linear,
+                    finite_list(state.base_velocity_in_base, 'base_velocity_in_base'))
         _set_vector(self.odom.twist.twist.angular, rate)
 
 
@@ -69,7 +71,7 @@ class JointsReader:
         self._without_effort = JointStateReader(JOINT_NAMES, ('position', 'velocity'))
 
     def read(self, message: JointState) -> tuple[Array, Array, Array]:
-        """Position [rad], velocity [rad/s] and effort [N m], each ndarray (12,); effort 0 where it is absent."""
+        """Position [rad], velocity [rad/s] and effort [N m] (0 where absent), each (12,)."""
         if message.effort:
             position, velocity, effort = self._full.read(message)
             return position, velocity, effort
@@ -110,24 +112,27 @@ class BaseMotion:
 
 
 def read_odom(message: Odometry) -> BaseMotion:
-    """Read ``odom``; raises DataError for numbers that are not finite or a quaternion that is no rotation."""
+    """Read ``odom``; raises DataError, also for a quaternion that is no rotation."""
     pose, twist = message.pose.pose, message.twist.twist
     return BaseMotion(_vector(pose.position, 'position'), _quaternion(pose.orientation),
-                      _vector(twist.linear, 'linear velocity'), _vector(twist.angular, 'angular velocity'))
+                      _vector(twist.linear, 'linear velocity'),
+                      _vector(twist.angular, 'angular velocity'))
 
 
 def read_imu(message: Imu) -> tuple[Array, Array, Array]:
-    """Quaternion (4,), rate (3,) [rad/s] and specific force (3,) [m/s^2] in ``base_link``; raises DataError."""
-    return (_quaternion(message.orientation), _vector(message.angular_velocity, 'angular_velocity'),
+    """Quaternion (4,), rate (3,) [rad/s] and specific force (3,) [m/s^2]; raises DataError."""
+    return (_quaternion(message.orientation),
+            _vector(message.angular_velocity, 'angular_velocity'),
             _vector(message.linear_acceleration, 'linear_acceleration'))
 
 
-def robot_state(time_ns: int, joints: tuple[Array, Array, Array], base: BaseMotion, foot_force: Array,
-                acceleration_in_base: Array | None = None) -> RobotState:
-    """Put a robot state together from what its messages told; the acceleration is zero where none is given."""
+def robot_state(time_ns: int, joints: tuple[Array, Array, Array], base: BaseMotion,
+                foot_force: Array, acceleration_in_base: Array | None = None) -> RobotState:
+    """Put a state together from what its messages told; acceleration zero where not given."""
     return RobotState(
-        time_ns, joints[0], joints[1], joints[2], base.position_in_world, base.quaternion, base.velocity_in_base,
-        base.rate_in_base, np.zeros(3) if acceleration_in_base is None else acceleration_in_base, foot_force)
+        time_ns, joints[0], joints[1], joints[2], base.position_in_world,
+        base.quaternion, base.velocity_in_base, base.rate_in_base,
+        np.zeros(3) if acceleration_in_base is None else acceleration_in_base, foot_force)
 
 
 def _vector(vector: Any, what: str) -> Array:

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""ROS parameters declared from the fields of :class:`~dmp_cpg_ros.core.parameters.Parameters` classes."""
+"""ROS parameters declared from the fields of parameter sets."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import dataclasses
 import sys
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -31,8 +32,9 @@ FOREIGN_PREFIXES = ('use_sim_time', 'qos_overrides.', 'start_type_description_se
 class NodeParameters(Parameters):
     """Parameters of every node."""
 
-    autostart: bool = parameter(True, 'whether the node configures and activates itself when it starts')
-    executor: str = parameter('events', "rclpy's executor: events needs a quarter of the CPU of single",
+    autostart: bool = parameter(
+        True, 'whether the node configures and activates itself when it starts')
+    executor: str = parameter('events', "rclpy's executor; events needs a quarter of single's CPU",
                               choices=('events', 'single'))
     expected_nodes: tuple[str, ...] = parameter(
         SUITE[:-1], 'kinds of nodes that must be connected before ~/ready says yes', choices=SUITE)
@@ -42,7 +44,8 @@ class NodeParameters(Parameters):
 class LockStepParameters(Parameters):
     """Parameters of every node that takes part in ticks."""
 
-    lock_step: bool = parameter(False, 'whether ticks wait for all their inputs instead of for the wall clock')
+    lock_step: bool = parameter(
+        False, 'whether ticks wait for all their inputs instead of for the wall clock')
 
 
 class ParameterTable:
@@ -51,8 +54,8 @@ class ParameterTable:
     Parameters
     ----------
     sets : sequence of Parameters classes
-        A name that occurs in several sets is one parameter; the first set's default and range are declared and
-        all sets check it.
+        A name that occurs in several sets is one parameter; the first set's default and range are
+        declared and all sets check it.
     changeable : collection of str
         Names that may be set while the node runs; all others are read-only.
     """
@@ -94,16 +97,19 @@ class ParameterTable:
         """Describe a parameter to ROS: text, unit, range, words, whether it is read-only."""
         field = self.fields[name]
         low, high = field.metadata.get('minimum'), field.metadata.get('maximum')
-        descriptor = ParameterDescriptor(description=describe(field), read_only=name not in self.changeable,
+        descriptor = ParameterDescriptor(
+            description=describe(field), read_only=name not in self.changeable,
                                          additional_constraints=constraint(field))
         bounded = low is not None or high is not None
         if bounded and isinstance(field.default, float):
             huge = sys.float_info.max
             descriptor.floating_point_range = [FloatingPointRange(
-                from_value=-huge if low is None else float(low), to_value=huge if high is None else float(high))]
+                from_value=-huge if low is None else float(low),
+                to_value=huge if high is None else float(high))]
         elif bounded and isinstance(field.default, int):
             descriptor.integer_range = [IntegerRange(
-                from_value=-2**63 if low is None else int(low), to_value=2**63 - 1 if high is None else int(high),
+                from_value=-2**63 if low is None else int(low),
+                to_value=2**63 - 1 if high is None else int(high),
                 step=1)]
         return descriptor
 
@@ -123,7 +129,7 @@ def constraint(field: dataclasses.Field[Any]) -> str:
     low, high = field.metadata.get('minimum'), field.metadata.get('maximum')
     if low is None and high is None:
         return ''
-    return f"from {'-inf' if low is None else f'{low:g}'} to {'inf' if high is None else f'{high:g}'}"
+    return f'from {-inf if low is None else low:g} to {inf if high is None else high:g}'
 
 
 def plain(value: Any) -> Any:
@@ -147,8 +153,8 @@ def declare(node: Node, table: ParameterTable, arguments: Sequence[str] | None =
     table : ParameterTable
         Its parameters.
     arguments : sequence of str, optional
-        The command line, to tell values that a parameter file shares among all nodes (``/**``), which a node need
-        not know, from misspelt ones; default ``sys.argv``.
+        The command line, to tell values that a parameter file shares among all nodes (``/**``),
+        which a node need not know, from misspelt ones; default ``sys.argv``.
 
     Returns
     -------
@@ -160,7 +166,8 @@ def declare(node: Node, table: ParameterTable, arguments: Sequence[str] | None =
     ParameterError
         If an override is unknown, of the wrong type, not finite or out of range.
     """
-    overrides = {name: plain(override.value) for name, override in node._parameter_overrides.items()
+    overrides = {name: plain(override.value)
+                 for name, override in node._parameter_overrides.items()
                  if not name.startswith(FOREIGN_PREFIXES)}
     shared = shared_names(sys.argv if arguments is None else arguments)
     sets = table.build({name: value for name, value in overrides.items()
@@ -168,11 +175,13 @@ def declare(node: Node, table: ParameterTable, arguments: Sequence[str] | None =
     values = table.values(sets)
     for name, value in values.items():
         if value == ():
-            raise ParameterError(f"parameter '{name}' must not be an empty list; {constraint(table.fields[name])}")
+            raise ParameterError(
+                f"parameter '{name}' must not be an empty list; {constraint(table.fields[name])}")
         if name in node._parameter_overrides:
             node._parameter_overrides[name] = Parameter(name, value=ros_value(value))
         if not node.has_parameter(name):
-            node.declare_parameter(name, ros_value(table.fields[name].default), table.descriptor(name))
+            node.declare_parameter(name, ros_value(table.fields[name].default),
+                                   table.descriptor(name))
     return sets
 
 
@@ -180,7 +189,7 @@ def shared_names(arguments: Iterable[str]) -> set[str]:
     """Names under ``/**`` in the parameter files of a command line."""
     names: set[str] = set()
     arguments = list(arguments)
-    for flag, path in zip(arguments, arguments[1:]):
+    for flag, path in zip(arguments, arguments[1:], strict=False):
         if flag == '--params-file' and Path(path).is_file():
             content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
             section = content.get('/**') if isinstance(content, dict) else None

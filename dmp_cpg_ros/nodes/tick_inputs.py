@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Matching of messages by stamp: what belongs to one tick, however the messages arrive.
 
-The class knows no ROS, so that its rules can be tested by themselves; :func:`drain` takes any rclpy subscription.
+The class knows no ROS, so that its rules can be tested by themselves; :func:`drain` takes any
+rclpy subscription.
 """
 
 from __future__ import annotations
@@ -25,9 +26,10 @@ PATIENCE = 3
 class TickInputs:
     """Collects the inputs of each tick and calls back once per tick, in the order of the stamps.
 
-    In lock-step a tick fires when every input with its stamp is there, and every delayed input with the stamp of the
-    tick before (at the first tick delayed inputs are None). In real time it fires the same way, or else, when the
-    trigger of a later tick arrives, with the newest value of each input that was lost.
+    In lock-step a tick fires when every input with its stamp is there, and every delayed input
+    with the stamp of the tick before (at the first tick delayed inputs are None). In real time it
+    fires the same way, or else, when the trigger of a later tick arrives, with the newest value of
+    each input that was lost.
 
     Parameters
     ----------
@@ -40,18 +42,22 @@ class TickInputs:
     delayed : sequence of str
         Inputs that act one tick later. In real time the one that arrived last acts.
     optional : sequence of str
-        Of ``inputs``: those without which a tick may run in real time; their value is None until the first arrives.
+        Of ``inputs``: those without which a tick may run in real time; their value is None until
+        the first arrives.
     lock_step : bool
         Whether ticks wait for exact stamps.
     """
 
-    def __init__(self, on_tick: TickCallback, inputs: Sequence[str], trigger: str, *, delayed: Sequence[str] = (),
+    def __init__(self, on_tick: TickCallback, inputs: Sequence[str], trigger: str, *,
+                 delayed: Sequence[str] = (),
                  optional: Sequence[str] = (), lock_step: bool = False) -> None:
         """Start without any message."""
-        if trigger not in inputs or not set(optional) <= set(inputs) - {trigger} or set(delayed) & set(inputs):
-            raise ValueError('the trigger and the optional inputs must be inputs, the delayed ones must not')
+        others = set(inputs) - {trigger}
+        if trigger not in inputs or not set(optional) <= others or set(delayed) & set(inputs):
+            raise ValueError('trigger and optional inputs must be inputs, delayed ones must not')
         self._on_tick, self._inputs, self._trigger = on_tick, tuple(inputs), trigger
-        self._delayed, self._optional, self._lock_step = tuple(delayed), frozenset(optional), lock_step
+        self._delayed, self._optional = tuple(delayed), frozenset(optional)
+        self._lock_step = lock_step
         self._others = tuple(name for name in inputs if name != trigger)
         self._held: dict[str, Any] = dict.fromkeys(delayed)
         self.ignored = 0
@@ -61,7 +67,8 @@ class TickInputs:
     def reset(self) -> None:
         """Forget all ticks and their messages.
 
-        What was counted stays, and so do delayed inputs in real time: those are sent when they change.
+        What was counted stays, and so do delayed inputs in real time: those are sent when they
+        change.
         """
         self._pending: dict[int, dict[str, Any]] = {}
         self._newest: dict[str, tuple[int, Any]] = {}
@@ -133,7 +140,7 @@ class TickInputs:
             self._fire(stamp, tick)
 
     def _fire_newest(self, triggered: bool, stamp_ns: int) -> None:
-        """Real time: fire ticks that a later trigger has overtaken, then this one if nothing is worth waiting for."""
+        """Real time: fire what a later trigger has overtaken, then this if it need not wait."""
         if triggered and len(self._pending) > 1:
             for stamp in sorted(self._pending):
                 if stamp < stamp_ns and stamp in self._pending:
@@ -178,8 +185,9 @@ class TickInputs:
 def drain(subscription: Any) -> int:
     """Take what waits in a subscription's queue now, in order, as the executor would.
 
-    A node calls this for its command topics at the start of its tick, so that commands which arrived before the tick
-    act in it whatever the executor's order. The executor later finds the queue empty, which it takes in its stride.
+    A node calls this for its command topics at the start of its tick, so that commands which
+    arrived before the tick act in it whatever the executor's order. The executor later finds the
+    queue empty, which it takes in its stride.
 
     Parameters
     ----------

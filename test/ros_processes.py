@@ -1,0 +1,276 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Fixtures for tests with real nodes: a domain of their own, processes that end, waits with
+deadlines.
+
+Import ``ros_domain``, ``processes`` or ``ros`` into a test module to use them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from dmp_cpg_ros.nodes.middleware import prepare_middleware
+
+ROOT = Path(__file__).resolve().parent.parent
+
+DEADLINE_S = 30.0
+"""How long a condition may take before a test fails; a loaded machine is no failure."""
+
+
+class NodeProcess:
+    """A process whose output is kept.
+
+    Parameters
+    ----------
+    command : sequence of str
+        What to run.
+    environment : dict of str to str
+        Its environment.
+    """
+
+    def __init__(self, command: Sequence[str], environment: dict[str, str]) -> None:
+        self.command = list(command)
+        self._process = subprocess.Popen(self.command, env=environment, stdout=subprocess.PIPE,
+                                         stderr=subprocess.STDOUT, text=True, cwd=ROOT,
+                                         start_new_session=True)
+        self._lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def output(self) -> str:
+        """What it has written so far."""
+        return ''.join(self._lines)
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        return self._process.poll() is None
+
+    def wait_for_output(self, pattern: str, deadline_s: float = DEADLINE_S) -> re.Match[str]:
+        """Wait until the output matches; fails when the process ends before."""
+        found: list[re.Match[str]] = []
+
+        def matches() -> bool:
+            running = self.running
+            if not running:
+                self._reader.join(DEADLINE_S)
+            match = re.search(pattern, self.output)
+            found.extend([match] if match else [])
+            assert match or running, f'{self} ended before it wrote {pattern!r}'
+            return bool(match)
+
+        wait_until(matches, deadline_s, what=lambda: f'{pattern!r} in the output of {self}')
+        return found[0]
+
+    def signal(self, number: int) -> None:
+        """Send it a signal."""
+        self._process.send_signal(number)
+
+    def interrupt(self) -> None:
+        """Press Ctrl-C."""
+        self.signal(signal.SIGINT)
+
+    def kill(self) -> None:
+        """Kill it; it cannot notice."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait(DEADLINE_S)
+        self._reader.join(DEADLINE_S)
+
+    def wait(self, deadline_s: float = DEADLINE_S) -> int:
+        """Wait for its end; returns its exit status."""
+        try:
+            status = self._process.wait(deadline_s)
+        except subprocess.TimeoutExpired:
+            pytest.fail(f'{self} did not end within {deadline_s} s')
+        self._reader.join(DEADLINE_S)
+        return status
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        with self._process.stdout as stream:
+            self._lines.extend(iter(stream.readline, ''))
+
+    def __repr__(self) -> str:
+        return f"{' '.join(self.command)}\n--- output ---\n{self.output}--------------\n"
+
+
+class Processes:
+    """Starts processes in one domain and ends them all.
+
+    Attributes
+    ----------
+    domain : int
+        Their ROS domain.
+    """
+
+    def __init__(self, domain: int) -> None:
+        self.domain = domain
+        self._started: list[NodeProcess] = []
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """Environment that keeps nodes in the domain and on this machine."""
+        paths = [str(ROOT), *filter(None, [os.environ.get('PYTHONPATH')])]
+        return {**os.environ, 'ROS_DOMAIN_ID': str(self.domain), 'PYTHONUNBUFFERED': '1',
+                'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'PYTHONPATH': os.pathsep.join(paths)}
+
+    def start(self, *command: str, **environment: str) -> NodeProcess:
+        """Start any command."""
+        process = NodeProcess(command, {**self.environment, **environment})
+        self._started.append(process)
+        return process
+
+    def python(self, *arguments: str, **environment: str) -> NodeProcess:
+        """Start this Python with arguments."""
+        return self.start(sys.executable, *arguments, **environment)
+
+    def node(self, kind: str, *ros_arguments: str, **parameters: Any) -> NodeProcess:
+        """Start a node of the suite, with parameters as keywords."""
+        pairs = [f'{name}:={_yaml(value)}' for name, value in parameters.items()]
+        given = [item for pair in pairs for item in ('-p', pair)]
+        return self.python('-m', f'dmp_cpg_ros.nodes.{kind}', '--ros-args', *ros_arguments, *given)
+
+    def end(self) -> None:
+        """Kill what still runs."""
+        for process in self._started:
+            process.kill()
+
+
+class Ros:
+    """A node of the test itself, in the test's domain.
+
+    Attributes
+    ----------
+    node : Node
+        For publishers, subscriptions, clients.
+    context : Context
+        For nodes under test that run in this process.
+    """
+
+    def __init__(self, domain: int) -> None:
+        self.context = Context()
+        rclpy.init(context=self.context, domain_id=domain, args=[])
+        self.executor = SingleThreadedExecutor(context=self.context)
+        self.node = Node('test', context=self.context)
+        self.executor.add_node(self.node)
+
+    def spin_until(self, condition: Callable[[], bool], deadline_s: float = DEADLINE_S,
+                   what: Callable[[], str] | None = None) -> None:
+        """Run callbacks until a condition holds; fails at the deadline."""
+        wait_until(
+    condition,
+    deadline_s,
+    between=lambda: self.executor.spin_once(
+        timeout_sec=0.02),
+         what=what)
+
+    def call(self, service_type: Any, name: str, request: Any,
+             deadline_s: float = DEADLINE_S) -> Any:
+        """Call a service and return the response."""
+        client = self.node.create_client(service_type, name)
+        self.spin_until(client.service_is_ready, deadline_s, what=lambda: f'service {name}')
+        future = client.call_async(request)
+        self.spin_until(future.done, deadline_s, what=lambda: f'answer of {name}')
+        self.node.destroy_client(client)
+        return future.result()
+
+    def collect(self, message_type: Any, topic: str, qos: Any = 10, *,
+                raw: bool = False) -> list[Any]:
+        """Subscribe; returns the list into which messages go."""
+        messages: list[Any] = []
+        self.node.create_subscription(message_type, topic, messages.append, qos, raw=raw)
+        return messages
+
+    def end(self) -> None:
+        """Destroy the node and end the context."""
+        self.executor.shutdown()
+        self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+def wait_until(condition: Callable[[], bool], deadline_s: float = DEADLINE_S, *,
+               between: Callable[[], Any] = lambda: time.sleep(0.01),
+               what: Callable[[], str] | None = None) -> None:
+    """Wait until a condition holds; fails at the deadline and says what did not come."""
+    end = time.monotonic() + deadline_s
+    while not condition():
+        if time.monotonic() > end:
+            pytest.fail(f'waited {deadline_s} s in vain for {what() if what else condition}')
+        between()
+
+
+def _yaml(value: Any) -> str:
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_yaml(entry) for entry in value)}]"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+@contextlib.contextmanager
+def reserved_domain() -> Iterator[int]:
+    """Reserve a ROS domain among 1 to 100 that no other test on this machine uses."""
+    folder = Path(tempfile.gettempdir()) / f'dmp_cpg_ros_domains_{os.getuid()}'
+    folder.mkdir(exist_ok=True)
+    for offset in range(100):
+        domain = 1 + (os.getpid() + offset) % 100
+        with (folder / str(domain)).open('w') as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            yield domain
+            return
+    pytest.fail('all hundred ROS domains of the tests are in use')
+
+
+@pytest.fixture
+def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """Domain of one test; the environment of this process names it too."""
+    with reserved_domain() as domain:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+        monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        prepare_middleware()
+        yield domain
+
+
+@pytest.fixture
+def processes(ros_domain: int) -> Iterator[Processes]:
+    """Processes that are killed when the test ends."""
+    started = Processes(ros_domain)
+    try:
+        yield started
+    finally:
+        started.end()
+
+
+@pytest.fixture
+def ros(ros_domain: int) -> Iterator[Ros]:
+    """A node of the test itself."""
+    session = Ros(ros_domain)
+    try:
+        yield session
+    finally:
+        session.end()

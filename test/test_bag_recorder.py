@@ -1,0 +1,225 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The recorder keeps every byte, and what a killed one had flushed can be rescued."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import ros_processes
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from ros_processes import NodeProcess, Processes, Ros
+from rosbags.highlevel import AnyReader
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from dmp_cpg_ros.analysis.rescue import rescue
+from dmp_cpg_ros.core.errors import DataError, MissingFileError, ParameterError
+from dmp_cpg_ros.nodes.bag_writing import BagWriter
+from dmp_cpg_ros.nodes.interfaces import interface
+from dmp_cpg_ros.nodes.message_values import set_stamp
+
+processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
+
+TICK_NS = 4_000_000
+
+
+def joint_state(k: int) -> JointState:
+    message = JointState(name=[f'joint_{i}' for i in range(12)],
+                         position=[0.1 * k + i for i in range(12)],
+                         velocity=[-1.0 / (k + 1)] * 12)
+    set_stamp(message.header.stamp, TICK_NS * (k + 1))
+    return message
+
+
+def read(bag: Path) -> dict[str, list[tuple[int, bytes]]]:
+    with AnyReader([bag]) as reader:
+        messages: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in reader.topics}
+        for connection, time_ns, data in reader.messages():
+            messages[connection.topic].append((time_ns, bytes(data)))
+    return messages
+
+
+def started(processes: Processes, ros: Ros, bag: Path, **parameters: object) -> NodeProcess:
+    """Start a recorder; its subscriptions match the test's publishers when this returns."""
+    process = processes.node(
+    'bag_recorder',
+    output=bag,
+    expected_nodes=['bag_recorder'],
+     **parameters)
+    answers = []
+
+    def ready() -> bool:
+        answers.append(ros.call(Trigger, 'bag_recorder/ready', Trigger.Request()))
+        return answers[-1].success
+
+    ros.spin_until(ready, what=lambda: f'{answers} {process}')
+    publishers = list(ros.node.publishers)
+    ros.spin_until(lambda: all(p.get_subscription_count() for p in publishers if p.topic_name in (
+        '/joint_states', '/cmd_vel', '/clock')), what=lambda: f'matching with {process}')
+    return process
+
+
+def publisher(ros: Ros, name: str):
+    topic = interface(name)
+    return ros.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_a_stopped_recorder_has_every_byte(processes: Processes, ros: Ros, tmp_path: Path,
+                                           storage: str) -> None:
+    joints, commands, clock = (publisher(ros, name)
+                               for name in ('joint_states', 'cmd_vel', '/clock'))
+    bag = tmp_path / 'bag'
+    process = started(processes, ros, bag, storage=storage)
+    sent = [serialize_message(joint_state(k)) for k in range(300)]
+    for k, data in enumerate(sent):
+        joints.publish(data)
+        if k % 100 == 50:
+            joints.wait_for_all_acked()
+            commands.publish(Twist())
+    commands.wait_for_all_acked()
+    joints.wait_for_all_acked()
+    process.interrupt()
+    assert process.wait() == 0, process
+    recorded = read(bag)
+    assert [data for _, data in recorded['/joint_states']] == sent
+    assert [time_ns for time_ns, _ in recorded['/joint_states']
+        ] == [TICK_NS * (k + 1) for k in range(300)]
+    assert len(recorded['/cmd_vel']) == 3
+    assert all(TICK_NS <= time_ns <= 300 * TICK_NS for time_ns, _ in recorded['/cmd_vel'])
+    with AnyReader([bag]) as reader:
+        offered = {c.topic: c.ext.offered_qos_profiles[0] for c in reader.connections}
+    assert offered['/inhibition_state'].durability.name == 'TRANSIENT_LOCAL'
+    assert offered['/joint_states'].durability.name == 'VOLATILE'
+    assert {profile.reliability.name for profile in offered.values()} == {'RELIABLE'}
+
+
+def test_a_killed_recorder_leaves_what_it_had_flushed(
+    processes: Processes, ros: Ros, tmp_path: Path) -> None:
+    joints = publisher(ros, 'joint_states')
+    reports = ros.collect(DiagnosticArray, '/diagnostics', QoSProfile(depth=100))
+    bag = tmp_path / 'bag'
+    process = started(processes, ros, bag, flush_period=0.05)
+    sent: list[bytes] = []
+
+    def flushed() -> int:
+        values = [{v.key: v.value for v in report.status[0].values} for report in reports]
+        return max((int(value.get('messages_on_disk', 0)) for value in values), default=0)
+
+    def enough() -> bool:
+        # Every call is a second of the robot's clock, so that the recorder reports.
+        sent.append(serialize_message(joint_state(250 * len(sent))))
+        joints.publish(sent[-1])
+        return flushed() > 20
+
+    ros.spin_until(enough, what=lambda: str(process))
+    with pytest.raises(DataError, match='still being recorded'):
+        rescue(bag)
+    on_disk = flushed()
+    process.kill()
+    assert not (bag / 'metadata.yaml').exists()
+    assert rescue(bag) == bag.resolve()
+    recorded = read(bag)
+    saved = [data for _, data in recorded['/joint_states']]
+    assert saved == sent[:len(saved)]
+    assert sum(map(len, recorded.values())) >= on_disk
+    assert rescue(bag) == bag.resolve()  # a sound bag stays as it is
+    assert read(bag) == recorded
+
+
+def test_an_output_that_exists_is_refused(processes: Processes, tmp_path: Path) -> None:
+    process = processes.node('bag_recorder', output=tmp_path)
+    assert process.wait() == 2
+    assert 'output' in process.output and str(tmp_path) in process.output
+
+
+def test_a_node_outside_the_table_is_refused(processes: Processes, tmp_path: Path) -> None:
+    process = processes.node('bag_recorder', output=tmp_path / 'bag', topics=['joint_stats'])
+    assert process.wait() == 2
+    assert 'joint_stats' in process.output and 'joint_states' in process.output
+    assert not (tmp_path / 'bag').exists()
+
+
+def writer(bag: Path) -> tuple[BagWriter, dict[str, object]]:
+    bag_writer = BagWriter(bag)
+    writers = {}
+    for name in ('joint_states', 'cmd_vel', 'inhibition_state'):
+        topic = interface(name)
+        writers[name] = bag_writer.add_topic(
+            f'/{name}', topic.type_name, topic.publisher_qos, stamped=name != 'cmd_vel',
+            clock=name == 'joint_states')
+    return bag_writer, writers
+
+
+def test_messages_without_a_stamp_bear_the_time_of_the_robot(tmp_path: Path) -> None:
+    bag, write = writer(tmp_path / 'bag')
+    twist, early = serialize_message(Twist()), serialize_message(DiagnosticArray())
+    write['cmd_vel'](twist)
+    write['inhibition_state'](early)
+    write['joint_states'](serialize_message(joint_state(9)))
+    write['cmd_vel'](twist)
+    write['joint_states'](serialize_message(joint_state(10)))
+    write['cmd_vel'](twist)
+    bag.close()
+    recorded = read(tmp_path / 'bag')
+    assert [time_ns // TICK_NS for time_ns, _ in recorded['/cmd_vel']] == [10, 10, 11]
+    assert [time_ns // TICK_NS for time_ns, _ in recorded['/inhibition_state']] == [10]
+
+
+def test_a_recording_without_a_robot_is_kept(tmp_path: Path) -> None:
+    bag, write = writer(tmp_path / 'bag')
+    write['cmd_vel'](serialize_message(Twist()))
+    bag.close()
+    assert len(read(tmp_path / 'bag')['/cmd_vel']) == 1
+
+
+def test_an_empty_recording_can_be_opened(tmp_path: Path) -> None:
+    bag, _ = writer(tmp_path / 'bag')
+    bag.close()
+    assert not any(read(tmp_path / 'bag').values())
+
+
+@pytest.mark.parametrize('kept', [0.2, 0.5, 0.9, 0.999])
+def test_a_file_cut_anywhere_keeps_its_closed_chunks(tmp_path: Path, kept: float) -> None:
+    whole, write = writer(tmp_path / 'bag')
+    sizes, file = [], tmp_path / 'bag' / 'bag.mcap'
+    for k in range(200):
+        write['joint_states'](serialize_message(joint_state(k)))
+        if k % 10 == 9:
+            whole.flush()
+            sizes.append((file.stat().st_size, k + 1))
+    whole.close()
+    size = round(sizes[-1][0] * kept)
+    with file.open('r+b') as stream:
+        stream.truncate(size)
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    rescue(tmp_path / 'bag')
+    expected = max((count for end, count in sizes if end <= size), default=0)
+    saved = [data for _, data in read(tmp_path / 'bag')['/joint_states']]
+    assert saved[:expected] == [serialize_message(joint_state(k)) for k in range(expected)]
+    assert expected <= len(saved) <= expected + 10
+
+
+def test_what_cannot_be_rescued_is_named(tmp_path: Path) -> None:
+    with pytest.raises(MissingFileError, match='nowhere'):
+        rescue(tmp_path / 'nowhere')
+    with pytest.raises(DataError, match='mcap'):
+        rescue(tmp_path)
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'bag.mcap').write_bytes(b'no mcap at all')
+    with pytest.raises(DataError, match='no complete message'):
+        rescue(tmp_path / 'bag')
+    with pytest.raises(ParameterError, match='output'):
+        BagWriter(tmp_path / 'bag')
+
+
+def test_clock_is_stamped_like_a_header() -> None:
+    message = Clock()
+    set_stamp(message.clock, 7_000_000_003)
+    assert serialize_message(message)[4:8] == (7).to_bytes(4, 'little')
