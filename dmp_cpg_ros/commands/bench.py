@@ -1,0 +1,205 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Measures the cost of the core: time steps, networks of growing size, the parts of one tick.
+
+Every row is the best of several repetitions and is also given as a ratio within the same run, for
+absolute times drift with the machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.graph import CouplingGraph, Edges, graph_from_edges, topology
+from dmp_cpg_ros.core.hopf import AndronovHopf
+from dmp_cpg_ros.core.networks.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
+from dmp_cpg_ros.core.networks.hopf_oscillators import HopfOscillators
+from dmp_cpg_ros.core.networks.network import OscillatorNetwork
+from dmp_cpg_ros.core.phase import state_at
+from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.walking_loop import WalkingLoop
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.suite import load_suite
+
+Array = NDArray[np.float64]
+
+TICK, OMEGA, GAIN = 0.004, 9.0, 100.0
+"""Tick [s], angular frequency [rad/s] and sum of the gains at each node [1/s] of the networks."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measurement.
+
+    Attributes
+    ----------
+    what : str
+        What was measured.
+    seconds : float
+        Its time [s].
+    ratio : float
+        The same over that of the row that the table's title names.
+    """
+
+    what: str
+    seconds: float
+    ratio: float
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure and print; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    tables = {
+        'One time step of four coupled oscillators (ratio: to the first row)': steps_of_four(),
+        'A time step per oscillator (ratio: to 1,000 oscillators)': steps_of_many(options.sizes),
+        'The parts of one tick of the plain loop (ratio: to the whole tick)': parts_of_a_tick(),
+    }
+    for title, rows in tables.items():
+        width = max(len(row.what) for row in rows)
+        print(f'\n{title}')
+        for row in rows:
+            print(f'  {row.what.ljust(width)} {_text(row.seconds)} {row.ratio:8.2f}')
+    if options.json:
+        write_json(options.json, tables)
+        print(f'\nwrote {options.json}')
+    return 0
+
+
+def steps_of_four() -> list[Row]:
+    """Time steps of the gait's network, and of what else could be done."""
+    phases = -2.0 * np.pi * np.array([0.0, 0.5, 0.75, 0.25])
+    graph = graph_from_edges(4, topology('all_to_all', 4), GAIN, phases)
+    of = CanonicalSystem(graph, AndronovHopf(8.0), state_at(phases))
+    general = OscillatorNetwork(HopfOscillators(4, OMEGA), EdgeCoupling(graph), state_at(phases))
+    x, free, held = state_at(phases + 0.5), np.zeros(4), np.array([400.0, 0.0, 0.0, 0.0])
+    return _with_ratios([
+        ('exponential step (core/canonical.py)', lambda: of.step(x, OMEGA, free, TICK)),
+        ('the same, inhibited', lambda: of.step(x, OMEGA, held, TICK)),
+        ('its vector field alone', lambda: of.field(x, OMEGA, free)),
+        ('classical Runge-Kutta, unstable here', lambda: _classical(of, x, held)),
+        ('stabilised step of any network (core/networks)', lambda: general.step(x, TICK, held)),
+    ])
+
+
+def steps_of_many(sizes: Sequence[int]) -> list[Row]:
+    """Time steps of growing networks, divided by the number of oscillators."""
+    kinds: dict[str, Callable[[int], Coupling]] = {
+        'ring': lambda n: EdgeCoupling(_graph(n, topology('ring', n))),
+        'random, 6 neighbours': lambda n: EdgeCoupling(_graph(n, _random_edges(n))),
+        'all to all': lambda n: MeanFieldCoupling(n, GAIN / n),
+    }
+    rows = []
+    for kind, coupling in kinds.items():
+        seconds = {size: _step_time(size, coupling(size)) / size for size in {*sizes, 1000}}
+        rows += [Row(f'{kind}, {size:,}', seconds[size], seconds[size] / seconds[1000])
+                 for size in sizes]
+    return rows
+
+
+def parts_of_a_tick() -> list[Row]:
+    """Parts of the plain loop on the walking robot, and the prediction of a stop."""
+    suite = load_suite(overrides={'cmd_vel_timeout': 0.0})
+    robot = MujocoRobot(suite.robot_file, suite.tick_ns)
+    loop, state = WalkingLoop(robot.description, suite.gait, suite.parameters), robot.reset()
+    loop.command(0.5)
+    for _ in range(500):
+        state = robot.step(loop.tick(state).targets)
+    x, r, dt, zero = loop.x, loop.r, suite.tick_ns * 1e-9, np.zeros(3)
+    x_dot = loop.network.rate(x, r, loop.inhibition)
+    stopping = loop.supervisor.request(loop.stop, True)
+    leg, command = loop.legs[0], (0.5, 0.0, 0.0)
+
+    def tick() -> None:
+        nonlocal state
+        state = replace(state, time_ns=state.time_ns + suite.tick_ns)
+        loop.tick(state)
+
+    return _with_ratios([
+        ('whole tick', tick),
+        ('reference', lambda: loop.reference.step(r, zero, dt)),
+        ('oscillators', lambda: loop.network.step(x, r, loop.inhibition, dt)),
+        ('state of the stop', lambda: loop.supervisor.step(
+            loop.stop, loop.stop.time_ns, x, x_dot, r, command)),
+        ('balance', lambda: loop.posture.step(loop.posture_state, state, x, x_dot, r, dt)),
+        ('one leg', lambda: leg.step(loop.leg_states[0], x[0], x_dot[0], r, zero[:2], zero, dt)),
+        ('prediction of a stop', lambda: predict(
+            loop.supervisor, loop.reference, stopping, loop.inhibition, x, r, command, dt)),
+    ])
+
+
+def seconds_of(what: Callable[[], object], repetitions: int = 7, least: float = 0.01) -> float:
+    """Time of one call: the best of several repetitions of at least some seconds each."""
+    what()
+    calls, best = 1, float('inf')
+    while True:
+        start = time.perf_counter()
+        for _ in range(calls):
+            what()
+        elapsed = time.perf_counter() - start
+        if elapsed < least:
+            calls = max(calls + 1, int(1.5 * calls * least / max(elapsed, 1e-9)))
+            continue
+        best, repetitions = min(best, elapsed / calls), repetitions - 1
+        if repetitions == 0:
+            return best
+
+
+def _with_ratios(cases: Sequence[tuple[str, Callable[[], object]]]) -> list[Row]:
+    seconds = [seconds_of(what) for _, what in cases]
+    return [Row(name, own, own / seconds[0])
+            for (name, _), own in zip(cases, seconds, strict=True)]
+
+
+def _step_time(size: int, coupling: Coupling) -> float:
+    rng = np.random.default_rng(0)
+    of = OscillatorNetwork(HopfOscillators(size, rng.uniform(8.0, 10.0, size)), coupling)
+    x = state_at(rng.uniform(-np.pi, np.pi, size))
+    return seconds_of(lambda: of.step(x, TICK))
+
+
+def _graph(size: int, edges: Edges) -> CouplingGraph:
+    return graph_from_edges(size, edges, GAIN * size / max(len(edges), 1))
+
+
+def _random_edges(size: int) -> Edges:
+    """Three chords from every node to random others, both ways."""
+    rng = np.random.default_rng(1)
+    chords = {(i, int(j)) for i in range(size) for j in rng.integers(0, size, 3) if i != j}
+    return tuple(sorted(chords | {(j, i) for i, j in chords}))
+
+
+def _classical(of: CanonicalSystem, x: Array, gains: Array) -> Array:
+    a = of.field(x, OMEGA, gains)
+    b = of.field(x + 0.5 * TICK * a, OMEGA, gains)
+    c = of.field(x + 0.5 * TICK * b, OMEGA, gains)
+    d = of.field(x + TICK * c, OMEGA, gains)
+    return x + TICK / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+
+
+def _text(seconds: float) -> str:
+    unit, scale = ('ns', 1e9) if seconds < 1e-6 else ('us', 1e6) if seconds < 1e-3 else ('ms', 1e3)
+    return f'{scale * seconds:8.1f} {unit}'
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='bench', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--sizes', type=int, nargs='+', metavar='N',
+                        default=[10, 100, 1000, 3000, 10_000],
+                        help='numbers of oscillators (default: 10 100 1000 3000 10000)')
+    parser.add_argument('--json', type=Path, metavar='FILE', help='write the tables')
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())
