@@ -1,0 +1,95 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One inequality of a certificate: left < right, with its unit, its grade and a sentence."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from dmp_cpg_ros.core.contraction.finding import GRADES, PROVED
+from dmp_cpg_ros.core.errors import ParameterError
+
+ROUNDING = 1e-9
+"""Share of the larger side by which an inequality must hold, far above all rounding errors."""
+
+
+@dataclass(frozen=True)
+class Inequality:
+    """left < right.
+
+    Attributes
+    ----------
+    name : str
+        Short name, a word with underscores.
+    left, right : float
+        Both sides; not a number counts as not holding.
+    unit : str
+        SI unit of both sides, empty for pure numbers.
+    left_is, right_is : str
+        What the sides are, as short expressions.
+    grade : str
+        ``proved`` or ``sampled``.
+    sentence : str
+        What it means for the robot.
+    required : bool
+        Whether the certificate fails without it.
+
+    Raises
+    ------
+    ParameterError
+        If the grade is neither of the two.
+    """
+
+    name: str
+    left: float
+    right: float
+    unit: str
+    left_is: str
+    right_is: str
+    grade: str
+    sentence: str
+    required: bool = True
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        if self.grade not in GRADES:
+            raise ParameterError(f"inequality '{self.name}': the grade must be one of "
+                                 f"{', '.join(GRADES)}, not '{self.grade}'")
+
+    @property
+    def margin(self) -> float:
+        """Right minus left, in the unit; negative where the inequality fails."""
+        if math.isinf(self.left) and math.isinf(self.right):
+            return -math.inf
+        return self.right - self.left
+
+    @property
+    def holds(self) -> bool:
+        """Whether left < right beyond rounding."""
+        if math.isnan(self.left) or math.isnan(self.right) or math.isinf(self.left):
+            return self.left == -math.inf
+        return self.margin > ROUNDING * max(abs(self.left), min(abs(self.right), 1e300))
+
+    @property
+    def proved(self) -> bool:
+        """Whether it is proved and not only sampled."""
+        return self.grade == PROVED
+
+    def as_mapping(self) -> dict[str, object]:
+        """Return everything as values that strict JSON can write; None for what is not finite."""
+        return {'name': self.name, 'holds': self.holds, 'required': self.required,
+                'left': _finite(self.left), 'right': _finite(self.right),
+                'margin': _finite(self.margin), 'unit': self.unit, 'left_is': self.left_is,
+                'right_is': self.right_is, 'grade': self.grade, 'sentence': self.sentence}
+
+    def explained(self) -> str:
+        """Name, both sides and the sentence in one line."""
+        relation = '<' if self.holds else 'is not <'
+        unit = f' {self.unit}' if self.unit else ''
+        return (f'{self.name}: {self.left_is} = {self.left:.4g}{unit} {relation} {self.right_is} '
+                f'= {self.right:.4g}{unit}; {self.sentence}')
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
