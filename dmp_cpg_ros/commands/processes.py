@@ -56,7 +56,8 @@ class ProcessGroup:
 
     def start(self, name: str, module: str, arguments: Sequence[str]) -> None:
         """Run ``python -m module arguments`` in a session of its own, so that Ctrl-C reaches this process only."""
-        environment = {**os.environ, 'PYTHONUNBUFFERED': '1'}
+        # Matrices of a few rows: threads of the algebra library would only contend for the cores.
+        environment = {'OPENBLAS_NUM_THREADS': '1', **os.environ, 'PYTHONUNBUFFERED': '1'}
         with (self._logs / f'{name}.log').open('wb') as log:
             self._processes[name] = subprocess.Popen(
                 [sys.executable, '-m', module, *arguments], stdin=subprocess.DEVNULL, stdout=log,
