@@ -1,0 +1,209 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages are matched by stamp in whatever order they arrive; commands act in their tick."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+import ros_processes
+from hypothesis import given
+from hypothesis import strategies as st
+from ros_processes import Ros
+from std_msgs.msg import Int64
+
+from dmp_cpg_ros.nodes.executors import make_executor
+from dmp_cpg_ros.nodes.tick_inputs import PATIENCE, PENDING_TICKS, RESET_NS, TickInputs, drain
+
+ros, ros_domain = ros_processes.ros, ros_processes.ros_domain
+
+TICK = 4_000_000
+INPUTS = ('a', 'b', 'c')
+SEEDS = st.integers(0, 2**32)
+
+
+def recorder(**options: object) -> tuple[TickInputs, list]:
+    fired: list[tuple[int, dict]] = []
+    inputs = TickInputs(lambda stamp, values: fired.append((stamp, dict(values))), INPUTS, 'a',
+                        **options)
+    return inputs, fired
+
+
+def interleaving(seed: int, names: tuple[str, ...] = INPUTS, ticks: int = 12,
+                 lead: int = 3) -> list[tuple[str, int]]:
+    """Arrivals (name, tick): every input in its order, none more than ``lead`` ticks ahead."""
+    draw, at, arrivals = random.Random(seed), dict.fromkeys(names, 0), []
+    while any(tick < ticks for tick in at.values()):
+        name = draw.choice([n for n in names if at[n] < min(ticks, min(at.values()) + lead)])
+        arrivals.append((name, at[name]))
+        at[name] += draw.random() < 0.9  # else it arrives twice
+    return arrivals
+
+
+@given(SEEDS)
+def test_in_lock_step_every_tick_has_exactly_its_messages(seed: int) -> None:
+    inputs, fired = recorder(lock_step=True)
+    for name, tick in interleaving(seed):
+        inputs.add(name, tick * TICK, (name, tick))
+    assert [stamp for stamp, _ in fired] == [tick * TICK for tick in range(12)]
+    for stamp, values in fired:
+        assert values == {name: (name, stamp // TICK) for name in INPUTS}
+
+
+@given(SEEDS)
+def test_a_delayed_input_acts_one_tick_later(seed: int) -> None:
+    inputs, fired = recorder(lock_step=True, delayed=('late',))
+    for name, tick in interleaving(seed, (*INPUTS, 'late')):
+        inputs.add(name, tick * TICK, tick)
+    assert [values['late'] for _, values in fired] == [None, *range(11)]
+    assert [stamp for stamp, _ in fired] == [tick * TICK for tick in range(12)]
+
+
+def test_in_lock_step_a_delayed_input_of_another_tick_does_not_count() -> None:
+    inputs, fired = recorder(lock_step=True, delayed=('late',))
+    for name in INPUTS:
+        inputs.add(name, TICK, name)
+    for name in INPUTS:
+        inputs.add(name, 2 * TICK, name)
+    inputs.add('late', 0, 'old')
+    inputs.add('late', 2 * TICK, 'early')
+    assert len(fired) == 1
+    inputs.add('late', TICK, 'right')
+    assert [values['late'] for _, values in fired] == [None, 'right']
+
+
+@given(SEEDS, st.sets(st.tuples(st.sampled_from(INPUTS), st.integers(1, 29))))
+def test_in_real_time_losses_cost_no_tick_that_was_triggered(
+        seed: int, lost: set[tuple[str, int]]) -> None:
+    inputs, fired = recorder()
+    later = [arrival for arrival in interleaving(seed, ticks=30) if arrival[1] > 0]
+    seen: set[tuple[str, int]] = set()
+    for name, tick in [*((name, 0) for name in INPUTS), *later]:
+        if (name, tick) in lost:
+            continue
+        seen.add((name, tick))
+        before = len(fired)
+        inputs.add(name, tick * TICK, tick)
+        for stamp, values in fired[before:]:
+            for other in INPUTS:
+                arrived = (other, stamp // TICK) in seen
+                assert (values[other] == stamp // TICK) == arrived
+        assert len(inputs._pending) <= PENDING_TICKS
+    stamps = [stamp // TICK for stamp, _ in fired]
+    triggers = [tick for tick in range(30) if ('a', tick) not in lost]
+    # The newest may still wait for an input.
+    assert stamps in (triggers, triggers[:-1])
+
+
+def test_a_dead_input_delays_ticks_only_until_patience_ends() -> None:
+    inputs, fired = recorder()
+    for tick in range(3):
+        for name in INPUTS:
+            inputs.add(name, tick * TICK, tick)
+    waited = []
+    for tick in range(3, 20):
+        inputs.add('b', tick * TICK, tick)
+        inputs.add('a', tick * TICK, tick)
+        waited.append(fired[-1][0] != tick * TICK)
+    assert all(waited[:PATIENCE]) and not any(waited[PATIENCE:])
+    assert {values['c'] for _, values in fired[3:]} == {2}
+    # It comes back, a little later than the others, and is waited for again.
+    for tick in range(20, 24):
+        inputs.add('b', tick * TICK, tick)
+        inputs.add('a', tick * TICK, tick)
+        inputs.add('c', tick * TICK, tick)
+    assert [values['c'] for _, values in fired[-3:]] == [21, 22, 23]
+
+
+def test_an_optional_input_may_never_come_but_others_must() -> None:
+    inputs, fired = recorder(optional=('c',))
+    for tick in range(6):
+        inputs.add('a', tick * TICK, tick)
+    assert not fired
+    for tick in range(6, 12):
+        inputs.add('b', tick * TICK, tick)
+        inputs.add('a', tick * TICK, tick)
+    assert fired and all(values['c'] is None for _, values in fired)
+
+
+@pytest.mark.parametrize('lock_step', [True, False])
+def test_a_robot_that_starts_again_is_followed(lock_step: bool) -> None:
+    inputs, fired = recorder(lock_step=lock_step)
+    first = range(100, 110)
+    for tick in (*first, *range(5)):
+        for name in INPUTS:
+            inputs.add(name, tick * TICK, tick)
+    assert [stamp // TICK for stamp, _ in fired] == [*first, *range(5)]
+    # A stamp that is only a little older is a late message.
+    for name in INPUTS:
+        inputs.add(name, 4 * TICK - RESET_NS + 1, 'late')
+    assert len(fired) == 15
+
+
+def test_in_real_time_what_is_sent_on_change_survives_a_reset() -> None:
+    inputs, fired = recorder(delayed=('late',))
+    inputs.add('late', 0, 'state')
+    for tick in (1000, 0):
+        for name in INPUTS:
+            inputs.add(name, tick * TICK, tick)
+    inputs.add('late', 0, 'state of long ago')
+    assert [values['late'] for _, values in fired] == ['state', 'state']
+    assert inputs.last_ns == 0
+
+
+def test_memory_is_bounded() -> None:
+    for lock_step in (True, False):
+        inputs, fired = recorder(lock_step=lock_step, delayed=('late',))
+        for tick in range(1000):
+            inputs.add('b', tick * TICK, tick)
+            inputs.add('late', tick * TICK, tick)
+        assert len(inputs._pending) <= PENDING_TICKS and not fired
+        assert len(inputs._late['late']) <= PENDING_TICKS
+
+
+def test_wrong_names_are_errors() -> None:
+    for options in ({'trigger': 'x'}, {'trigger': 'a', 'optional': ('a',)},
+                    {'trigger': 'a', 'delayed': ('b',)}):
+        with pytest.raises(ValueError, match='must'):
+            TickInputs(lambda stamp, values: None, INPUTS, **options)
+
+
+@pytest.mark.parametrize('kind', ['events', 'single'])
+def test_commands_that_arrived_before_a_tick_act_in_it(ros: Ros, kind: str) -> None:
+    """Ten ticks; before each five commands arrive, and after it one that nobody drains."""
+    got: list[int] = []
+    at_tick: list[int] = []
+    commands = ros.node.create_subscription(Int64, 'command', lambda m: got.append(m.data), 100)
+
+    def tick(message: Int64) -> None:
+        drain(commands)
+        at_tick.append(len(got))
+
+    ros.node.create_subscription(Int64, 'tick', tick, 100)
+    sender = ros.node.create_publisher(Int64, 'command', 100)
+    ticker = ros.node.create_publisher(Int64, 'tick', 100)
+    ros.spin_until(lambda: sender.get_subscription_count() and ticker.get_subscription_count())
+    ros.executor.remove_node(ros.node)
+    executor = make_executor(kind, ros.context)
+    executor.add_node(ros.node)
+    sent = 0
+
+    def until(condition: object) -> None:
+        ros_processes.wait_until(condition, between=lambda: executor.spin_once(timeout_sec=0.02))
+
+    try:
+        for k in range(10):
+            for _ in range(5):
+                sender.publish(Int64(data=sent))
+                sent += 1
+            assert sender.wait_for_all_acked()
+            ticker.publish(Int64(data=k))
+            until(lambda k=k: len(at_tick) > k)
+            assert at_tick[-1] == sent
+            sender.publish(Int64(data=sent))
+            sent += 1
+            until(lambda sent=sent: len(got) == sent)
+        assert got == list(range(sent))
+    finally:
+        executor.remove_node(ros.node)
