@@ -151,8 +151,9 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     span = operating_range(network, inhibition, reference)
     analysis = analyse_network(network, inhibition, span)
     p, found = network.parameters, analysis.found
-    inhibited = max(analysis.contraction.rate, analysis.capture.rate)
-    slowest = min(found.rate, inhibited, 2.0 * p.rho * p.radius**2)
+    rates = (found.rate, max(analysis.contraction.rate, analysis.capture.rate),
+             2.0 * p.rho * p.radius**2)
+    slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
     stop = time_to_rest(network, analysis.capture, analysis.rest, span, reference.alpha_r,
                         leg.activity_rate, inhibition.region_radius, tick_s)
     start = time_to_walking(network, found, analysis.rest, span, leg.activity_rate, tick_s)

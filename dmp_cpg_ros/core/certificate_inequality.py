@@ -85,10 +85,10 @@ class Inequality:
 
     def explained(self) -> str:
         """Name, both sides and the sentence in one line."""
-        relation = '<' if self.holds else 'is not <'
+        relation, told = ('<', '') if self.holds else ('is not <', 'not guaranteed: ')
         unit = f' {self.unit}' if self.unit else ''
         return (f'{self.name}: {self.left_is} = {self.left:.4g}{unit} {relation} {self.right_is} '
-                f'= {self.right:.4g}{unit}; {self.sentence}')
+                f'= {self.right:.4g}{unit}; {told}{self.sentence}')
 
 
 def _finite(value: float) -> float | None:

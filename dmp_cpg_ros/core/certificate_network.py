@@ -121,14 +121,15 @@ def network_inequalities(network: GaitNetwork, inhibition: InhibitionParameters,
 
 
 def _contraction(contraction: InhibitedContraction) -> Inequality:
-    where = {GLOBAL: 'from every state', NONE: 'nowhere that is certified'}.get(
+    where = {GLOBAL: 'from every state', NONE: 'and comes to rest'}.get(
         contraction.reach, 'inside the capture set, which leaves the origin out')
     return Inequality(
         'contraction', contraction.growth, contraction.inhibition_rate, '1/s',
         'rho r^2' if contraction.reach == GLOBAL else 'growth on the capture set',
         'connectivity of L_K + k_inh E', PROVED,
-        f'the inhibited network contracts {where} ({contraction.reach} grade), at '
-        f'{max(contraction.rate, 0.0):.4g} 1/s')
+        f'the inhibited network contracts {where}' + (
+            '' if contraction.reach == NONE else
+            f' ({contraction.reach} grade), at {contraction.rate:.4g} 1/s'))
 
 
 def _capture(network: GaitNetwork, inhibition: InhibitionParameters, span: OperatingRange,
@@ -142,12 +143,13 @@ def _capture(network: GaitNetwork, inhibition: InhibitionParameters, span: Opera
         rest.distance[held].max())
     anywhere = max(needed_gain_anywhere(network.system, span.omega[1], int(node), r0)
                    for node in np.flatnonzero(held))
+    exists = '' if np.isfinite(distance) else '; there is none, the other legs break free'
     cadence = f'at the highest cadence, {span.omega[1]:.4g} rad/s'
     return [
         Inequality('capture', needed, gain, '1/s', 'N omega r/r0 made exact', 'k_inh', PROVED,
                    f'legs that enter C in their places cannot leave it again, {cadence}'),
         Inequality('rest_in_region', distance, r0, '', '|x_1* - x_d|', 'r0', PROVED,
-                   f'the inhibited equilibrium lies inside C, {cadence}'),
+                   f'the inhibited equilibrium lies inside C, {cadence}{exists}'),
         Inequality('capture_anywhere', anywhere, gain, '1/s', 'gain for any |x_j| <= r', 'k_inh',
                    PROVED, 'C cannot be left even while the other legs are out of place',
                    required=False)]

@@ -1,0 +1,199 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``certify``: the certificate of a parameter file, with exit status 1 when it fails."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.certificate import Certificate, certify
+from dmp_cpg_ros.core.certificate_inequality import Inequality
+from dmp_cpg_ros.core.certificate_suggest import Suggestion, suggest_gains
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.gait_network import GaitNetwork
+from dmp_cpg_ros.core.leg_primitive import body_scale
+from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.suite import Suite, load_suite
+
+HOLDS, FAILS, BAD_INPUT = 0, 1, 2
+"""Exit statuses."""
+
+_EXAMPLES = """\
+exit status:
+  0 every required inequality holds    1 one fails, and is named    2 the input cannot be used
+
+examples:
+  certify
+  certify my_suite.yaml --gait trot --suggest
+  certify --json | python3 -m json.tool
+"""
+
+
+@dataclass(frozen=True)
+class Certified:
+    """A parameter file with its certificate.
+
+    Attributes
+    ----------
+    suite : Suite
+        What the file says.
+    certificate : Certificate
+        Of its parameters.
+    suggestion : Suggestion or None
+        Gains that hold, when asked for and found.
+    """
+
+    suite: Suite
+    certificate: Certificate
+    suggestion: Suggestion | None
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(_without_ros_arguments(given))
+    try:
+        certified = certify_file(options.file, options.gait, options.robot, options.suggest)
+    except DmpCpgError as error:
+        print(f'certify: {error}', file=sys.stderr)
+        return BAD_INPUT
+    if options.json:
+        print(json.dumps(_as_mapping(certified, options.suggest), indent=2, allow_nan=False))
+    else:
+        print('\n'.join(_report(certified, options.suggest)))
+    for entry in certified.certificate.failing:
+        print(f'certify: fails: {entry.explained()}', file=sys.stderr)
+    return HOLDS if certified.certificate.holds else FAILS
+
+
+def certify_file(file: str | None = None, gait: str | None = None, robot: str | None = None,
+                 suggest: bool = False) -> Certified:
+    """Certify a parameter file.
+
+    Parameters
+    ----------
+    file : str, optional
+        ROS 2 parameter file; the package's own without.
+    gait, robot : str, optional
+        Gait and robot file to use instead of those that the file names.
+    suggest : bool
+        Whether to look for gains that hold.
+
+    Returns
+    -------
+    Certified
+
+    Raises
+    ------
+    DmpCpgError
+        If a file is not there, or a name or value in it is wrong.
+    """
+    from dmp_cpg_ros.robot.model_reader import load_description
+
+    overrides: dict[str, Any] = {}
+    if gait is not None:
+        overrides['gait'] = gait
+    if robot is not None:
+        overrides['robot'] = str(find_config(robot).resolve())
+    suite = load_suite(file, overrides)
+    p = suite.parameters
+    network = GaitNetwork(p.canonical, suite.gait, body_scale(load_description(suite.robot_file)))
+    running = (network, p.inhibition, p.reference, p.leg, p.posture, suite.tick_ns * 1e-9)
+    return Certified(suite, certify(*running), suggest_gains(*running) if suggest else None)
+
+
+def _report(certified: Certified, suggest: bool) -> list[str]:
+    suite, certificate = certified.suite, certified.certificate
+    lines = [f'{suite.file}: {suite.gait.name} at up to {certificate.omega_max:.4g} rad/s, '
+             f'{1e9 / suite.tick_ns:g} Hz', '']
+    lines += _table(certificate.inequalities)
+    if certificate.rest_phase:
+        at_rest = ', '.join(
+            f'{leg} {math.degrees(ahead):.1f} deg at {radius:.3f}' for leg, ahead, radius
+            in zip(LEGS, certificate.rest_phase, certificate.rest_radius, strict=True))
+        lines += ['', f'at rest, phase ahead of its place and radius: {at_rest}']
+    lines += ['', 'certificate: ' + (
+        f'holds; contraction under inhibition is of {certificate.contraction_grade} grade; '
+        f"sampled, not proved: {', '.join(certificate.sampled) or 'nothing'}"
+        if certificate.holds else 'FAILS: ' + ', '.join(
+            entry.name for entry in certificate.failing))]
+    return lines + (['', *_suggested(certified)] if suggest else [])
+
+
+def _table(inequalities: Sequence[Inequality]) -> list[str]:
+    """Two lines for each inequality: both sides with the margin, and what it means."""
+    rows = [('inequality', '', 'left side', 'right side', 'margin', 'unit', 'grade')]
+    for entry in inequalities:
+        rows.append((entry.name, _verdict(entry), f'{entry.left_is} = {entry.left:.4g}',
+                     f'{entry.right_is} = {entry.right:.4g}', f'{entry.margin:.4g}',
+                     entry.unit or '-', entry.grade))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    lines = ['  '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+             for row in rows]
+    told = [f'    {entry.sentence}' for entry in inequalities]
+    return [lines[0], *(line for pair in zip(lines[1:], told, strict=True) for line in pair)]
+
+
+def _verdict(entry: Inequality) -> str:
+    if entry.holds:
+        return 'holds'
+    return 'FAILS' if entry.required else 'no (not required)'
+
+
+def _suggested(certified: Certified) -> list[str]:
+    suggestion = certified.suggestion
+    if suggestion is None:
+        return ['no coupling and inhibition gains within their ranges make it hold: change what '
+                'the failing inequality names']
+    if not suggestion.changed:
+        return ['the present gains hold']
+    return ['these gains hold:', f'    coupling_gain: {suggestion.coupling_gain:g}    # [1/s]',
+            f'    inhibition_gain: {suggestion.inhibition_gain:g}    # [1/s]']
+
+
+def _as_mapping(certified: Certified, suggest: bool) -> dict[str, Any]:
+    suite = certified.suite
+    mapping: dict[str, Any] = {'file': str(suite.file), 'gait': suite.gait.name,
+                               'tick_s': suite.tick_ns * 1e-9,
+                               **certified.certificate.as_mapping()}
+    if suggest:
+        found = certified.suggestion
+        mapping['suggestion'] = None if found is None else {
+            'coupling_gain': found.coupling_gain, 'inhibition_gain': found.inhibition_gain}
+    return mapping
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='certify', epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Print what the parameters of the suite guarantee: that the legs synchronise, '
+                    'that the gait can be stopped, and when.')
+    add = parser.add_argument
+    add('file', metavar='FILE', nargs='?', help='ROS 2 parameter file (default: suite.yaml)')
+    add('--gait', metavar='NAME', help='gait instead of the one that the file names')
+    add('--robot', metavar='FILE', help='robot file instead of the one that the file names')
+    add('--json', action='store_true', help='print JSON instead of a table')
+    add('--suggest', action='store_true', help='propose coupling and inhibition gains that hold')
+    add('--ros-args', nargs='*', help="accepted as ROS tools add it; 'certify' uses no ROS")
+    return parser
+
+
+def _without_ros_arguments(arguments: list[str]) -> list[str]:
+    """Drop --ros-args up to a closing -- or the end; argparse would reject what they hold."""
+    if '--ros-args' not in arguments:
+        return arguments
+    begin = arguments.index('--ros-args')
+    rest = arguments[begin:]
+    after = rest[rest.index('--') + 1:] if '--' in rest else []
+    return [*arguments[:begin], *_without_ros_arguments(after)]
+
+
+if __name__ == '__main__':
+    sys.exit(main())
