@@ -129,7 +129,7 @@ class VonMisesBases:
         _check(self)
 
     @classmethod
-    def evenly_around(cls, count: int, overlap: float = 0.6) -> VonMisesBases:
+    def evenly_around(cls, count: int, overlap: float = 0.2) -> VonMisesBases:
         """Bases evenly spaced around the cycle, all of one width.
 
         Parameters

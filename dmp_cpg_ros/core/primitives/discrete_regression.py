@@ -28,6 +28,7 @@ Mask = NDArray[np.bool_]
 FINAL_PHASE = 0.01
 """Phase x at the end of the demonstration, the usual choice; it fixes α_x = −ln(0.01)/T."""
 
+_OVERLAP = 0.6
 _STEPS_PER_MOVEMENT = 400
 
 
@@ -67,7 +68,7 @@ class DiscreteTask:
     def bases(self, count: int) -> GaussianBases:
         """So many bases over the movement."""
         return GaussianBases.evenly_in_time(
-            count, self.decay, self.duration, self.options.basis_overlap
+            count, self.decay, self.duration, self.options.overlap_or(_OVERLAP)
         )
 
 

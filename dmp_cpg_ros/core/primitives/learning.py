@@ -37,6 +37,9 @@ BASIS_CANDIDATES = (5, 7, 10, 14, 19, 25, 33, 43)
 """Numbers of bases that are tried when the number is to be chosen."""
 
 
+_LOCAL_OVERLAP = 0.03
+
+
 @dataclass(frozen=True)
 class FitOptions:
     """How weights are fitted.
@@ -48,8 +51,9 @@ class FitOptions:
     ridge : float
         Regularisation λ ≥ 0, relative to the mean square of the regressors' columns.
     overlap : float, optional
-        Value of a basis at the centre of its neighbour, in (0, 1). Without: 0.6, and 0.03 for the
-        local method, whose separate fits are averaged where bases overlap.
+        Value of a basis at the centre of its neighbour, in (0, 1). Without: 0.6 for
+        discrete primitives; 0.2 for rhythmic ones, whose vector weights give each basis a slope
+        too; 0.03 for the local method, whose separate fits are averaged where bases overlap.
 
     Raises
     ------
@@ -69,15 +73,24 @@ class FitOptions:
             )
         if not (np.isfinite(self.ridge) and self.ridge >= 0.0):
             raise ParameterError(f'ridge = {self.ridge!r} must be a finite number of at least 0')
-        if not 0.0 < self.basis_overlap < 1.0:
+        if self.overlap is not None and not 0.0 < self.overlap < 1.0:
             raise ParameterError(f'overlap = {self.overlap!r} must lie between 0 and 1')
 
-    @property
-    def basis_overlap(self) -> float:
-        """The overlap that is used."""
-        if self.overlap is None:
-            return 0.03 if self.method == 'local' else 0.6
-        return self.overlap
+    def overlap_or(self, usual: float) -> float:
+        """Overlap that is used, given what suits the kind of primitive.
+
+        Parameters
+        ----------
+        usual : float
+            Overlap for joint fits when none is asked for.
+
+        Returns
+        -------
+        float
+        """
+        if self.overlap is not None:
+            return self.overlap
+        return _LOCAL_OVERLAP if self.method == 'local' else usual
 
 
 def ridge_regression(regressors: Array, targets: Array, ridge: float) -> Array:
