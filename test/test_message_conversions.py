@@ -1,0 +1,277 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Values cross the wire bit for bit; names decide, not places; no bad number enters."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Twist, TwistStamped
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.posture import PostureFeedback
+from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.nodes.conversions import (
+    CanonicalStateReader,
+    CanonicalStateWriter,
+    JointTargetsReader,
+    JointTargetsWriter,
+    PostureFeedbackReader,
+    PostureFeedbackWriter,
+    ReferenceWriter,
+    read_reference,
+    read_twist,
+)
+from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter, read_inhibition_state
+from dmp_cpg_ros.nodes.message_values import LARGEST, header_ns, set_stamp, stamp_ns, text
+from dmp_cpg_ros.nodes.robot_state_messages import (
+    FootContactsReader,
+    JointsReader,
+    RobotStateWriter,
+    read_imu,
+    read_odom,
+    robot_state,
+)
+
+FLOATS = st.floats(-LARGEST, LARGEST)
+STAMPS = st.integers(0, 2**31 * 10**9 - 1)
+
+
+def numbers(*shape: int) -> st.SearchStrategy[np.ndarray]:
+    return arrays(np.float64, shape, elements=FLOATS)
+
+
+def wire(message: Any) -> Any:
+    """The message as another process gets it."""
+    return deserialize_message(serialize_message(message), type(message))
+
+
+def bits(*values: Any) -> list[bytes]:
+    return [np.ascontiguousarray(value, dtype=np.float64).tobytes() for value in values]
+
+
+@given(STAMPS)
+def test_stamps_are_exact(time_ns: int) -> None:
+    stamp = Time()
+    set_stamp(stamp, time_ns)
+    assert stamp_ns(wire(stamp)) == time_ns
+
+
+@pytest.mark.parametrize('stamp', [Time(sec=-1), Time(nanosec=10**9)])
+def test_stamps_that_are_no_time_are_refused(stamp: Time) -> None:
+    with pytest.raises(DataError, match='stamp'):
+        stamp_ns(stamp)
+
+
+@given(STAMPS, numbers(4, 2), numbers(4, 2))
+def test_canonical_state(time_ns: int, x: np.ndarray, x_dot: np.ndarray) -> None:
+    message = wire(CanonicalStateWriter().fill(time_ns, x, x_dot))
+    assert list(message.name[:3]) == ['fl_x1', 'fl_x2', 'fr_x1']
+    assert bits(*CanonicalStateReader().read(message)) == bits(x, x_dot)
+    assert header_ns(message) == time_ns
+
+
+@given(numbers(3))
+def test_reference(r: np.ndarray) -> None:
+    message = wire(ReferenceWriter().fill(0, r))
+    assert bits(read_reference(message)) == bits(r)
+    twist = message.twist
+    assert bits([twist.linear.x, twist.linear.y, twist.angular.z]) == bits(r)
+
+
+@given(st.sampled_from(LEGS), numbers(3, 3))
+def test_joint_targets(leg: str, values: np.ndarray) -> None:
+    sent = JointTargets(*values)
+    found, targets = JointTargetsReader().read(wire(JointTargetsWriter(leg).fill(0, sent)))
+    assert found == leg
+    assert bits(*dataclasses.astuple(targets)) == bits(*dataclasses.astuple(sent))
+
+
+@given(numbers(12), numbers(4, 2), numbers(3))
+def test_posture_feedback(torque: np.ndarray, shift: np.ndarray, correction: np.ndarray) -> None:
+    sent = PostureFeedback(torque, shift, correction)
+    read = PostureFeedbackReader().read(wire(PostureFeedbackWriter().fill(0, sent)))
+    assert bits(read.torque, read.shift_in_base, read.correction) == bits(
+        torque, shift, correction)
+
+
+def state_of(values: np.ndarray, time_ns: int = 0) -> RobotState:
+    quaternion = values[:4] / np.linalg.norm(values[:4])
+    return RobotState(time_ns, values[4:16], values[16:28], values[28:40], values[40:43],
+                      quaternion, values[43:46], values[46:49], values[49:52], values[52:56])
+
+
+def read_state(writer: RobotStateWriter) -> RobotState:
+    joints = JointsReader().read(wire(writer.joint_states))
+    quaternion, rate, acceleration = read_imu(wire(writer.imu))
+    base = read_odom(wire(writer.odom))
+    assert bits(quaternion, rate) == bits(base.quaternion, base.rate_in_base)
+    stamps = {header_ns(message) for message in (
+        writer.joint_states, writer.imu, writer.odom, writer.foot_contacts)}
+    assert stamps == {stamp_ns(writer.clock.clock)}
+    return robot_state(stamps.pop(), joints, base,
+                       FootContactsReader().read(wire(writer.foot_contacts)), acceleration)
+
+
+@given(STAMPS, numbers(56))
+def test_robot_state(time_ns: int, values: np.ndarray) -> None:
+    values[:4] = np.clip(values[:4], -1.0, 1.0) + [0.0, 0.0, 0.0, 2.0]
+    sent, writer = state_of(values, time_ns), RobotStateWriter()
+    writer.fill(state_of(np.ones(56)))  # the messages are used again
+    writer.fill(sent)
+    read = read_state(writer)
+    assert read.time_ns == time_ns
+    names = [field.name for field in dataclasses.fields(RobotState)[1:]]
+    assert bits(*(getattr(read, name) for name in names)) == bits(
+        *(getattr(sent, name) for name in names))
+
+
+@given(st.permutations(range(12)), st.booleans(), numbers(12))
+def test_joints_are_taken_by_name(order: list[int], more: bool, position: np.ndarray) -> None:
+    names = [JOINT_NAMES[i] for i in order] + (['tail'] if more else [])
+    extra = [0.5] if more else []
+    message = JointState(name=names, position=[position[i] for i in order] + extra,
+                         velocity=[-position[i] for i in order] + extra)
+    reader = JointsReader()
+    for _ in range(2):  # the second time from the cache
+        read = reader.read(wire(message))
+        assert bits(*read) == bits(position, -position, np.zeros(12))
+    plain = JointState(name=list(JOINT_NAMES), position=position, velocity=position)
+    assert bits(reader.read(plain)[0]) == bits(position)
+
+
+@pytest.mark.parametrize(('change', 'problem'), [
+    (lambda m: m.name.__setitem__(4, 'fr_hop'), 'fr_hip'),
+    (lambda m: m.name.__setitem__(4, 'fl_hip'), 'fr_hip'),
+    (lambda m: [getattr(m, field).append(value) for field, value in (
+        ('name', 'fl_hip'), ('position', 0.0), ('velocity', 0.0))], 'unique'),
+    (lambda m: m.position.pop(), 'position has 11 entries for 12 names'),
+    (lambda m: m.velocity.append(0.0), 'velocity has 13 entries for 12 names'),
+    (lambda m: m.effort.append(0.0), 'effort has 1 entries for 12 names'),
+    (lambda m: m.name.clear(), 'fl_abduction'),
+])
+def test_messages_that_do_not_fit_are_refused(change: Callable, problem: str) -> None:
+    message = JointState(name=list(JOINT_NAMES), position=[0.0] * 12, velocity=[0.0] * 12)
+    change(message)
+    with pytest.raises(DataError, match=problem):
+        JointsReader().read(message)
+
+
+def test_targets_of_no_leg_are_refused() -> None:
+    for names in ([], ['fl_hip'], ['xx_abduction', 'xx_hip', 'xx_knee'], list(JOINT_NAMES),
+                  ['fl_abduction', 'fr_hip', 'fl_knee']):
+        values = [0.0] * len(names)
+        message = JointState(name=names, position=values, velocity=values, effort=values)
+        with pytest.raises(DataError, match='fl'):
+            JointTargetsReader().read(message)
+
+
+BAD = (math.nan, math.inf, -math.inf, 1e300, -1.001 * LARGEST)
+
+
+@pytest.mark.parametrize('bad', BAD)
+@given(st.integers(0, 11), st.sampled_from(['position', 'velocity', 'effort']))
+def test_no_bad_number_enters_through_joints(bad: float, place: int, field: str) -> None:
+    message = JointState(name=list(JOINT_NAMES), position=[0.0] * 12, velocity=[0.0] * 12,
+                         effort=[0.0] * 12)
+    getattr(message, field)[place] = bad
+    with pytest.raises(DataError, match=f'{field}.*must be finite'):
+        JointsReader().read(message)
+
+
+@pytest.mark.parametrize('bad', BAD)
+def test_no_bad_number_enters_otherwise(bad: float) -> None:
+    for part in ('linear', 'angular'):
+        for axis in 'xyz':
+            twist = TwistStamped()
+            setattr(getattr(twist.twist, part), axis, bad)
+            with pytest.raises(DataError, match='finite'):
+                read_reference(twist)
+    writer = RobotStateWriter()
+    writer.fill(state_of(np.ones(56)))
+    vectors = [(writer.odom, read_odom, writer.odom.pose.pose.position),
+               (writer.odom, read_odom, writer.odom.pose.pose.orientation),
+               (writer.odom, read_odom, writer.odom.twist.twist.linear),
+               (writer.odom, read_odom, writer.odom.twist.twist.angular),
+               (writer.imu, read_imu, writer.imu.orientation),
+               (writer.imu, read_imu, writer.imu.angular_velocity),
+               (writer.imu, read_imu, writer.imu.linear_acceleration)]
+    for message, read, part in vectors:
+        good, part.y = part.y, bad
+        with pytest.raises(DataError):
+            read(message)
+        part.y = good
+        read(message)
+
+
+@pytest.mark.parametrize('bad', [math.nan, math.inf])
+def test_no_bad_number_leaves(bad: float) -> None:
+    x = np.zeros((4, 2))
+    x[2, 1] = bad
+    with pytest.raises(DataError, match='velocity'):
+        CanonicalStateWriter().fill(0, np.zeros((4, 2)), x)
+    with pytest.raises(DataError, match='effort'):
+        JointTargetsWriter('fl').fill(0, JointTargets(np.zeros(3), np.zeros(3), np.full(3, bad)))
+    with pytest.raises(DataError, match='reference'):
+        ReferenceWriter().fill(0, np.array([0.0, bad, 0.0]))
+    for place in range(4, 56):
+        values = np.ones(56)
+        values[place] = bad
+        with pytest.raises(DataError, match='finite'):
+            RobotStateWriter().fill(state_of(values))
+
+
+def test_a_quaternion_must_be_a_rotation() -> None:
+    writer = RobotStateWriter()
+    writer.fill(state_of(np.ones(56)))
+    writer.odom.pose.pose.orientation.w = 3.0
+    with pytest.raises(DataError, match='quaternion'):
+        read_odom(writer.odom)
+
+
+@given(st.tuples(FLOATS, FLOATS, FLOATS))
+def test_commands(values: tuple[float, float, float]) -> None:
+    message = Twist()
+    message.linear.x, message.linear.y, message.angular.z = values
+    assert bits(read_twist(wire(message))) == bits(values)
+
+
+@given(STAMPS, st.floats(allow_nan=False, allow_infinity=False), st.booleans())
+def test_inhibition_state(time_ns: int, number: float, flag: bool) -> None:
+    writer = InhibitionStateWriter()
+    writer.fill(0, 'free', {'gain': 1.0, 'requested': not flag})
+    message = wire(writer.fill(time_ns, 'at_rest', {'gain': number, 'requested': flag}))
+    read = read_inhibition_state(message)
+    assert (read.word, header_ns(message)) == ('at_rest', time_ns)
+    assert bits(read.number('gain')) == bits(number)
+    assert read.flag('requested') is flag
+
+
+def test_inhibition_values_that_cannot_be_used_are_named() -> None:
+    writer = InhibitionStateWriter()
+    read = read_inhibition_state(writer.fill(0, 'free', {'gain': math.nan, 'word': 'x'}))
+    for key in ('gain', 'word', 'absent'):
+        with pytest.raises(DataError, match=key):
+            read.number(key)
+        with pytest.raises(DataError, match=key):
+            read.flag(key)
+    writer.message.status[0].name = 'other'
+    with pytest.raises(DataError, match='inhibition'):
+        read_inhibition_state(writer.message)
+
+
+@given(st.floats())
+def test_texts_read_back_to_the_same_float(value: float) -> None:
+    assert bits(float(text(value))) == bits(value) or math.isnan(value)
+    assert text(np.float64(value)) == text(value)
