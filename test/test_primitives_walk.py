@@ -1,0 +1,59 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Primitives learned from the joints of a walking robot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_examples import GAITS, TICK, suite_parameters
+
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.core.primitives.learning_rhythmic import learn_rhythmic, reproduction_errors
+from dmp_cpg_ros.core.primitives.period import find_period
+from dmp_cpg_ros.core.robot_state import JOINT_NAMES
+from dmp_cpg_ros.core.walking_loop import WalkingLoop
+
+pytest.importorskip('mujoco')
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+
+SETTLING, RECORDED = 4.0, 2.5
+
+
+def recorded_walk(gait):
+    """Measured joint angles of the MuJoCo robot once it walks steadily, and ω of its phases."""
+    robot = MujocoRobot()
+    loop = WalkingLoop(robot.description, GAITS[gait], suite_parameters())
+    loop.command(0.4)
+    state, times, angles = robot.reset(), [], []
+    for i in range(round((SETTLING + RECORDED) / TICK)):
+        if i * TICK >= SETTLING:
+            times.append(state.time_ns * 1e-9)
+            angles.append(state.joint_position)
+        state = robot.step(loop.tick(state).targets)
+    recording = Demonstration(np.array(times), np.array(angles), names=JOINT_NAMES)
+    return recording, float(loop.network.omega(loop.r))
+
+
+def spread_between_cycles(recording, period):
+    """Largest departure of a cycle from the mean one; no periodic movement can come closer."""
+    since = recording.times - recording.times[0]
+    count = int(since[-1] // period)
+    phase = np.linspace(0.0, 1.0, 100)
+    cycles = np.array([
+        [np.interp((i + phase) * period, since, angle) for angle in recording.positions.T]
+        for i in range(count)
+    ])
+    departure = np.abs(cycles - cycles.mean(axis=0)).max(axis=(0, 2))
+    return departure / np.ptp(recording.positions, axis=0)
+
+
+@pytest.mark.parametrize('gait', ['amble', 'trot'])
+def test_25_bases_reproduce_a_recorded_walk_to_less_than_one_percent(gait):
+    recording, omega = recorded_walk(gait)
+    period = find_period(recording)
+    assert period == pytest.approx(2.0 * np.pi / omega, rel=0.01)
+    errors = reproduction_errors(learn_rhythmic(recording, 25, period=period), recording, period)
+    widest = np.ptp(recording.positions, axis=0) / np.ptp(recording.positions, axis=0).max()
+    assert np.all(errors * widest < 0.01)
+    assert np.all(errors < np.maximum(0.01, 1.5 * spread_between_cycles(recording, period)))
