@@ -10,13 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.recording import (
-    FootForceSeries,
-    JointSeries,
-    OdometrySeries,
-    Recording,
-)
 from dmp_cpg_ros.analysis.stop_outcome import WALKING_ERROR, StopOutcome, body_at_rest
+from dmp_cpg_ros.commands.loop_recording import recording_of
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.stop_baselines import FreezingLoop
@@ -109,7 +104,8 @@ def run_trial(robot: MujocoRobot, case: StopCase, gait: Gait, parameters: SuiteP
     if trial.fell():
         return StopOutcome(True, predicted_s=predicted, bound_s=bound, measured_s=measured)
     context = RunContext(robot=robot.description)
-    at_rest = body_at_rest(trial.recording(), robot.description, context.contact_force)
+    at_rest = body_at_rest(
+        recording_of(trial.states), robot.description, context.contact_force)
     resumed = trial.resume(case)
     return replace(at_rest, fell=trial.fell(), predicted_s=predicted, bound_s=bound,
                    measured_s=measured, resumed_speed=resumed,
@@ -167,17 +163,3 @@ class _Trial:
         self.walk(WALKING_AFTER)
         count = round(SPEED_WINDOW / self.tick_s)
         return float(np.mean([state.base_velocity_in_base[0] for state in self.states[-count:]]))
-
-    def recording(self) -> Recording:
-        """States since the last request as a recording."""
-        def column(name: str) -> np.ndarray:
-            return np.array([getattr(state, name) for state in self.states])
-
-        time = column('time_ns') * 1e-9
-        return Recording(
-            joints=JointSeries(time, column('joint_position'), column('joint_velocity'),
-                               column('joint_effort')),
-            odometry=OdometrySeries(time, column('base_position_in_world'),
-                                    column('base_quaternion'), column('base_velocity_in_base'),
-                                    column('base_rate_in_base')),
-            feet=FootForceSeries(time, column('foot_force')))
