@@ -1,0 +1,178 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The suite as its users run it: real nodes in real processes over DDS, the service, the bag."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import re
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from ros_processes import NodeProcess, Processes, processes, ros_domain  # noqa: E402, F401
+
+from dmp_cpg_ros.analysis.digests import payload_digests  # noqa: E402
+from dmp_cpg_ros.analysis.loading import load_recording  # noqa: E402
+from dmp_cpg_ros.commands.walk import load_scenario  # noqa: E402
+from dmp_cpg_ros.core.robot_state import RobotState  # noqa: E402
+from dmp_cpg_ros.core.scenario import play  # noqa: E402
+from dmp_cpg_ros.core.walking_loop import WalkingLoop  # noqa: E402
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot  # noqa: E402
+from dmp_cpg_ros.suite import load_suite  # noqa: E402
+
+SCENARIO = """\
+name: short
+duration: 6.0
+events:
+  - {at: 0.2, inhibit: false}
+  - {at: 0.2, command: {v_x: 0.5, gamma: 0.1}}
+  - {at: 2.0, inhibit: true}
+  - {at: 4.4, inhibit: false}
+"""
+
+RUN_S = 240.0
+"""How long a run may take on a loaded machine before the test gives up [s]."""
+
+
+@pytest.fixture(scope='module')
+def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp('scenario') / 'short.yaml'
+    path.write_text(SCENARIO, encoding='utf-8')
+    return path
+
+
+def start_walk(processes: Processes, scenario: Path, out: Path, *options: str) -> NodeProcess:
+    return processes.python('-m', 'dmp_cpg_ros.commands.walk', str(scenario), '--no-report',
+                            '--out', str(out), *options)
+
+
+def walked(processes: Processes, scenario: Path, out: Path, *options: str) -> Path:
+    process = start_walk(processes, scenario, out, *options)
+    assert process.wait(RUN_S) == 0, process
+    return out
+
+
+def load_the_machine(until: Any) -> None:
+    while not until.is_set():
+        sum(range(10000))
+
+
+def plain_run(scenario_file: Path) -> tuple[list[RobotState], list[Any]]:
+    """Run the scenario on the plain loop; states and ticks."""
+    scenario, suite = load_scenario(scenario_file), load_suite()
+    robot = MujocoRobot(suite.robot_file, suite.tick_ns)
+    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
+    states, ticks = [robot.reset()], []
+
+    def step() -> RobotState:
+        ticks.append(loop.tick(states[-1]))
+        states.append(robot.step(ticks[-1].targets))
+        return states[-1]
+
+    play(scenario, suite.tick_ns, step, lambda command: loop.command(*command), loop.request)
+    return states, ticks
+
+
+def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
+        processes: Processes, scenario: Path, tmp_path: Path) -> None:
+    first = walked(processes, scenario, tmp_path / 'first', '--lock-step')
+    stop = multiprocessing.Event()
+    burners = [multiprocessing.Process(target=load_the_machine, args=(stop,), daemon=True)
+               for _ in range(os.cpu_count() or 2)]
+    for burner in burners:
+        burner.start()
+    try:
+        loaded = walked(processes, scenario, tmp_path / 'loaded', '--lock-step')
+    finally:
+        stop.set()
+    composed = walked(processes, scenario, tmp_path / 'composed', '--lock-step', '--composed')
+    digests = payload_digests(first / 'bag')
+    assert {'joint_states', 'canonical_state', *(f'joint_targets/{leg}' for leg in (
+        'fl', 'fr', 'rl', 'rr'))} <= set(digests)
+    assert payload_digests(loaded / 'bag') == digests
+    assert payload_digests(composed / 'bag') == digests
+    manifest = json.loads((first / 'manifest.json').read_text(encoding='utf-8'))
+    assert manifest['digests'] == digests
+
+    recording, (states, ticks) = load_recording(first / 'bag'), plain_run(scenario)
+    assert len(recording.joints.time) == len(ticks) == 1500
+    np.testing.assert_array_equal(recording.joints.position,
+                                  [state.joint_position for state in states[:-1]])
+    np.testing.assert_array_equal(recording.joints.velocity,
+                                  [state.joint_velocity for state in states[:-1]])
+    np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
+    np.testing.assert_array_equal(recording.canonical.x_dot, [tick.x_dot for tick in ticks])
+    np.testing.assert_array_equal(recording.targets.effort, [tick.targets.effort for tick in ticks])
+
+    metrics = json.loads((first / 'metrics.json').read_text(encoding='utf-8'))
+    assert metrics['robot']['fell'] is False
+    assert metrics['stop']['measured_s'] == pytest.approx(metrics['stop']['predicted_s'], abs=1e-6)
+
+
+def test_real_time_run_stops_and_starts(processes: Processes, scenario: Path, tmp_path: Path) -> None:
+    run = walked(processes, scenario, tmp_path / 'run', '--composed')
+    metrics = json.loads((run / 'metrics.json').read_text(encoding='utf-8'))
+    assert metrics['robot']['fell'] is False
+    assert metrics['stop']['completed'] == 1
+    for name in ('rate_hz', 'real_time_factor', 'latency_ms_p50', 'latency_ms_p99', 'deadline_misses'):
+        assert metrics['timing'][name] is not None
+
+
+def test_a_dead_node_ends_the_run_and_is_named(
+        processes: Processes, scenario: Path, tmp_path: Path) -> None:
+    process = start_walk(processes, scenario, tmp_path / 'run', '--lock-step')
+    process.wait_for_output('walking', RUN_S)
+    victim = find_child(process.pid, 'leg:fr')
+    os.kill(victim, signal.SIGKILL)
+    assert process.wait(RUN_S) == 1
+    assert re.search(r'leg_transformation_fr was ended by signal 9', process.output), process
+    assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
+
+
+def test_ctrl_c_ends_the_run_with_a_readable_bag(
+        processes: Processes, scenario: Path, tmp_path: Path) -> None:
+    process = start_walk(processes, scenario, tmp_path / 'run', '--lock-step')
+    process.wait_for_output('walking', RUN_S)
+    process.interrupt()
+    assert process.wait(RUN_S) == 130
+    assert 'interrupted' in process.output
+    assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
+
+
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (('no_such.yaml',), 'no_such.yaml'),
+    (('start_stop.yaml', '--set', 'gait:=gallop'), 'valid are amble'),
+    (('start_stop.yaml', '--set', 'rho:=.nan'), 'rho'),
+    (('start_stop.yaml', '--set', 'cadence:=1'), "no parameter 'cadence'"),
+    (('start_stop.yaml', '--rate', '333'), 'whole microseconds'),
+    (('start_stop.yaml', '--robot', 'no_robot.yaml'), 'no_robot.yaml'),
+])
+def test_bad_input_is_refused_with_what_is_valid(
+        processes: Processes, tmp_path: Path, arguments: tuple[str, ...], text: str) -> None:
+    process = processes.python('-m', 'dmp_cpg_ros.commands.walk', *arguments,
+                               '--out', str(tmp_path / 'run'))
+    assert process.wait() == 2
+    assert text in process.output
+
+
+def find_child(parent: int, name: str) -> int:
+    """Process of a node below a walk, by a word of its command line after ``__node:=``."""
+    word = name.replace('leg:', '__node:=leg_transformation_')
+    for folder in Path('/proc').iterdir():
+        if folder.name.isdigit():
+            try:
+                line = (folder / 'cmdline').read_bytes().decode()
+                status = (folder / 'stat').read_text(encoding='utf-8')
+            except OSError:
+                continue
+            if word in line and int(status.rpartition(')')[2].split()[1]) == parent:
+                return int(folder.name)
+    raise AssertionError(f'no process {word} below {parent}')
