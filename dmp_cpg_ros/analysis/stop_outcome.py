@@ -155,7 +155,7 @@ class StopSummary:
         Numbers of cases; ``bounded`` are those that have a bound.
     prediction_error : tuple of float
         Share of the measured time.
-    measured_s, body_rest_s : tuple of float
+    bound_s, measured_s, body_rest_s : tuple of float
         [s]
     slip_m, displacement_m : tuple of float
         [m]
@@ -172,6 +172,7 @@ class StopSummary:
     bounded: int
     bound_exceeded: int
     prediction_error: tuple[float, float]
+    bound_s: tuple[float, float]
     measured_s: tuple[float, float]
     body_rest_s: tuple[float, float]
     slip_m: tuple[float, float]
@@ -199,6 +200,7 @@ def summary(outcomes: Sequence[StopOutcome]) -> StopSummary:
         sum(np.isfinite(outcome.bound_s) for outcome in outcomes),
         number('bound_exceeded'),
         spread('prediction_error'),
+        spread('bound_s'),
         spread('measured_s'),
         spread('body_rest_s'),
         spread('slip_m'),

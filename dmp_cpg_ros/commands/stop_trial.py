@@ -152,7 +152,9 @@ class _Trial:
             held += self.tick_s
             if self.loop.stop.word == 'at_rest':
                 measured = self.loop.stop.measured_s
-        return predicted, bound, measured
+        # a robot that fell on the way says nothing of the oscillators' time to rest
+        unknown = self.fell() and measured == np.inf
+        return predicted, bound, np.nan if unknown else measured
 
     def resume(self, case: StopCase) -> float:
         """Walk on; return the mean forward speed at the end [m/s]."""
