@@ -1,0 +1,571 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What all nodes stand on: interfaces, parameters, lifecycle, diagnostics, executors."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy.experimental
+import ros_processes
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import TwistStamped
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import DescribeParameters, SetParametersAtomically
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSCompatibility, ReliabilityPolicy, qos_check_compatible
+from rclpy.task import Future
+from ros_processes import NodeProcess, Processes, Ros
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.robot_state import JOINT_NAMES
+from dmp_cpg_ros.nodes import middleware
+from dmp_cpg_ros.nodes.conversions import ReferenceWriter, read_twist
+from dmp_cpg_ros.nodes.diagnostics import LOG_EVERY, NodeHealth
+from dmp_cpg_ros.nodes.executors import make_executor, spin
+from dmp_cpg_ros.nodes.help_text import help_text
+from dmp_cpg_ros.nodes.interfaces import (
+    INTERFACES,
+    SUITE,
+    TOPICS,
+    expected_count,
+    interface,
+    published_by,
+    read_by,
+    served_by,
+)
+from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp
+from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters, NodeParameters, ParameterTable
+
+processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
+
+TICK = 4_000_000
+MIDDLE = 1_500_000_000
+
+
+@dataclass(frozen=True)
+class OtherParameters(Parameters):
+    """Parameters of the test's node."""
+
+    count: int = parameter(3, 'a whole number', minimum=1, maximum=9)
+    words: tuple[str, ...] = parameter(('a', 'b'), 'some words', choices=('a', 'b', 'c'))
+    gains: tuple[float, ...] = parameter((1.0, 2.0), 'some numbers', unit='1/s', minimum=0.0)
+    upper: float = parameter(5.0, 'a number not below count', minimum=0.0)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.upper < self.count:
+            raise ParameterError(f'upper = {self.upper} must not be below count = {self.count}')
+
+
+class Relay(ManagedNode):
+    """Publishes the newest command at every tick.
+
+    And more that --help does not say.
+    """
+
+    KIND = 'reference_filter'
+    PARAMETER_SETS = (LockStepParameters, ReferenceParameters, OtherParameters)
+    CHANGEABLE = ('alpha_r', 'count', 'upper', 'gains')
+    fails_with: Exception | None = None
+
+    def configure(self) -> None:
+        if self.fails_with:
+            raise self.fails_with
+        self.command = (0.0, 0.0, 0.0)
+        self.changes: list[tuple[int, float, int]] = []
+        self.out, self.writer = self.publisher('reference'), ReferenceWriter()
+        self.ticks = self.match(('joint_states',), 'joint_states')
+        self.listen('joint_states', lambda m: self.ticks.add('joint_states', header_ns(m), None))
+        self.listen('cmd_vel', self.on_command, command=True)
+
+    def on_command(self, message: Any) -> None:
+        self.command = read_twist(message)
+
+    def on_parameters(self) -> None:
+        self.changes.append((self.health.ticks, self.parameters_of(ReferenceParameters).alpha_r,
+                             self.parameters_of(OtherParameters).count))
+
+    def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
+        self.out.publish(self.writer.fill(stamp_ns, np.array(self.command)))
+
+    def check_parameters(self, sets: Any) -> None:
+        if sets[ReferenceParameters].alpha_r == 7.0:
+            raise ParameterError('alpha_r = 7.0 would lose the certificate')
+
+    def diagnostic_values(self) -> dict[str, Any]:
+        return {'v_x': self.command[0]}
+
+
+def overrides(**values: Any) -> list[Parameter]:
+    return [Parameter(name, value=value) for name, value in values.items()]
+
+
+def relay(ros: Ros, **values: Any) -> Relay:
+    return Relay('relay', context=ros.context, parameter_overrides=overrides(**values))
+
+
+@pytest.fixture
+def started(ros: Ros) -> Iterator[Relay]:
+    """An active relay whose callbacks run when the test's do."""
+    node = relay(ros)
+    node.start()
+    ros.executor.add_node(node)
+    yield node
+    node.close()
+    ros.executor.remove_node(node)
+    node.destroy_node()
+
+
+class Robot:
+    """The other end of the relay."""
+
+    def __init__(self, ros: Ros) -> None:
+        self.ros = ros
+        self.joints = self._publisher('joint_states')
+        self.commands = self._publisher('cmd_vel')
+        self.references: list[TwistStamped] = ros.collect(
+            TwistStamped, 'reference', interface('reference').reader_qos)
+        self.reports: list[DiagnosticArray] = ros.collect(DiagnosticArray, '/diagnostics', 100)
+        self.k = 0
+        ros.spin_until(lambda: self.joints.get_subscription_count()
+                       and self.commands.get_subscription_count())
+
+    def _publisher(self, name: str) -> Any:
+        topic = interface(name)
+        return self.ros.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
+
+    def tick(self) -> TwistStamped:
+        """Publish a tick and return the reference that it leads to."""
+        self.k += 1
+        message = JointState(name=list(JOINT_NAMES), position=[0.0] * 12, velocity=[0.0] * 12)
+        set_stamp(message.header.stamp, self.k * TICK)
+        self.joints.publish(message)
+        stamps = [self.k * TICK]
+        self.ros.spin_until(lambda: [header_ns(m) for m in self.references[-1:]] == stamps)
+        return self.references[-1]
+
+    def send(self, v_x: float) -> None:
+        """Send a command; it is in the reader's queue when this returns."""
+        message = interface('cmd_vel').type()
+        message.linear.x = v_x
+        self.commands.publish(message)
+        assert self.commands.wait_for_all_acked()
+
+    def status(self) -> tuple[int, str, dict[str, str]]:
+        """Level, message and values of the last report of the relay."""
+        found = [r.status[0] for r in self.reports if r.status[0].name == 'relay']
+        return found[-1].level, found[-1].message, {v.key: v.value for v in found[-1].values}
+
+
+# Interfaces ------------------------------------------------------------------------------------
+
+
+def test_every_topic_is_lossless_and_the_latched_ones_are_latched() -> None:
+    for topic in TOPICS:
+        offered = topic.publisher_qos
+        assert offered.reliability == ReliabilityPolicy.RELIABLE
+        assert (offered.durability == DurabilityPolicy.TRANSIENT_LOCAL) == topic.latched
+        assert (offered.depth == 1) == topic.latched
+        for reader in (topic.reader_qos, topic.recorder_qos):
+            assert qos_check_compatible(offered, reader)[0] != QoSCompatibility.ERROR
+            assert topic.latched or reader.depth >= 2 * expected_count(topic.publishers)
+    assert interface('inhibition_state').latched
+
+
+def test_every_node_has_its_place_in_the_table() -> None:
+    for kind in SUITE:
+        assert {'/diagnostics'} <= {topic.name for topic in published_by(kind)}
+        assert {'~/ready'} <= {service.name for service in served_by(kind)}
+        assert read_by(kind)
+    for entry in INTERFACES.values():
+        known = {*SUITE, 'user'}
+        assert set(entry.publishers) | set(entry.subscribers) <= known
+        assert set(entry.sometimes) <= set(entry.publishers) | set(entry.subscribers)
+        assert entry.type_name.split('/')[1] == ('srv' if entry.service else 'msg')
+    with pytest.raises(ParameterError, match='joint_states'):
+        interface('joint_stats')
+
+
+# Parameters ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('values', 'problem'), [
+    ({'alpha_r': 'fast'}, "alpha_r.*must be a number, not 'fast'"),
+    ({'alpha_r': math.nan}, 'alpha_r.*nan.*0.05, 50'),
+    ({'alpha_r': 50.1}, 'alpha_r.*50.1.*0.05, 50'),
+    ({'alpha_R': 3.0}, "no parameter 'alpha_R'.*alpha_r"),
+    ({'count': 1.5}, 'count.*whole number'),
+    ({'count': True}, 'count.*whole number'),
+    ({'lock_step': 1}, 'lock_step.*true or false'),
+    ({'words': ['a', 'd']}, "words.*one of a, b, c, not 'd'"),
+    ({'gains': [1.0, -1.0]}, 'gains'),
+    ({'gains': 1.0}, 'gains.*list'),
+    ({'words': []}, 'words.*empty'),
+    ({'executor': 'fastest'}, 'executor.*events, single'),
+    ({'count': 7}, 'upper = 5.0.*count = 7'),
+])
+def test_a_bad_override_is_named(ros: Ros, values: dict[str, Any], problem: str) -> None:
+    with pytest.raises(ParameterError, match=problem):
+        relay(ros, **values)
+
+
+def test_overrides_take_effect_and_whole_numbers_are_numbers(ros: Ros) -> None:
+    node = relay(ros, alpha_r=4, count=2, words=['c'], gains=[3, 4], use_sim_time=True)
+    assert node.parameters_of(ReferenceParameters) == ReferenceParameters(alpha_r=4.0)
+    assert node.parameters_of(OtherParameters) == OtherParameters(
+        count=2, words=('c',), gains=(3.0, 4.0))
+    assert node.get_parameter('alpha_r').value == 4.0
+    node.destroy_node()
+
+
+def test_values_for_all_nodes_may_be_foreign_but_not_ones_for_this_node(
+        processes: Processes, tmp_path: Path) -> None:
+    shared = tmp_path / 'shared.yaml'
+    shared.write_text('/**:\n  ros__parameters:\n    of_another: 1.0\n    alpha_r: 2.0\n')
+    own = tmp_path / 'own.yaml'
+    own.write_text('reference_filter:\n  ros__parameters:\n    alpha_q: 1.0\n')
+    good = processes.node('reference_filter', '--params-file', str(shared), autostart=False)
+    bad = processes.node('reference_filter', '--params-file', str(own))
+    assert bad.wait() == 2
+    assert 'alpha_q' in bad.output and 'alpha_r' in bad.output
+    session = Ros(processes.domain)
+    try:
+        state = session.call(GetState, 'reference_filter/get_state', GetState.Request())
+        assert state.current_state.label == 'unconfigured'
+    finally:
+        session.end()
+    assert good.running, good
+
+
+def test_descriptors_tell_unit_range_and_what_may_change(ros: Ros, started: Relay) -> None:
+    names = ['alpha_r', 'count', 'executor', 'words', 'max_speed']
+    answer = ros.call(DescribeParameters, 'relay/describe_parameters',
+                      DescribeParameters.Request(names=names))
+    alpha_r, count, executor, words, max_speed = answer.descriptors
+    assert '[1/s]' in alpha_r.description and not alpha_r.read_only
+    limits = alpha_r.floating_point_range[0]
+    assert (limits.from_value, limits.to_value) == (0.05, 50.0)
+    assert (count.integer_range[0].from_value, count.integer_range[0].to_value) == (1, 9)
+    assert executor.read_only and 'events, single' in executor.additional_constraints
+    assert 'a, b, c' in words.additional_constraints
+    assert max_speed.read_only
+
+
+def change(ros: Ros, **values: Any) -> tuple[bool, str]:
+    messages: Sequence[ParameterMessage] = [p.to_parameter_msg() for p in overrides(**values)]
+    result = ros.call(SetParametersAtomically, 'relay/set_parameters_atomically',
+                      SetParametersAtomically.Request(parameters=messages)).result
+    return result.successful, result.reason
+
+
+def test_changes_act_together_at_the_next_tick(ros: Ros, started: Relay) -> None:
+    robot = Robot(ros)
+    robot.tick()
+    assert change(ros, alpha_r=9.0, count=4) == (True, '')
+    assert started.parameters_of(ReferenceParameters).alpha_r == 3.0
+    assert change(ros, count=5)[0]
+    robot.tick()
+    robot.tick()
+    assert started.changes == [(2, 9.0, 5)]
+
+
+def test_a_change_that_cannot_be_is_refused_with_the_reason(ros: Ros, started: Relay) -> None:
+    robot = Robot(ros)
+    for values, reason in (({'alpha_r': 'x'}, 'type'), ({'alpha_r': 1e9}, 'alpha_r'),
+                           ({'alpha_r': math.nan}, 'alpha_r'), ({'count': 6}, 'upper = 5.0'),
+                           ({'alpha_r': 7.0}, 'certificate'), ({'gains': [math.nan]}, 'gains'),
+                           ({'max_speed': 0.5}, 'read-only')):
+        accepted, said = change(ros, **values)
+        assert not accepted and reason in said, (values, said)
+    assert change(ros, count=6, upper=6.0)[0]  # together they fit
+    robot.tick()
+    assert started.changes == [(1, 3.0, 6)]
+    assert started.parameters_of(OtherParameters).upper == 6.0
+
+
+def test_a_changeable_name_must_be_a_parameter() -> None:
+    with pytest.raises(ParameterError, match='nothing'):
+        ParameterTable((NodeParameters,), ('nothing',))
+
+
+def test_help_tells_everything_without_starting_ros() -> None:
+    text = help_text(Relay)
+    assert 'Publishes the newest command' in text and 'And more' not in text
+    for topic in (*read_by(Relay.KIND), *published_by(Relay.KIND), *served_by(Relay.KIND)):
+        assert f'{topic.name} ({topic.type_name}' in text
+    table = Relay.parameter_table()
+    for name, field in table.fields.items():
+        assert f'{name}: {field.metadata["description"]}' in text
+    for part in ('[1/s]', 'default 3.0, from 0.05 to 50, changeable', 'default [a, b]',
+                 'from 0 to inf'):
+        assert part in text, part
+
+
+# Lifecycle -------------------------------------------------------------------------------------
+
+
+def test_the_lifecycle_makes_and_destroys_the_topics(ros: Ros) -> None:
+    node = relay(ros, autostart=False)
+    ros.executor.add_node(node)
+    reports: list[DiagnosticArray] = ros.collect(DiagnosticArray, '/diagnostics', 100)
+    ros.spin_until(lambda: node._diagnostics.get_subscription_count() > 0)
+    node.start()
+    topics = ('/reference', '/joint_states', '/cmd_vel')
+
+    def entities() -> list[int]:
+        names = [entity.topic_name for entity in (*node.publishers, *node.subscriptions)]
+        return [names.count(topic) for topic in topics]
+
+    def go(transition: str) -> None:
+        request = ChangeState.Request()
+        request.transition.label = transition
+        assert ros.call(ChangeState, 'relay/change_state', request).success, transition
+
+    expected = {'configure': ('inactive', [1, 1, 1]), 'activate': ('active', [1, 1, 1]),
+                'deactivate': ('inactive', [1, 1, 1]), 'cleanup': ('unconfigured', [0, 0, 0])}
+    assert entities() == [0, 0, 0]
+    for transition in (*expected, *expected, 'configure', 'activate'):
+        go(transition)
+        label, counts = expected[transition]
+        assert entities() == counts
+        assert node.state_label == label == node._state_machine.current_state[1]
+        ros.spin_until(lambda label=label: bool(reports) and {
+            v.key: v.value for v in reports[-1].status[0].values}['state'] == label)
+    go('shutdown')
+    assert node.state_label == 'finalized' and entities() == [0, 0, 0]
+    ros.executor.remove_node(node)
+    node.destroy_node()
+
+
+@pytest.mark.parametrize('failure', [ParameterError('no such gait'), RuntimeError('a bug')])
+def test_a_failed_configuration_says_why_and_can_be_repeated(ros: Ros, failure: Exception) -> None:
+    node = relay(ros)
+    node.fails_with = failure
+    with pytest.raises(type(failure), match=str(failure)):
+        node.start()
+    assert node.state_label == 'unconfigured' == node._state_machine.current_state[1]
+    node.fails_with = None
+    node.start()
+    assert node.active
+    node.destroy_node()
+
+
+def test_nothing_enters_an_inactive_node_but_what_is_latched(ros: Ros, started: Relay) -> None:
+    robot, seen = Robot(ros), []
+    latched = started.listen('inhibition_state', seen.append)
+    started.trigger_deactivate()
+    robot.send(1.0)
+    state = interface('inhibition_state')
+    sender = ros.node.create_publisher(state.type, state.name, state.publisher_qos)
+    sender.publish(DiagnosticArray())
+    ros.spin_until(lambda: bool(seen))
+    assert latched in started.subscriptions
+    assert started.command == (0.0, 0.0, 0.0)
+    started.trigger_activate()
+    robot.send(0.25)
+    assert robot.tick().twist.linear.x == 0.25
+
+
+# Messages and diagnostics ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('bad', [math.nan, math.inf])
+def test_a_bad_message_is_dropped_and_told(ros: Ros, started: Relay, bad: float) -> None:
+    robot = Robot(ros)
+    robot.send(0.5)
+    assert robot.tick().twist.linear.x == 0.5
+    for _ in range(3):
+        robot.send(bad)
+    assert robot.tick().twist.linear.x == 0.5
+    ros.spin_until(lambda: robot.status()[0] == DiagnosticStatus.WARN)
+    assert 'cmd_vel' in robot.status()[1] and 'finite' in robot.status()[1]
+    robot.k += 250  # a second later all is well, but not forgotten
+    robot.tick()
+    robot.k += 250
+    robot.tick()
+    ros.spin_until(lambda: robot.status()[0] == DiagnosticStatus.OK)
+    values = robot.status()[2]
+    assert values['rejected.cmd_vel'] == '3'
+    assert values['state'] == 'active' and values['ticks'] == str(started.health.ticks)
+    assert values['last_stamp_ns'] == str(robot.k * TICK) and values['v_x'] == '0.5'
+
+
+def test_diagnostics_come_once_in_a_second_of_the_robots_clock() -> None:
+    for name in ('one', 'another'):
+        health, due = NodeHealth(name), []
+        for k in range(1000):
+            health.stamp_ns = MIDDLE + k * TICK
+            due += [health.stamp_ns] if health.due() else []
+        assert len(due) == 5  # the first, then one for each of four seconds
+        assert set(np.diff(due[1:])) == {1_000_000_000}
+
+
+def test_of_many_bad_messages_few_are_logged() -> None:
+    health = NodeHealth('node')
+    logged = [k for k in range(1000) if health.reject('imu', 'NaN')]
+    assert logged == list(range(0, 1000, LOG_EVERY))
+
+
+def test_problems_stay_until_they_are_cleared() -> None:
+    health = NodeHealth('node')
+    assert health.set_problem('fell', 'the robot fell', error=True)
+    assert not health.set_problem('fell', 'the robot fell', error=True)
+    for _ in range(2):
+        status = health.status('active', {'x': 0.1}, periodic=True).status[0]
+        assert (status.level, status.message) == (DiagnosticStatus.ERROR, 'the robot fell')
+    assert health.clear_problem('fell') and not health.clear_problem('fell')
+    status = health.status('active', {'x': 0.1}, periodic=True).status[0]
+    assert (status.level, status.message) == (DiagnosticStatus.OK, 'active')
+
+
+def test_an_unexpected_error_is_not_hidden(ros: Ros, started: Relay) -> None:
+    robot = Robot(ros)
+    started.on_command = None  # type: ignore[assignment]
+    started.on_tick = None  # type: ignore[assignment]
+    with pytest.raises(TypeError):
+        robot.tick()
+
+
+# Readiness -------------------------------------------------------------------------------------
+
+
+def test_ready_lists_who_is_missing(ros: Ros) -> None:
+    node = relay(ros, expected_nodes=['reference_filter', 'mujoco_robot', 'canonical_oscillators',
+                                      'leg_transformation'])
+    ros.executor.add_node(node)
+
+    def ready() -> tuple[bool, str]:
+        answer = ros.call(Trigger, 'relay/ready', Trigger.Request())
+        return answer.success, answer.message
+
+    assert ready() == (False, 'relay is unconfigured')
+    node.start()
+    success, said = ready()
+    assert not success
+    for part in ('joint_states is not published by mujoco_robot',
+                 'reference is not read by canonical_oscillators',
+                 'reference is not read by leg_transformation (0 of 4)'):
+        assert part in said
+    assert 'posture_control' not in said and 'bag_recorder' not in said
+    legs = (f'leg_transformation_{i}' for i in range(4))
+    names = ('mujoco_robot', 'canonical_oscillators', *legs)
+    others = [rclpy.node.Node(name, context=ros.context) for name in names]
+    joints, reference = interface('joint_states'), interface('reference')
+    others[0].create_publisher(joints.type, joints.name, joints.publisher_qos)
+    for other in others[1:]:
+        other.create_subscription(reference.type, reference.name, lambda m: None,
+                                  reference.reader_qos)
+    ros.spin_until(lambda: ready() == (True, 'ready'), what=lambda: ready()[1])
+    for other in (node, *others):
+        other.destroy_node()
+
+
+# Executors and processes -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('kind', ['events', 'single'])
+def test_nodes_share_an_executor_until_a_future_is_done(ros: Ros, kind: str) -> None:
+    done, sender = Future(), ros.node.create_publisher(JointState, 'joint_states', 10)
+    node = Relay('relay', context=ros.context)
+    node.start()
+    node.on_tick = lambda stamp_ns, values: done.set_result(stamp_ns)  # type: ignore
+    message = JointState()
+    set_stamp(message.header.stamp, 5 * TICK)
+    timer = ros.node.create_timer(0.01, lambda: sender.publish(message))
+    ros.executor.remove_node(ros.node)
+    spin([ros.node, node], kind, until=done)
+    assert done.result() == 5 * TICK
+    ros.node.destroy_timer(timer)
+    node.destroy_node()
+
+
+def test_without_events_executor_the_single_threaded_one_serves(
+        ros: Ros, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(context: Any) -> Any:
+        raise RuntimeError('not in this build')
+
+    monkeypatch.setattr(rclpy.experimental, 'EventsExecutor', broken)
+    assert isinstance(make_executor('events', ros.context), SingleThreadedExecutor)
+    monkeypatch.delattr(rclpy.experimental, 'EventsExecutor')
+    assert isinstance(make_executor('events', ros.context), SingleThreadedExecutor)
+
+
+@pytest.mark.parametrize(('executor', 'number'), [
+    ('events', signal.SIGINT), ('events', signal.SIGTERM), ('single', signal.SIGINT)])
+def test_a_lone_node_serves_and_ends_cleanly(processes: Processes, ros: Ros, executor: str,
+                                             number: int) -> None:
+    """A real process: alone, fed with NaN, interrupted while it works."""
+    process = processes.node('reference_filter', executor=executor)
+    robot = Robot(ros)
+    state = ros.call(GetState, 'reference_filter/get_state', GetState.Request())
+    assert state.current_state.label == 'active'
+    robot.tick()
+    for bad in (math.nan, math.inf, 1e300):
+        robot.send(bad)
+    assert np.isfinite(robot.tick().twist.linear.x), process
+    ros.spin_until(lambda: 'dropped' in process.output)
+    process.signal(number)
+    assert process.wait() == 0, process
+    assert 'Traceback' not in process.output, process
+
+
+def ended(process: NodeProcess, status: int, *words: str) -> None:
+    assert process.wait() == status, process
+    assert 'Traceback' not in process.output, process
+    for word in words:
+        assert word in process.output, process
+
+
+def test_bad_arguments_end_a_process_with_status_two(processes: Processes) -> None:
+    started = [
+        (processes.node('reference_filter', alpha_r='.nan'), 2, ('alpha_r', 'nan', '[0.05, 50]')),
+        (processes.node('reference_filter', alpha_r='fast'), 2, ('alpha_r', 'fast', 'number')),
+        (processes.node('reference_filter', alpha='3.0'), 2, ("'alpha'", 'alpha_r')),
+        (processes.node('reference_filter', '-p'), 2, ('-p',)),
+        (processes.python('-m', 'dmp_cpg_ros.nodes.reference_filter', '--fast'), 2, ('--fast',)),
+        (processes.python('-m', 'dmp_cpg_ros.nodes.reference_filter', '--help'), 0,
+         ('alpha_r', 'cmd_vel', 'geometry_msgs/msg/Twist')),
+    ]
+    for process, status, words in started:
+        ended(process, status, *words)
+
+
+# Middleware ------------------------------------------------------------------------------------
+
+
+def test_the_middleware_profile_is_named_unless_the_user_has_one(
+        monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in middleware.VARIABLES:
+        monkeypatch.setenv(name, '')
+    middleware.prepare_middleware()
+    paths = {os.environ[name] for name in middleware.VARIABLES}
+    root = ElementTree.parse(paths.pop()).getroot()
+    period = next(part for part in root.iter() if part.tag.endswith('heartbeatPeriod'))
+    assert int(period[0].text or '') == 0 and 0 < int(period[1].text or '') < 100_000_000
+    assert not paths
+    for name in middleware.VARIABLES:
+        monkeypatch.setenv(name, '')
+    monkeypatch.setenv(middleware.VARIABLES[0], 'mine.xml')
+    middleware.prepare_middleware()
+    assert os.environ[middleware.VARIABLES[0]] == 'mine.xml'
+    assert not os.environ[middleware.VARIABLES[1]]
+
+
