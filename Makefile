@@ -9,7 +9,7 @@ BIN := $(VENV)/bin
 
 # Arguments to pass on, e.g. make test PYTEST_ARGS='-k certificate -x'. pytest runs in test/, where
 # Python finds the installed package and not the sources.
-WALK_ARGS ?=
+WALK_ARGS ?= --lock-step
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 

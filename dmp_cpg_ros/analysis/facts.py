@@ -146,11 +146,13 @@ def _timing(metrics: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
 def _certificate(metrics: Mapping[str, Any]) -> list[Fact]:
     entries = metrics['certificate'] or []
     holds = [
-        bool(entry['holds']) for entry in entries if isinstance(entry, dict) and 'holds' in entry
+        bool(entry['holds'])
+        for entry in entries
+        if isinstance(entry, dict) and 'holds' in entry and entry.get('required', True)
     ]
     if not holds:
         return []
-    finding = f'{sum(holds)} of {len(holds)} inequalities'
+    finding = f'{sum(holds)} of {len(holds)} required inequalities'
     return [Fact('The certificate of the running parameters holds', finding, all(holds))]
 
 

@@ -17,8 +17,12 @@ from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.commands.analyze import MARKS, analyze_run
 from dmp_cpg_ros.commands.run_folder import make_run_folder, resolved_parameters, write_parameters
 from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.core.certificate import Certificate, certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.core.gait_network import GaitNetwork
+from dmp_cpg_ros.core.leg_primitive import body_scale
 from dmp_cpg_ros.core.scenario import Scenario
+from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.suite import Suite, load_suite
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -39,6 +43,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.rate is not None:
             overrides['control_rate'] = options.rate
         suite = load_suite(options.parameters, overrides)
+        certificate = _certificate(suite)
+        if not certificate.holds and not overrides.get('allow_uncertified', False):
+            raise ParameterError(f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
+                                 'proposes gains that hold; --set allow_uncertified:=true walks all the same)')
         folder = make_run_folder(options.out)
     except DmpCpgError as error:
         print(f'walk: {error}', file=sys.stderr)
@@ -47,9 +55,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
           f"{'lock-step' if options.lock_step else 'real time'}, "
           f"{'one process' if options.composed else 'a process per node'}, "
           f'{1e9 / suite.tick_ns:g} Hz', flush=True)
+    print(f'certificate: {certificate.explained()}; {certificate.contraction_grade} grade; at rest at most '
+          f'{certificate.time_to_rest:.3f} s after a request', flush=True)
     status = _run(scenario, suite, overrides, folder, options)
     if (folder / 'bag').is_dir():
-        status = max(status, _analyze(scenario, suite, overrides, folder, options))
+        status = max(status, _analyze(scenario, suite, certificate, overrides, folder, options))
     print(f'{folder.name}: {time.monotonic() - begin:.0f} s in all')
     return status
 
@@ -103,14 +113,15 @@ KINDS = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inh
 """Kinds of nodes that a run has besides its recorder."""
 
 
-def _analyze(scenario: Scenario, suite: Suite, overrides: dict[str, Any], folder: Path,
+def _analyze(scenario: Scenario, suite: Suite, certificate: Certificate, overrides: dict[str, Any], folder: Path,
              options: argparse.Namespace) -> int:
     """Write the run's folder and print what it says; returns the exit status."""
     try:
         results = analyze_run(
             folder, robot_file=suite.robot_file, parameters=resolved_parameters(suite.file, overrides),
             seeds={'robot': suite.robot.seed}, lock_step=options.lock_step, report=not options.no_report,
-            scenario=scenario.name, composed=options.composed)
+            scenario=scenario.name, composed=options.composed,
+            certificate=[entry.as_mapping() for entry in certificate.inequalities])
     except DmpCpgError as error:
         print(f'walk: cannot analyze the recording: {error}', file=sys.stderr)
         return FAILED
@@ -119,6 +130,13 @@ def _analyze(scenario: Scenario, suite: Suite, overrides: dict[str, Any], folder
     if results.report is not None:
         print(f'report: {os.path.relpath(results.report)}')
     return FAILED if results.metrics['robot']['fell'] else OK
+
+
+def _certificate(suite: Suite) -> Certificate:
+    """Certificate of the parameters that the nodes will run with."""
+    p = suite.parameters
+    network = GaitNetwork(p.canonical, suite.gait, body_scale(load_description(suite.robot_file)))
+    return certify(network, p.inhibition, p.reference, p.leg, p.posture, suite.tick_ns * 1e-9)
 
 
 def _say(time_s: float, text: str) -> None:

@@ -101,12 +101,24 @@ class RobotParameters(Parameters):
     viewer: bool = parameter(False, 'whether to open a window with the robot')
 
 
+@dataclass(frozen=True)
+class CertificateParameters(Parameters):
+    """What happens without a certificate."""
+
+    allow_uncertified: bool = parameter(False, 'whether the gait may start, and parameters may change, although the '
+                                               'certificate fails')
+
+
+CERTIFIED: tuple[type[Parameters], ...] = (
+    CanonicalParameters, InhibitionParameters, ReferenceParameters, LegParameters, PostureParameters, TickParameters,
+    GaitParameters, RobotFileParameters)
+"""Parameter sets that the certificate is computed from; nodes that compute it declare all of them."""
+
 NODE_PARAMETERS: dict[str, tuple[type[Parameters], ...]] = {
     'reference_filter': (ReferenceParameters, CommandParameters),
-    'canonical_oscillators': (CanonicalParameters, InhibitionParameters, GaitParameters, RobotFileParameters),
+    'canonical_oscillators': (*CERTIFIED, CertificateParameters),
     'leg_transformation': (LegChoice, LegParameters, GaitParameters, RobotFileParameters),
-    'inhibition': (InhibitionParameters, CanonicalParameters, ReferenceParameters, LegParameters, CommandParameters,
-                   TickParameters, GaitParameters, RobotFileParameters),
+    'inhibition': (*CERTIFIED, CommandParameters),
     'posture_control': (PostureParameters, GaitParameters, RobotFileParameters),
     'mujoco_robot': (RobotParameters, TickParameters, RobotFileParameters),
 }

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
 from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
+from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CertificateParameters
 from dmp_cpg_ros.core.walking_loop import initial_canonical_state
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, read_reference
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import network_of
+from dmp_cpg_ros.nodes.gait_setup import certificate_of, certificate_words, network_of
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionMessage, read_inhibition_state
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns
@@ -33,6 +34,9 @@ class CanonicalOscillators(ManagedNode):
         """Build the network at its initial state and its topics."""
         inhibition = self.parameters_of(InhibitionParameters)
         self._network = network_of(self)
+        self._certificate = certificate_of(self, self._network)
+        if not self._certificate.holds:
+            self._without_certificate(self._certificate.explained())
         self._x, self._last_ns = initial_canonical_state(self._network, inhibition), -1
         self._inhibition = initial_inhibition(inhibition)
         self._writer, self._publisher = CanonicalStateWriter(), self.publisher('canonical_state')
@@ -54,9 +58,17 @@ class CanonicalOscillators(ManagedNode):
         x_dot = self._network.rate(self._x, r, self._inhibition)
         self._publisher.publish(self._writer.fill(stamp_ns, self._x, x_dot))
 
+    def _without_certificate(self, reason: str) -> None:
+        """Refuse to walk without a certificate, or say loudly that nothing is guaranteed."""
+        if not self.parameters_of(CertificateParameters).allow_uncertified:
+            raise ParameterError(f'the gait is not certified to stop: {reason} (allow_uncertified:=true walks all the same; '
+                                 'certify --suggest proposes gains that hold)')
+        self.warn('certificate', f'walking WITHOUT a certificate: {reason}', error=True)
+
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Phase error of the legs [rad]."""
-        return {'phase_error_rad': float(np.abs(self._network.phase_errors(self._x)).max())}
+        return {'phase_error_rad': float(np.abs(self._network.phase_errors(self._x)).max()),
+                'certificate': certificate_words(self._certificate)}
 
 
 def inhibition_from(message: InhibitionMessage) -> Inhibition:

@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters, TickParameters
 from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference, read_twist
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import network_of
+from dmp_cpg_ros.nodes.gait_setup import certificate_of, certificate_words, network_of
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
@@ -38,7 +38,9 @@ class InhibitionNode(ManagedNode):
     def configure(self) -> None:
         """Build the supervisor and its topics and service."""
         parameters, reference = self.parameters_of(InhibitionParameters), self.parameters_of(ReferenceParameters)
-        self._supervisor = GaitSupervisor(parameters, network_of(self),
+        network = network_of(self)
+        self._certificate = certificate_of(self, network)
+        self._supervisor = GaitSupervisor(parameters, network,
                                           self.parameters_of(LegParameters).activity_rate)
         self._gate, self._reference = CommandGate(reference), ReferenceSystem(reference)
         self._state = self._supervisor.initial_state()
@@ -108,7 +110,7 @@ class InhibitionNode(ManagedNode):
             return response
         self._predict(self._acting)
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
-        response.message = f'{verb} {when}'
+        response.message = f'{verb} {when}, at most {self._bound:.3f} s; {certificate_words(self._certificate)}'
         return response
 
     def _predict(self, published: Inhibition) -> None:
@@ -116,13 +118,16 @@ class InhibitionNode(ManagedNode):
         tick_s = self.parameters_of(TickParameters).tick_ns * 1e-9
         self._predicted = predict(self._supervisor, self._reference, self._state, published, self._x, self._r,
                                   self._gate.at(self._state.time_ns), tick_s)
+        certificate = self._certificate
+        self._bound = certificate.time_to_rest if self._state.requested else certificate.time_to_walking
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()
         values: dict[str, Any] = {'requested': state.requested, 'armed': state.armed, 'automatic': state.automatic}
         values.update((f'gain_{leg}', gain) for leg, gain in zip(LEGS, acting.gains.tolist(), strict=True))
         values.update(region_radius=acting.region_radius, request_stamp=state.request_ns * 1e-9,
-                      predicted_s=self._predicted, bound_s=self._bound, measured_s=state.measured_s)
+                      predicted_s=self._predicted, bound_s=self._bound, measured_s=state.measured_s,
+                      grade=certificate_words(self._certificate))
         self._publisher.publish(self._writer.fill(state.time_ns, state.word, values))
 
 
