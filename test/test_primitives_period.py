@@ -12,7 +12,12 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.demonstrations import minimum_jerk, walking_joints
-from dmp_cpg_ros.core.primitives.period import find_period, fourier_series, phase_lead
+from dmp_cpg_ros.core.primitives.period import (
+    find_period,
+    fourier_series,
+    phase_lead,
+    spread_between_cycles,
+)
 
 SHAPES = {
     'sine': lambda u: np.sin(u),
@@ -82,3 +87,13 @@ def test_fourier_series_needs_no_whole_cycles():
     values = 2.0 + 3.0 * np.cos(4.0 * times) - np.sin(8.0 * times)
     series = fourier_series(times, values[:, None], 4.0, 3)[:, 0]
     np.testing.assert_allclose(series, [2.0, 3.0, 1j, 0.0], atol=1e-8)
+
+
+def test_spread_is_that_of_the_cycles_and_nothing_of_their_shape():
+    times = np.linspace(0.0, 4.0, 4001)
+    sizes = np.array([1.0, 1.2, 0.8, 1.0, 1.0])[(times // 1.0).astype(int)]
+    both = np.stack([np.sin(2.0 * np.pi * times), sizes * np.sin(2.0 * np.pi * times)], axis=1)
+    spread = spread_between_cycles(Demonstration(times, both), 1.0)
+    np.testing.assert_allclose(spread, [0.0, 0.2], atol=1e-3)
+    with pytest.raises(DataError, match='fewer than two'):
+        spread_between_cycles(Demonstration(times, both), 3.0)

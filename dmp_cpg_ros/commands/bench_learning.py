@@ -4,7 +4,8 @@
 
 Both get positions only and the same number of bases; each reproduces with its own integrator at
 the demonstration's sampling interval. Where that package is not installed, its columns stay empty;
-it has no rhythmic primitive.
+it has no rhythmic primitive, so that of each rhythm one cycle is learned as a discrete movement
+too.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.core.errors import DmpCpgError
@@ -32,6 +34,7 @@ from dmp_cpg_ros.core.primitives.demonstrations import (
     walking_joints,
 )
 from dmp_cpg_ros.core.primitives.learning import ranges
+from dmp_cpg_ros.core.primitives.period import find_period, spread_between_cycles
 
 _REPEATS = 5
 
@@ -42,13 +45,13 @@ class LearningResult:
 
     Attributes
     ----------
-    error : float
-        Largest reproduction error over degrees of freedom and time, as a fraction of the range.
+    errors : ndarray (n,)
+        Largest reproduction error over time, as a fraction of each degree of freedom's range.
     seconds : float
         Shortest fit of several [s].
     """
 
-    error: float
+    errors: NDArray[np.float64]
     seconds: float
 
 
@@ -62,6 +65,30 @@ def demonstrations() -> dict[str, tuple[str, Demonstration]]:
         name: (kind, Demonstration(d.times, d.positions, names=d.names))
         for name, (kind, d) in made.items()
     }
+
+
+def single_cycles(
+    rows: dict[str, tuple[str, Demonstration]],
+) -> dict[str, tuple[str, Demonstration]]:
+    """First cycle of every rhythm as a discrete movement, which discrete libraries can learn.
+
+    Parameters
+    ----------
+    rows : dict
+        Name → kind and demonstration.
+
+    Returns
+    -------
+    dict
+        The same of the single cycles.
+    """
+    cycles = {}
+    for name, (kind, whole) in rows.items():
+        if kind == 'rhythmic':
+            inside = whole.times - whole.times[0] <= find_period(whole)
+            cycle = Demonstration(whole.times[inside], whole.positions[inside])
+            cycles[f'one cycle of {name}'] = ('discrete', cycle)
+    return cycles
 
 
 def learn_ours(kind: str, demonstration: Demonstration, bases: int) -> LearningResult:
@@ -84,7 +111,7 @@ def learn_ours(kind: str, demonstration: Demonstration, bases: int) -> LearningR
     else:
         cycle, seconds = _fastest(lambda: learning_rhythmic.learn_rhythmic(demonstration, bases))
         errors = learning_rhythmic.reproduction_errors(cycle, demonstration)
-    return LearningResult(float(errors.max()), seconds)
+    return LearningResult(errors, seconds)
 
 
 def learn_theirs(demonstration: Demonstration, bases: int) -> LearningResult | None:
@@ -115,11 +142,14 @@ def learn_theirs(demonstration: Demonstration, bases: int) -> LearningResult | N
     made_at, made = dmp.open_loop()
     columns = [np.interp(times, made_at, column) for column in made.T]
     errors = np.abs(np.stack(columns, axis=1) - demonstration.positions).max(axis=0)
-    return LearningResult(float((errors / ranges([demonstration])).max()), seconds)
+    return LearningResult(errors / ranges([demonstration]), seconds)
 
 
 def table(rows: dict[str, tuple[str, Demonstration]], bases: int) -> str:
     """Markdown table of both libraries.
+
+    Errors are of the median and of the worst degree of freedom. For rhythms there is also the
+    departure of the recorded cycles from their mean, which no periodic movement can reproduce.
 
     Parameters
     ----------
@@ -132,16 +162,20 @@ def table(rows: dict[str, tuple[str, Demonstration]], bases: int) -> str:
     str
     """
     lines = [
-        '| demonstration | samples | degrees of freedom | error | fit | '
+        '| demonstration | samples | degrees of freedom | differs between cycles | error | fit | '
         'error, movement_primitives | fit, movement_primitives |',
-        '|---|---|---|---|---|---|---|',
+        '|---|---|---|---|---|---|---|---|',
     ]
     for name, (kind, demonstration) in rows.items():
+        differs = '–'
+        if kind == 'rhythmic':
+            spread = spread_between_cycles(demonstration, find_period(demonstration))
+            differs = _percent(spread / ranges([demonstration]))
         ours = learn_ours(kind, demonstration, bases)
         theirs = learn_theirs(demonstration, bases) if kind == 'discrete' else None
         lines.append(
-            f'| {name} | {len(demonstration.times)} | {demonstration.dofs} | {_cells(ours)} | '
-            f'{_cells(theirs)} |'
+            f'| {name} | {len(demonstration.times)} | {demonstration.dofs} | {differs} | '
+            f'{_cells(ours)} | {_cells(theirs)} |'
         )
     return '\n'.join(lines)
 
@@ -159,6 +193,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.bag is not None:
             walk = read_demonstration(options.bag, start=options.start, end=options.end)
             rows['recorded walk'] = ('rhythmic', Demonstration(walk.times, walk.positions))
+        rows.update(single_cycles(rows))
         print(table(rows, options.bases))
     except DmpCpgError as error:
         print(f'bench_learning: {error}', file=sys.stderr)
@@ -179,7 +214,12 @@ def _fastest(fit: Callable[[], Any]) -> tuple[Any, float]:
 def _cells(result: LearningResult | None) -> str:
     if result is None:
         return '– | –'
-    return f'{100.0 * result.error:.3g} % | {1e3 * result.seconds:.2g} ms'
+    return f'{_percent(result.errors)} | {1e3 * result.seconds:.2g} ms'
+
+
+def _percent(values: NDArray[np.float64]) -> str:
+    """Median and worst of some fractions."""
+    return f'{100.0 * np.median(values):.2g} / {100.0 * np.max(values):.2g} %'
 
 
 if __name__ == '__main__':

@@ -17,7 +17,8 @@ from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.primitives import learning_discrete, learning_rhythmic
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
-from dmp_cpg_ros.core.primitives.learning import METHODS, FitOptions
+from dmp_cpg_ros.core.primitives.learning import METHODS, FitOptions, ranges
+from dmp_cpg_ros.core.primitives.period import spread_between_cycles
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.transformation import FORMS
 from dmp_cpg_ros.primitive_files import save_primitive
@@ -52,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except DmpCpgError as error:
         print(f'learn: {error}', file=sys.stderr)
         return BAD_INPUT
-    _report(primitive, errors, seconds, options.out)
+    _report(primitive, errors, _irregularity(demonstrations, primitive), seconds, options.out)
     return 0
 
 
@@ -78,9 +79,22 @@ def _learn(
     return cycle, learning_rhythmic.reproduction_errors(cycle, demonstrations, options.period)
 
 
+def _irregularity(
+    demonstrations: list[Demonstration], primitive: DiscretePrimitive | RhythmicPrimitive
+) -> np.ndarray | None:
+    """Departure of cycles from their mean, of the range; None without one recording of two."""
+    first = demonstrations[0]
+    if isinstance(primitive, DiscretePrimitive) or len(demonstrations) > 1:
+        return None
+    if first.duration < 2.0 * primitive.period:
+        return None
+    return spread_between_cycles(first, primitive.period) / ranges([first])
+
+
 def _report(
     primitive: DiscretePrimitive | RhythmicPrimitive,
     errors: np.ndarray,
+    irregular: np.ndarray | None,
     seconds: float,
     out: Path,
 ) -> None:
@@ -92,6 +106,9 @@ def _report(
     listed = ', '.join(f'{name} {100.0 * e:.3g} %' for name, e in zip(names, errors, strict=True))
     print(f'{kind} primitive, {primitive.bases.count} bases, {time}')
     print(f'largest reproduction error in % of the range: {listed}')
+    if irregular is not None:
+        listed = ', '.join(f'{n} {100.0 * e:.3g} %' for n, e in zip(names, irregular, strict=True))
+        print(f'the cycles themselves differ from their mean by up to: {listed}')
     print(f'learned and checked in {seconds:.3g} s')
     print(f'wrote {out}')
 

@@ -108,6 +108,38 @@ def fourier_series(times: ArrayLike, values: ArrayLike, omega: float, harmonics:
     return coefficients
 
 
+def spread_between_cycles(demonstration: Demonstration, period: float) -> Array:
+    """Largest departure of a cycle from the mean cycle; no periodic movement comes much closer.
+
+    Parameters
+    ----------
+    demonstration : Demonstration
+        At least two cycles.
+    period : float
+        [s]
+
+    Returns
+    -------
+    ndarray (n,)
+        In the unit of the positions.
+
+    Raises
+    ------
+    DataError
+        If there are fewer than two cycles.
+    """
+    since = demonstration.times - demonstration.times[0]
+    count = int(since[-1] / period + 1e-9)
+    if count < 2:
+        raise DataError(f'{since[-1]:g} s hold fewer than two cycles of {period:g} s')
+    fraction = np.linspace(0.0, 1.0, 200, endpoint=False)
+    at = (np.arange(count)[:, None] + fraction).ravel() * period
+    cycles = np.stack([np.interp(at, since, column) for column in demonstration.positions.T])
+    cycles = cycles.reshape(demonstration.dofs, count, -1)
+    departure = np.abs(cycles - cycles.mean(axis=1, keepdims=True))
+    return np.asarray(departure.max(axis=(1, 2)))
+
+
 def phase_lead(reference: Array, other: Array) -> float:
     """Phase by which one cycle leads another, from the maximum of their correlation.
 
