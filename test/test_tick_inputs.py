@@ -44,8 +44,11 @@ def interleaving(seed: int, names: tuple[str, ...] = INPUTS, ticks: int = 12,
 @given(SEEDS)
 def test_in_lock_step_every_tick_has_exactly_its_messages(seed: int) -> None:
     inputs, fired = recorder(lock_step=True)
-    for name, tick in interleaving(seed):
-        inputs.add(name, tick * TICK, (name, tick))
+    arrivals = interleaving(seed)
+    for place, (name, tick) in enumerate(arrivals):
+        first = arrivals.index((name, tick)) == place
+        inputs.add(name, tick * TICK, (name, tick) if first else 'repeated')
+    assert inputs.ignored == len(arrivals) - len(set(arrivals))
     assert [stamp for stamp, _ in fired] == [tick * TICK for tick in range(12)]
     for stamp, values in fired:
         assert values == {name: (name, stamp // TICK) for name in INPUTS}
