@@ -92,7 +92,9 @@ def load_gait(name: str, file: str | Path = 'gaits.yaml') -> Gait:
     return gaits[name]
 
 
-def load_suite(file: str | Path | None = None, overrides: Mapping[str, Any] | None = None) -> Suite:
+def load_suite(
+    file: str | Path | None = None, overrides: Mapping[str, Any] | None = None
+) -> Suite:
     """Read a parameter file.
 
     Parameters
@@ -109,28 +111,42 @@ def load_suite(file: str | Path | None = None, overrides: Mapping[str, Any] | No
     Raises
     ------
     DmpCpgError
-        If the file is not there, or a name or value in it is wrong; the text says where and what is valid.
+        If the file is not there, or a name or value in it is wrong; the text says where and what
+        is valid.
     """
     path, overrides = find_config(file or DEFAULT_FILE), dict(overrides or {})
     for name in overrides:
         if name not in SUITE_NAMES:
-            raise ParameterError(f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}")
+            raise ParameterError(
+                f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}"
+            )
     sets = {kind: node_sets(path, kind, overrides) for kind in NODE_PARAMETERS}
     canonical, robot = sets['canonical_oscillators'], sets['mujoco_robot']
     parameters = SuiteParameters(
-        sets['reference_filter'][ReferenceParameters], canonical[CanonicalParameters],
-        sets['inhibition'][InhibitionParameters], sets['leg_transformation'][LegParameters],
-        sets['posture_control'][PostureParameters])
+        sets['reference_filter'][ReferenceParameters],
+        canonical[CanonicalParameters],
+        sets['inhibition'][InhibitionParameters],
+        sets['leg_transformation'][LegParameters],
+        sets['posture_control'][PostureParameters],
+    )
     gait = canonical[GaitParameters]
-    return Suite(parameters, load_gait(gait.gait, gait.gaits_file), robot[RobotParameters],
-                 robot[TickParameters].tick_ns, find_config(robot[RobotFileParameters].robot), path)
+    return Suite(
+        parameters,
+        load_gait(gait.gait, gait.gaits_file),
+        robot[RobotParameters],
+        robot[TickParameters].tick_ns,
+        find_config(robot[RobotFileParameters].robot),
+        path,
+    )
 
 
-def node_sets(path: Path, kind: str, overrides: Mapping[str, Any] | None = None) -> dict[type[Any], Any]:
+def node_sets(
+    path: Path, kind: str, overrides: Mapping[str, Any] | None = None
+) -> dict[type[Any], Any]:
     """Parameter sets of one kind of node from a parameter file.
 
-    Values for other nodes under ``/**`` are left aside; names that no node has are errors. Of the four legs the
-    section of fl is read.
+    Values for other nodes under ``/**`` are left aside; names that no node has are errors. Of the
+    four legs the section of fl is read.
 
     Parameters
     ----------
@@ -154,8 +170,10 @@ def node_sets(path: Path, kind: str, overrides: Mapping[str, Any] | None = None)
     given = {**node_parameters(path, node), **(overrides or {})}
     for name in given:
         if name not in SUITE_NAMES and name not in NODE_NAMES:
-            raise ParameterError(f"'{path}', {node}: there is no parameter '{name}'; valid are "
-                                 f"{', '.join(sorted(SUITE_NAMES))}")
+            raise ParameterError(
+                f"'{path}', {node}: there is no parameter '{name}'; valid are "
+                f'{", ".join(sorted(SUITE_NAMES))}'
+            )
     sets: dict[type[Any], Any] = {}
     for cls in NODE_PARAMETERS[kind]:
         names = {field.name for field in dataclasses.fields(cls)}
@@ -166,10 +184,23 @@ def node_sets(path: Path, kind: str, overrides: Mapping[str, Any] | None = None)
     return sets
 
 
-SUITE_NAMES = frozenset(field.name for sets in NODE_PARAMETERS.values() for cls in sets
-                        for field in dataclasses.fields(cls))
+SUITE_NAMES = frozenset(
+    field.name
+    for sets in NODE_PARAMETERS.values()
+    for cls in sets
+    for field in dataclasses.fields(cls)
+)
 """Names of all parameters of all parts."""
 
-NODE_NAMES = ('autostart', 'executor', 'expected_nodes', 'lock_step', 'use_sim_time', 'storage', 'output', 'topics',
-              'flush_period')
+NODE_NAMES = (
+    'autostart',
+    'executor',
+    'expected_nodes',
+    'lock_step',
+    'use_sim_time',
+    'storage',
+    'output',
+    'topics',
+    'flush_period',
+)
 """Parameters that nodes have as nodes, not for their part of the core."""

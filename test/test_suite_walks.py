@@ -17,16 +17,19 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from ros_processes import NodeProcess, Processes, processes, ros_domain  # noqa: E402, F401
+import ros_processes
+from ros_processes import NodeProcess, Processes
 
-from dmp_cpg_ros.analysis.digests import payload_digests  # noqa: E402
-from dmp_cpg_ros.analysis.loading import load_recording  # noqa: E402
-from dmp_cpg_ros.commands.walk import load_scenario  # noqa: E402
-from dmp_cpg_ros.core.robot_state import RobotState  # noqa: E402
-from dmp_cpg_ros.core.scenario import play  # noqa: E402
-from dmp_cpg_ros.core.walking_loop import WalkingLoop  # noqa: E402
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot  # noqa: E402
-from dmp_cpg_ros.suite import load_suite  # noqa: E402
+from dmp_cpg_ros.analysis.digests import payload_digests
+from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.commands.walk import load_scenario
+from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.scenario import play
+from dmp_cpg_ros.core.walking_loop import WalkingLoop
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.suite import load_suite
+
+processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
 SCENARIO = """\
 name: short
@@ -50,8 +53,15 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def start_walk(processes: Processes, scenario: Path, out: Path, *options: str) -> NodeProcess:
-    return processes.python('-m', 'dmp_cpg_ros.commands.walk', str(scenario), '--no-report',
-                            '--out', str(out), *options)
+    return processes.python(
+        '-m',
+        'dmp_cpg_ros.commands.walk',
+        str(scenario),
+        '--no-report',
+        '--out',
+        str(out),
+        *options,
+    )
 
 
 def walked(processes: Processes, scenario: Path, out: Path, *options: str) -> Path:
@@ -82,11 +92,14 @@ def plain_run(scenario_file: Path) -> tuple[list[RobotState], list[Any]]:
 
 
 def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
-        processes: Processes, scenario: Path, tmp_path: Path) -> None:
+    processes: Processes, scenario: Path, tmp_path: Path
+) -> None:
     first = walked(processes, scenario, tmp_path / 'first', '--lock-step')
     stop = multiprocessing.Event()
-    burners = [multiprocessing.Process(target=load_the_machine, args=(stop,), daemon=True)
-               for _ in range(os.cpu_count() or 2)]
+    burners = [
+        multiprocessing.Process(target=load_the_machine, args=(stop,), daemon=True)
+        for _ in range(os.cpu_count() or 2)
+    ]
     for burner in burners:
         burner.start()
     try:
@@ -95,8 +108,11 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
         stop.set()
     composed = walked(processes, scenario, tmp_path / 'composed', '--lock-step', '--composed')
     digests = payload_digests(first / 'bag')
-    assert {'joint_states', 'canonical_state', *(f'joint_targets/{leg}' for leg in (
-        'fl', 'fr', 'rl', 'rr'))} <= set(digests)
+    assert {
+        'joint_states',
+        'canonical_state',
+        *(f'joint_targets/{leg}' for leg in ('fl', 'fr', 'rl', 'rr')),
+    } <= set(digests)
     assert payload_digests(loaded / 'bag') == digests
     assert payload_digests(composed / 'bag') == digests
     manifest = json.loads((first / 'manifest.json').read_text(encoding='utf-8'))
@@ -104,30 +120,43 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
 
     recording, (states, ticks) = load_recording(first / 'bag'), plain_run(scenario)
     assert len(recording.joints.time) == len(ticks) == 1500
-    np.testing.assert_array_equal(recording.joints.position,
-                                  [state.joint_position for state in states[:-1]])
-    np.testing.assert_array_equal(recording.joints.velocity,
-                                  [state.joint_velocity for state in states[:-1]])
+    np.testing.assert_array_equal(
+        recording.joints.position, [state.joint_position for state in states[:-1]]
+    )
+    np.testing.assert_array_equal(
+        recording.joints.velocity, [state.joint_velocity for state in states[:-1]]
+    )
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
     np.testing.assert_array_equal(recording.canonical.x_dot, [tick.x_dot for tick in ticks])
-    np.testing.assert_array_equal(recording.targets.effort, [tick.targets.effort for tick in ticks])
+    np.testing.assert_array_equal(
+        recording.targets.effort, [tick.targets.effort for tick in ticks]
+    )
 
     metrics = json.loads((first / 'metrics.json').read_text(encoding='utf-8'))
     assert metrics['robot']['fell'] is False
     assert metrics['stop']['measured_s'] == pytest.approx(metrics['stop']['predicted_s'], abs=1e-6)
 
 
-def test_real_time_run_stops_and_starts(processes: Processes, scenario: Path, tmp_path: Path) -> None:
+def test_real_time_run_stops_and_starts(
+    processes: Processes, scenario: Path, tmp_path: Path
+) -> None:
     run = walked(processes, scenario, tmp_path / 'run', '--composed')
     metrics = json.loads((run / 'metrics.json').read_text(encoding='utf-8'))
     assert metrics['robot']['fell'] is False
     assert metrics['stop']['completed'] == 1
-    for name in ('rate_hz', 'real_time_factor', 'latency_ms_p50', 'latency_ms_p99', 'deadline_misses'):
+    for name in (
+        'rate_hz',
+        'real_time_factor',
+        'latency_ms_p50',
+        'latency_ms_p99',
+        'deadline_misses',
+    ):
         assert metrics['timing'][name] is not None
 
 
 def test_a_dead_node_ends_the_run_and_is_named(
-        processes: Processes, scenario: Path, tmp_path: Path) -> None:
+    processes: Processes, scenario: Path, tmp_path: Path
+) -> None:
     process = start_walk(processes, scenario, tmp_path / 'run', '--lock-step')
     process.wait_for_output('walking', RUN_S)
     victim = find_child(process.pid, 'leg:fr')
@@ -138,7 +167,8 @@ def test_a_dead_node_ends_the_run_and_is_named(
 
 
 def test_ctrl_c_ends_the_run_with_a_readable_bag(
-        processes: Processes, scenario: Path, tmp_path: Path) -> None:
+    processes: Processes, scenario: Path, tmp_path: Path
+) -> None:
     process = start_walk(processes, scenario, tmp_path / 'run', '--lock-step')
     process.wait_for_output('walking', RUN_S)
     process.interrupt()
@@ -147,18 +177,23 @@ def test_ctrl_c_ends_the_run_with_a_readable_bag(
     assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
 
 
-@pytest.mark.parametrize(('arguments', 'text'), [
-    (('no_such.yaml',), 'no_such.yaml'),
-    (('start_stop.yaml', '--set', 'gait:=gallop'), 'valid are amble'),
-    (('start_stop.yaml', '--set', 'rho:=.nan'), 'rho'),
-    (('start_stop.yaml', '--set', 'cadence:=1'), "no parameter 'cadence'"),
-    (('start_stop.yaml', '--rate', '333'), 'whole microseconds'),
-    (('start_stop.yaml', '--robot', 'no_robot.yaml'), 'no_robot.yaml'),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'text'),
+    [
+        (('no_such.yaml',), 'no_such.yaml'),
+        (('start_stop.yaml', '--set', 'gait:=gallop'), 'valid are amble'),
+        (('start_stop.yaml', '--set', 'rho:=.nan'), 'rho'),
+        (('start_stop.yaml', '--set', 'cadence:=1'), "no parameter 'cadence'"),
+        (('start_stop.yaml', '--rate', '333'), 'whole microseconds'),
+        (('start_stop.yaml', '--robot', 'no_robot.yaml'), 'no_robot.yaml'),
+    ],
+)
 def test_bad_input_is_refused_with_what_is_valid(
-        processes: Processes, tmp_path: Path, arguments: tuple[str, ...], text: str) -> None:
-    process = processes.python('-m', 'dmp_cpg_ros.commands.walk', *arguments,
-                               '--out', str(tmp_path / 'run'))
+    processes: Processes, tmp_path: Path, arguments: tuple[str, ...], text: str
+) -> None:
+    process = processes.python(
+        '-m', 'dmp_cpg_ros.commands.walk', *arguments, '--out', str(tmp_path / 'run')
+    )
     assert process.wait() == 2
     assert text in process.output
 

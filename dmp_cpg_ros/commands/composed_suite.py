@@ -24,9 +24,18 @@ from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
 from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
 
-CLASSES: dict[str, type[ManagedNode]] = {cls.KIND: cls for cls in (
-    ReferenceFilter, CanonicalOscillators, InhibitionNode, PostureControl, LegTransformation, MujocoRobotNode,
-    BagRecorder)}
+CLASSES: dict[str, type[ManagedNode]] = {
+    cls.KIND: cls
+    for cls in (
+        ReferenceFilter,
+        CanonicalOscillators,
+        InhibitionNode,
+        PostureControl,
+        LegTransformation,
+        MujocoRobotNode,
+        BagRecorder,
+    )
+}
 """Class of every kind of node."""
 
 

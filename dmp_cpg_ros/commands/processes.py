@@ -34,9 +34,13 @@ class Ended:
 
     def __str__(self) -> str:
         """Say what happened, with the last line of the output."""
-        how = f'was ended by signal {-self.status}' if self.status < 0 else f'ended with status {self.status}'
+        how = (
+            f'was ended by signal {-self.status}'
+            if self.status < 0
+            else f'ended with status {self.status}'
+        )
         lines = self.log.read_text(encoding='utf-8', errors='replace').strip().splitlines()
-        return f"{self.name} {how}{': ' + lines[-1] if lines else ''}"
+        return f'{self.name} {how}{": " + lines[-1] if lines else ""}'
 
 
 class ProcessGroup:
@@ -55,18 +59,28 @@ class ProcessGroup:
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
     def start(self, name: str, module: str, arguments: Sequence[str]) -> None:
-        """Run ``python -m module arguments`` in a session of its own, so that Ctrl-C reaches this process only."""
+        """Run ``python -m module arguments`` in a session of its own, so that Ctrl-C reaches
+        this process only.
+        """
         # Matrices of a few rows: threads of the algebra library would only contend for the cores.
         environment = {'OPENBLAS_NUM_THREADS': '1', **os.environ, 'PYTHONUNBUFFERED': '1'}
         with (self._logs / f'{name}.log').open('wb') as log:
             self._processes[name] = subprocess.Popen(
-                [sys.executable, '-m', module, *arguments], stdin=subprocess.DEVNULL, stdout=log,
-                stderr=subprocess.STDOUT, start_new_session=True, env=environment)
+                [sys.executable, '-m', module, *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                env=environment,
+            )
 
     def ended(self) -> list[Ended]:
         """Processes that have ended."""
-        return [Ended(name, process.returncode, self._logs / f'{name}.log')
-                for name, process in self._processes.items() if process.poll() is not None]
+        return [
+            Ended(name, process.returncode, self._logs / f'{name}.log')
+            for name, process in self._processes.items()
+            if process.poll() is not None
+        ]
 
     def stop(self, patience_s: float = 15.0) -> list[str]:
         """End all processes: interrupt, and after a time kill.
@@ -76,7 +90,9 @@ class ProcessGroup:
         list of str
             Names of those that had to be killed.
         """
-        running = {name: process for name, process in self._processes.items() if process.poll() is None}
+        running = {
+            name: process for name, process in self._processes.items() if process.poll() is None
+        }
         for process in running.values():
             process.send_signal(signal.SIGINT)
         deadline, killed = time.monotonic() + patience_s, []

@@ -23,7 +23,8 @@ def make_run_folder(out: Path | None) -> Path:
     Parameters
     ----------
     out : Path, optional
-        The folder itself; must not exist or be empty. Without, a new one in ``runs`` that ``runs/latest`` points at.
+        The folder itself; must not exist or be empty. Without, a new one in ``runs`` that
+        ``runs/latest`` points at.
 
     Raises
     ------
@@ -33,7 +34,9 @@ def make_run_folder(out: Path | None) -> Path:
     try:
         if out is not None:
             if out.exists() and (not out.is_dir() or any(out.iterdir())):
-                raise DataError(f"'{out}' exists and is not an empty folder; name another with --out")
+                raise DataError(
+                    f"'{out}' exists and is not an empty folder; name another with --out"
+                )
             out.mkdir(parents=True, exist_ok=True)
             return out.resolve()
         runs = Path('runs')
@@ -69,24 +72,32 @@ def resolved_parameters(file: Path, overrides: dict[str, Any]) -> dict[str, dict
     for node in SUITE_NODES:
         values: dict[str, Any] = {}
         for part in reversed(list(node_sets(file, node.kind, overrides).values())):
-            values.update({name: list(value) if isinstance(value, tuple) else value
-                           for name, value in dataclasses.asdict(part).items()})
+            values.update(
+                {
+                    name: list(value) if isinstance(value, tuple) else value
+                    for name, value in dataclasses.asdict(part).items()
+                }
+            )
         if node.kind == 'leg_transformation':
-            values['leg'] = node.name[-len(LEGS[0]):]
-        values.update({name: overrides[name] for name in ('lock_step', 'executor') if name in overrides})
+            values['leg'] = node.name[-len(LEGS[0]) :]
+        values.update(
+            {name: overrides[name] for name in ('lock_step', 'executor') if name in overrides}
+        )
         resolved[node.name] = values
     return resolved
 
 
-def write_parameters(folder: Path, resolved: dict[str, dict[str, Any]], recorder: dict[str, Any] | None) -> Path:
+def write_parameters(
+    folder: Path, resolved: dict[str, dict[str, Any]], recorder: dict[str, Any] | None
+) -> Path:
     """Write ``parameters.yaml``, the parameter file that all processes of the run read."""
     nodes = dict(resolved)
     if recorder is not None:
         nodes[RECORDER.name] = recorder
     path = folder / 'parameters.yaml'
     content = {name: {'ros__parameters': values} for name, values in nodes.items()}
-    path.write_text('# Parameters of every node of this run.\n' + yaml.safe_dump(content, sort_keys=False),
-                    encoding='utf-8')
+    path.write_text(
+        '# Parameters of every node of this run.\n' + yaml.safe_dump(content, sort_keys=False),
+        encoding='utf-8',
+    )
     return path
-
-

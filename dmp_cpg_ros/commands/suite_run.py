@@ -48,7 +48,7 @@ class SuiteError(DmpCpgError):
     """The suite did not come up, or a node died."""
 
 
-class Interrupted(DmpCpgError):
+class InterruptedRunError(DmpCpgError):
     """The user pressed Ctrl-C."""
 
 
@@ -94,7 +94,7 @@ def run_suite(plan: RunPlan, say: Say) -> None:
         If nodes do not get ready, or one ends before its time; its last words are in the text.
     PlayerError
         If the suite does not take a command.
-    Interrupted
+    InterruptedRunError
         On Ctrl-C or SIGTERM; everything is shut down cleanly all the same.
     """
     group = ProcessGroup(plan.logs)
@@ -120,7 +120,7 @@ def run_suite(plan: RunPlan, say: Say) -> None:
             killed = group.stop()
             rclpy.try_shutdown()
             if killed:
-                say(float('nan'), f"had to kill {', '.join(killed)}")
+                say(float('nan'), f'had to kill {", ".join(killed)}')
 
 
 def _start(plan: RunPlan, group: ProcessGroup) -> None:
@@ -136,9 +136,19 @@ def _start(plan: RunPlan, group: ProcessGroup) -> None:
 class _Watch:
     """Spins the player while it watches the processes and Ctrl-C."""
 
-    def __init__(self, executor: Executor, player: ScenarioPlayer, group: ProcessGroup,
-                 interrupted: list[int]) -> None:
-        self._executor, self._player, self._group, self._interrupted = executor, player, group, interrupted
+    def __init__(
+        self,
+        executor: Executor,
+        player: ScenarioPlayer,
+        group: ProcessGroup,
+        interrupted: list[int],
+    ) -> None:
+        self._executor, self._player, self._group, self._interrupted = (
+            executor,
+            player,
+            group,
+            interrupted,
+        )
 
     def until(self, future: Future, patience_s: float) -> bool:
         """Spin until a future is done; returns whether it is."""
@@ -146,7 +156,7 @@ class _Watch:
         while not future.done() and time.monotonic() < deadline:
             self._executor.spin_until_future_complete(future, timeout_sec=SLICE_S)
             if self._interrupted:
-                raise Interrupted('interrupted')
+                raise InterruptedRunError('interrupted')
             ended = self._group.ended()
             if ended:
                 raise SuiteError('; '.join(map(str, ended)))
@@ -164,7 +174,11 @@ class _Watch:
                 if answer is not None and answer.success:
                     self._player.destroy_client(clients.pop(name))
                 else:
-                    waiting = f"{name} does not answer" if answer is None else f'{name}: {answer.message}'
+                    waiting = (
+                        f'{name} does not answer'
+                        if answer is None
+                        else f'{name}: {answer.message}'
+                    )
             self.until(Future(), SLICE_S)
 
     def finish_work(self) -> None:
@@ -231,5 +245,3 @@ def _interrupt() -> Iterator[list[int]]:
     finally:
         for number, handler in former.items():
             signal.signal(number, handler)
-
-

@@ -45,18 +45,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         suite = load_suite(options.parameters, overrides)
         certificate = _certificate(suite)
         if not certificate.holds and not overrides.get('allow_uncertified', False):
-            raise ParameterError(f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
-                                 'proposes gains that hold; --set allow_uncertified:=true walks all the same)')
+            raise ParameterError(
+                f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
+                'proposes gains that hold; --set allow_uncertified:=true walks all the same)'
+            )
         folder = make_run_folder(options.out)
     except DmpCpgError as error:
         print(f'walk: {error}', file=sys.stderr)
         return BAD_INPUT
-    print(f'{scenario.name}: {scenario.duration_s:g} s, {suite.gait.name}, '
-          f"{'lock-step' if options.lock_step else 'real time'}, "
-          f"{'one process' if options.composed else 'a process per node'}, "
-          f'{1e9 / suite.tick_ns:g} Hz', flush=True)
-    print(f'certificate: {certificate.explained()}; {certificate.contraction_grade} grade; at rest at most '
-          f'{certificate.time_to_rest:.3f} s after a request', flush=True)
+    print(
+        f'{scenario.name}: {scenario.duration_s:g} s, {suite.gait.name}, '
+        f'{"lock-step" if options.lock_step else "real time"}, '
+        f'{"one process" if options.composed else "a process per node"}, '
+        f'{1e9 / suite.tick_ns:g} Hz',
+        flush=True,
+    )
+    print(
+        f'certificate: {certificate.explained()}; {certificate.contraction_grade} grade; '
+        f'at rest at most {certificate.time_to_rest:.3f} s after a request',
+        flush=True,
+    )
     status = _run(scenario, suite, overrides, folder, options)
     if (folder / 'bag').is_dir():
         status = max(status, _analyze(scenario, suite, certificate, overrides, folder, options))
@@ -84,23 +92,33 @@ def load_scenario(name: str | Path) -> Scenario:
     return Scenario.from_mapping(load_yaml(path), f"'{path}'")
 
 
-def _run(scenario: Scenario, suite: Suite, overrides: dict[str, Any], folder: Path,
-         options: argparse.Namespace) -> int:
+def _run(
+    scenario: Scenario,
+    suite: Suite,
+    overrides: dict[str, Any],
+    folder: Path,
+    options: argparse.Namespace,
+) -> int:
     """Bring the suite up, play, bring it down; returns the exit status."""
-    from dmp_cpg_ros.commands.suite_run import Interrupted, RunPlan, run_suite
+    from dmp_cpg_ros.commands.suite_run import InterruptedRunError, RunPlan, run_suite
+
     shared = {**overrides, 'lock_step': options.lock_step, 'gated': True}
-    resolved = resolved_parameters(suite.file, {name: value for name, value in shared.items()
-                                                if name != 'lock_step'})
+    resolved = resolved_parameters(
+        suite.file, {name: value for name, value in shared.items() if name != 'lock_step'}
+    )
     for values in resolved.values():
         values['lock_step'] = options.lock_step
         values['expected_nodes'] = [*KINDS, 'bag_recorder']
-    parameters = write_parameters(folder, resolved, {
-        'output': str(folder / 'bag'), 'expected_nodes': list(KINDS)})
-    plan = RunPlan(scenario, suite.tick_ns, parameters, folder / 'logs', options.lock_step, options.composed)
+    parameters = write_parameters(
+        folder, resolved, {'output': str(folder / 'bag'), 'expected_nodes': list(KINDS)}
+    )
+    plan = RunPlan(
+        scenario, suite.tick_ns, parameters, folder / 'logs', options.lock_step, options.composed
+    )
     try:
         run_suite(plan, _say)
         return OK
-    except Interrupted:
+    except InterruptedRunError:
         print('walk: interrupted; the recording up to here is complete', file=sys.stderr)
         return INTERRUPTED
     except DmpCpgError as error:
@@ -108,20 +126,38 @@ def _run(scenario: Scenario, suite: Suite, overrides: dict[str, Any], folder: Pa
         return FAILED
 
 
-KINDS = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition', 'posture_control',
-         'mujoco_robot')
+KINDS = (
+    'reference_filter',
+    'canonical_oscillators',
+    'leg_transformation',
+    'inhibition',
+    'posture_control',
+    'mujoco_robot',
+)
 """Kinds of nodes that a run has besides its recorder."""
 
 
-def _analyze(scenario: Scenario, suite: Suite, certificate: Certificate, overrides: dict[str, Any], folder: Path,
-             options: argparse.Namespace) -> int:
+def _analyze(
+    scenario: Scenario,
+    suite: Suite,
+    certificate: Certificate,
+    overrides: dict[str, Any],
+    folder: Path,
+    options: argparse.Namespace,
+) -> int:
     """Write the run's folder and print what it says; returns the exit status."""
     try:
         results = analyze_run(
-            folder, robot_file=suite.robot_file, parameters=resolved_parameters(suite.file, overrides),
-            seeds={'robot': suite.robot.seed}, lock_step=options.lock_step, report=not options.no_report,
-            scenario=scenario.name, composed=options.composed,
-            certificate=[entry.as_mapping() for entry in certificate.inequalities])
+            folder,
+            robot_file=suite.robot_file,
+            parameters=resolved_parameters(suite.file, overrides),
+            seeds={'robot': suite.robot.seed},
+            lock_step=options.lock_step,
+            report=not options.no_report,
+            scenario=scenario.name,
+            composed=options.composed,
+            certificate=[entry.as_mapping() for entry in certificate.inequalities],
+        )
     except DmpCpgError as error:
         print(f'walk: cannot analyze the recording: {error}', file=sys.stderr)
         return FAILED
@@ -147,6 +183,7 @@ def _say(time_s: float, text: str) -> None:
 def _pairs(texts: Sequence[str]) -> dict[str, Any]:
     """Values given as ``NAME:=VALUE``, as ROS does."""
     import yaml
+
     pairs = {}
     for text in texts:
         name, separator, value = text.partition(':=')
@@ -158,20 +195,42 @@ def _pairs(texts: Sequence[str]) -> dict[str, Any]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='walk', description='Bring the suite up, play a scenario, record it, report it, shut everything down.',
-        epilog='Exit status: 0 when all went well, 1 when the robot fell or a node died, 2 for bad input, 130 for '
-               'Ctrl-C.')
-    parser.add_argument('scenario', nargs='?', default=DEFAULT_SCENARIO,
-                        help=f'scenario file, by its path or in config/scenarios (default: {DEFAULT_SCENARIO})')
-    parser.add_argument('--lock-step', action='store_true',
-                        help='the robot waits for every target: the run does not depend on the speed of the machine')
-    parser.add_argument('--composed', action='store_true', help='all nodes in one process and one executor')
-    parser.add_argument('--robot', metavar='FILE', help='robot file (default: the one of the parameter file)')
-    parser.add_argument('--parameters', metavar='FILE', help='parameter file (default: config/suite.yaml)')
-    parser.add_argument('--set', metavar='NAME:=VALUE', action='append', default=[],
-                        help='parameter of every node that has it; may be repeated')
+        prog='walk',
+        description='Bring the suite up, play a scenario, record, report, shut everything down.',
+        epilog='Exit status: 0 when all went well, 1 when the robot fell or a node died, 2 for '
+        'bad input, 130 for Ctrl-C.',
+    )
+    parser.add_argument(
+        'scenario',
+        nargs='?',
+        default=DEFAULT_SCENARIO,
+        help=f'scenario file, by its path or in config/scenarios (default: {DEFAULT_SCENARIO})',
+    )
+    parser.add_argument(
+        '--lock-step',
+        action='store_true',
+        help='the robot waits for every target: no run depends on the speed of the machine',
+    )
+    parser.add_argument(
+        '--composed', action='store_true', help='all nodes in one process and one executor'
+    )
+    parser.add_argument(
+        '--robot', metavar='FILE', help='robot file (default: the one of the parameter file)'
+    )
+    parser.add_argument(
+        '--parameters', metavar='FILE', help='parameter file (default: config/suite.yaml)'
+    )
+    parser.add_argument(
+        '--set',
+        metavar='NAME:=VALUE',
+        action='append',
+        default=[],
+        help='parameter of every node that has it; may be repeated',
+    )
     parser.add_argument('--rate', metavar='HZ', type=float, help='control rate (default: 250)')
-    parser.add_argument('--out', metavar='DIR', type=Path, help="the run's folder (default: a new one in runs)")
+    parser.add_argument(
+        '--out', metavar='DIR', type=Path, help="the run's folder (default: a new one in runs)"
+    )
     parser.add_argument('--no-report', action='store_true', help='write metrics and manifest only')
     return parser
 

@@ -1,6 +1,7 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The canonical system: N coupled Andronov-Hopf oscillators with sparse inhibition (paper, Sections 4.2 and 5).
+"""The canonical system: N coupled Andronov-Hopf oscillators with sparse inhibition (paper,
+Sections 4.2 and 5).
 
     ẋ_i = f_x(x_i; ω_i) + Σ_j K_ij (R(φ_ij) x_j − x_i) + α_i (x_{i,d} − x_i)
 
@@ -8,6 +9,8 @@ with α_i = 0 except where inhibition is switched on.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +26,9 @@ Array = NDArray[np.float64]
 class CanonicalSystem:
     """Coupled oscillators: vector field, Jacobian and time step; the state stays with the caller.
 
-    The coupling and the inhibition, the stiff and constant part of the field, are integrated exactly; rotation
-    and radial attraction are the mild part (:class:`~dmp_cpg_ros.core.exponential.ExponentialStep`).
+    The coupling and the inhibition, the stiff and constant part of the field, are integrated
+    exactly; rotation and radial attraction are the mild part
+    (:class:`~dmp_cpg_ros.core.exponential.ExponentialStep`).
 
     Parameters
     ----------
@@ -36,18 +40,30 @@ class CanonicalSystem:
         x_{i,d}, where inhibition pulls each node; the paper's [1, 0] scaled to the radius without.
     """
 
-    def __init__(self, graph: CouplingGraph, oscillators: AndronovHopf | tuple[AndronovHopf, ...],
-                 target: Array | None = None) -> None:
+    def __init__(
+        self,
+        graph: CouplingGraph,
+        oscillators: AndronovHopf | tuple[AndronovHopf, ...],
+        target: Array | None = None,
+    ) -> None:
         """Collect the constant matrices."""
         self.graph = graph
-        self.oscillators = ((oscillators,) * graph.size if isinstance(oscillators, AndronovHopf)
-                            else tuple(oscillators))
+        self.oscillators = (
+            (oscillators,) * graph.size
+            if isinstance(oscillators, AndronovHopf)
+            else tuple(oscillators)
+        )
         if len(self.oscillators) != graph.size:
-            raise ParameterError(f'{graph.size} nodes need {graph.size} oscillators, not {len(self.oscillators)}')
+            raise ParameterError(
+                f'{graph.size} nodes need {graph.size} oscillators, not {len(self.oscillators)}'
+            )
         self.rho = np.array([oscillator.rho for oscillator in self.oscillators])
         self.radius = np.array([oscillator.radius for oscillator in self.oscillators])
-        self.target = (np.stack([self.radius, np.zeros(graph.size)], axis=1) if target is None
-                       else np.asarray(target, dtype=float))
+        self.target = (
+            np.stack([self.radius, np.zeros(graph.size)], axis=1)
+            if target is None
+            else np.asarray(target, dtype=float)
+        )
         self._coupling = graph.coupling_matrix()
         self._steps: dict[tuple[bytes, float], ExponentialStep] = {}
 
@@ -97,7 +113,7 @@ class CanonicalSystem:
         matrix, _ = self.linear_part(gains)
         omega = np.broadcast_to(omega, (self.graph.size,))
         for i, oscillator in enumerate(self.oscillators):
-            matrix[2 * i:2 * i + 2, 2 * i:2 * i + 2] += oscillator.jacobian(x[i], omega[i])
+            matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += oscillator.jacobian(x[i], omega[i])
         return matrix
 
     def step(self, x: Array, omega: float | Array, gains: Array, dt: float) -> Array:
@@ -126,7 +142,7 @@ class CanonicalSystem:
             step = self._steps[key] = ExponentialStep(*self.linear_part(gains), dt)
         return step(x.ravel(), self._nonlinear(omega)).reshape(x.shape)
 
-    def _nonlinear(self, omega: float | Array):  # noqa: ANN202
+    def _nonlinear(self, omega: float | Array) -> Callable[[Array], Array]:
         """N(x) = ω S x + ρ(r² − |x|²) x as one product with the complex number x₁ + i x₂."""
         rho, linear = self.rho, self.rho * self.radius**2 - 1j * np.asarray(omega)
 

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Exponential Runge-Kutta step for ẋ = M x + c + N(x) with a stiff constant M and a mild N.
 
-Third-order method ETD3RK of Cox & Matthews, *Exponential time differencing for stiff systems*,
-J. Comput. Phys. 176 (2002), eqs. (23)-(25). The linear part is exact, so the step is stable however large the
-coupling and inhibition gains are; an equilibrium of the equation is exactly an equilibrium of the step.
+Third-order method ETD3RK of Cox & Matthews, *Exponential time differencing for stiff systems*, J.
+Comput. Phys. 176 (2002), eqs. (23)-(25). The linear part is exact, so the step is stable however
+large the coupling and inhibition gains are; an equilibrium of the equation is exactly an
+equilibrium of the step.
 """
 
 from __future__ import annotations
@@ -20,8 +21,9 @@ Array = NDArray[np.float64]
 def phi_functions(M: Array, highest: int = 3) -> list[Array]:
     """φ₀ … φ_m of a matrix: φ₀ = e^M and φ_k(M) = Σ_j M^j/(j+k)!.
 
-    Read off the exponential of one block matrix (Sidje 1998, Theorem 1): scaling, a Taylor series and
-    squaring, which is accurate also where the recursion φ_{k+1} = M⁻¹(φ_k − 1/k!) cancels or M is singular.
+    Read off the exponential of one block matrix (Sidje 1998, Theorem 1): scaling, a Taylor series
+    and squaring, which is accurate also where the recursion φ_{k+1} = M⁻¹(φ_k − 1/k!) cancels or M
+    is singular.
 
     Parameters
     ----------
@@ -39,13 +41,15 @@ def phi_functions(M: Array, highest: int = 3) -> list[Array]:
     block = np.zeros(((highest + 1) * n, (highest + 1) * n))
     block[:n, :n] = M
     for k in range(highest):
-        block[k * n:(k + 1) * n, (k + 1) * n:(k + 2) * n] = np.eye(n)
+        block[k * n : (k + 1) * n, (k + 1) * n : (k + 2) * n] = np.eye(n)
     exponential = _expm(block)
-    return [exponential[:n, k * n:(k + 1) * n] for k in range(highest + 1)]
+    return [exponential[:n, k * n : (k + 1) * n] for k in range(highest + 1)]
 
 
 def _expm(M: Array) -> Array:
-    """Matrix exponential by scaling and squaring of a Taylor polynomial (norm below 1/2, 18 terms)."""
+    """Matrix exponential by scaling and squaring of a Taylor polynomial (norm below 1/2, 18
+    terms).
+    """
     norm = np.linalg.norm(M, 1)
     squarings = max(0, int(np.ceil(np.log2(norm / 0.5)))) if norm > 0.0 else 0
     scaled = M / 2.0**squarings
@@ -58,7 +62,8 @@ def _expm(M: Array) -> Array:
 
 
 class ExponentialStep:
-    """One step of fixed length for a fixed linear part; the nonlinear part may change from step to step.
+    """One step of fixed length for a fixed linear part; the nonlinear part may change from step
+    to step.
 
     Parameters
     ----------
@@ -74,10 +79,16 @@ class ExponentialStep:
         """Compute the matrices of the method once."""
         whole, half = phi_functions(M * dt), phi_functions(M * (0.5 * dt))
         p1, p2, p3 = whole[1], whole[2], whole[3]
-        self._to_half = np.hstack([half[0], 0.5 * dt * half[1]])                     # (n, 2n) on [x, N]
-        self._to_end = np.hstack([whole[0], -dt * p1, 2.0 * dt * p1])                # on [x, N_0, N_half]
-        self._final = np.hstack([whole[0], dt * (p1 - 3.0 * p2 + 4.0 * p3),
-                                 dt * (4.0 * p2 - 8.0 * p3), dt * (4.0 * p3 - p2)])  # on [x, N_0, N_half, N_end]
+        self._to_half = np.hstack([half[0], 0.5 * dt * half[1]])  # (n, 2n) on [x, N]
+        self._to_end = np.hstack([whole[0], -dt * p1, 2.0 * dt * p1])  # on [x, N_0, N_half]
+        self._final = np.hstack(
+            [
+                whole[0],
+                dt * (p1 - 3.0 * p2 + 4.0 * p3),
+                dt * (4.0 * p2 - 8.0 * p3),
+                dt * (4.0 * p3 - p2),
+            ]
+        )  # on [x, N_0, N_half, N_end]
         self._c_half, self._c = 0.5 * dt * half[1] @ c, dt * p1 @ c
         self._stages = np.empty(4 * len(c))
 
@@ -98,7 +109,7 @@ class ExponentialStep:
         """
         n, stages = len(x), self._stages
         stages[:n] = x
-        stages[n:2 * n] = nonlinear(x)
-        stages[2 * n:3 * n] = nonlinear(self._to_half @ stages[:2 * n] + self._c_half)
-        stages[3 * n:] = nonlinear(self._to_end @ stages[:3 * n] + self._c)
+        stages[n : 2 * n] = nonlinear(x)
+        stages[2 * n : 3 * n] = nonlinear(self._to_half @ stages[: 2 * n] + self._c_half)
+        stages[3 * n :] = nonlinear(self._to_end @ stages[: 3 * n] + self._c)
         return self._final @ stages + self._c

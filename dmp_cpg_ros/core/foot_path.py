@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The path of a foot over one cycle, as a function of the oscillator's phase and the reference.
 
-In stance the foot stays where it is in the world while the base moves with (v, γ), so in the base frame it follows
-ṗ = −v − γ ẑ × p exactly, turning included. A round foot rolls while it stands: its centre needs only the share
-``rolling`` of the way that the contact point makes (:func:`rolling_share`). In swing a cubic Hermite curve carries it back with matching velocities
-at both ends, under a bump of height. The whole path is C¹ in the phase.
+In stance the foot stays where it is in the world while the base moves with (v, γ), so in the base
+frame it follows ṗ = −v − γ ẑ × p exactly, turning included. A round foot rolls while it stands:
+its centre needs only the share ``rolling`` of the way that the contact point makes
+(:func:`rolling_share`). In swing a cubic Hermite curve carries it back with matching velocities at
+both ends, under a bump of height. The whole path is C¹ in the phase.
 """
 
 from __future__ import annotations
@@ -68,10 +69,11 @@ class FootPath:
         period, swing = 6.283185307179586 / self.omega, 1.0 - self.duty
         height = float(self.foothold_in_base[2])
         if abs(cycle_position) >= 0.5 * swing:
-            from_mid_stance = cycle_position - 0.5 if cycle_position > 0.0 else cycle_position + 0.5
+            from_mid_stance = (
+                cycle_position - 0.5 if cycle_position > 0.0 else cycle_position + 0.5
+            )
             x, y, x_dot, y_dot = self._stance(from_mid_stance * period)
-            return (np.array((x, y, height)),
-                    np.array((x_dot * period, y_dot * period, 0.0)))
+            return (np.array((x, y, height)), np.array((x_dot * period, y_dot * period, 0.0)))
         half_stance = 0.5 * self.duty * period
         x0, y0, dx0, dy0 = self._stance(half_stance)
         x1, y1, dx1, dy1 = self._stance(-half_stance)
@@ -81,8 +83,10 @@ class FootPath:
         rest = 1.0 - s
         bump = 16.0 * s * s * rest * rest
         bump_slope = 32.0 * s * rest * (rest - s)
-        return (np.array((x, y, height + self.clearance * bump)),
-                np.array((x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing)))
+        return (
+            np.array((x, y, height + self.clearance * bump)),
+            np.array((x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing)),
+        )
 
     def _stance(self, t: float) -> tuple[float, float, float, float]:
         """Planar position and velocity of a foot that stands, t seconds after mid-stance."""
@@ -96,16 +100,20 @@ class FootPath:
         x = c * x0 + s * y0 - along * self.v_x - across * self.v_y
         y = c * y0 - s * x0 - along * self.v_y + across * self.v_x
         share_x, share_y = self.rolling
-        return (x0 + share_x * (x - x0), y0 + share_y * (y - y0),
-                share_x * (-self.v_x + self.gamma * y), share_y * (-self.v_y - self.gamma * x))
+        return (
+            x0 + share_x * (x - x0),
+            y0 + share_y * (y - y0),
+            share_x * (-self.v_x + self.gamma * y),
+            share_y * (-self.v_y - self.gamma * x),
+        )
 
 
 def rolling_share(kinematics: LegKinematics, foothold_in_base: Array) -> tuple[float, float]:
     """Share of the stance displacement that the centre of a rolling foot makes, along x and y.
 
-    A foot of radius ρ on a shank that turns by θ rolls ρ θ on the ground, so with the base's velocity v the centre moves at
-    ẋ = −v / (1 − ρ ∂θ/∂x) in the base; to first order at the foothold, with θ the pitch of the shank for x and its
-    roll (with the opposite sign) for y.
+    A foot of radius ρ on a shank that turns by θ rolls ρ θ on the ground, so with the base's
+    velocity v the centre moves at ẋ = −v / (1 − ρ ∂θ/∂x) in the base; to first order at the
+    foothold, with θ the pitch of the shank for x and its roll (with the opposite sign) for y.
 
     Parameters
     ----------
@@ -120,17 +128,25 @@ def rolling_share(kinematics: LegKinematics, foothold_in_base: Array) -> tuple[f
     """
     geometry = kinematics.geometry
     inverse = np.linalg.inv(kinematics.jacobian_in_base(kinematics.inverse(foothold_in_base)))
-    turning = geometry.axis_sign[:, None] * inverse                         # (3, 3) axis angles per metre
+    turning = geometry.axis_sign[:, None] * inverse  # (3, 3) axis angles per metre
     pitch_per_x = turning[1, 0] + turning[2, 0]
     roll_per_y = turning[0, 1]
-    return (float(1.0 / (1.0 - geometry.foot_radius * pitch_per_x)),
-            float(1.0 / (1.0 + geometry.foot_radius * roll_per_y)))
+    return (
+        float(1.0 / (1.0 - geometry.foot_radius * pitch_per_x)),
+        float(1.0 / (1.0 + geometry.foot_radius * roll_per_y)),
+    )
 
 
 def _hermite(s: float, p0: float, p1: float, m0: float, m1: float) -> tuple[float, float]:
     """Cubic Hermite curve on [0, 1] and its derivative."""
     s2, s3 = s * s, s * s * s
-    value = ((2.0 * s3 - 3.0 * s2 + 1.0) * p0 + (s3 - 2.0 * s2 + s) * m0
-             + (3.0 * s2 - 2.0 * s3) * p1 + (s3 - s2) * m1)
-    slope = (6.0 * (s2 - s) * (p0 - p1) + (3.0 * s2 - 4.0 * s + 1.0) * m0 + (3.0 * s2 - 2.0 * s) * m1)
+    value = (
+        (2.0 * s3 - 3.0 * s2 + 1.0) * p0
+        + (s3 - 2.0 * s2 + s) * m0
+        + (3.0 * s2 - 2.0 * s3) * p1
+        + (s3 - s2) * m1
+    )
+    slope = (
+        6.0 * (s2 - s) * (p0 - p1) + (3.0 * s2 - 4.0 * s + 1.0) * m0 + (3.0 * s2 - 2.0 * s) * m1
+    )
     return value, slope

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sharing a body wrench among stance feet within friction cones.
 
-Weighted least squares (the minimum of Σ|f_i|²/w_i that yields the wrench), then each force is brought into its cone:
-0 ≤ f_z ≤ f_max and |f_xy| ≤ μ f_z. The limits therefore always hold; the wrench is met where they allow it.
+Weighted least squares (the minimum of Σ|f_i|²/w_i that yields the wrench), then each force is
+brought into its cone: 0 ≤ f_z ≤ f_max and |f_xy| ≤ μ f_z. The limits therefore always hold; the
+wrench is met where they allow it.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 REGULARISATION = 1e-4
-"""Damping of the least squares, relative to the mean of the weights; keeps one or two stance feet well posed."""
+"""Damping of the least squares, relative to the mean of the weights; keeps one or two stance
+feet well posed.
+"""
 
 
 def distribute(wrench: Array, feet: Array, load: Array, friction: float, largest: float) -> Array:
@@ -54,5 +57,7 @@ def distribute(wrench: Array, feet: Array, load: Array, friction: float, largest
     forces[:, 2] = np.clip(forces[:, 2], 0.0, largest * load)
     tangential = np.sqrt(forces[:, 0] ** 2 + forces[:, 1] ** 2)
     allowed = friction * forces[:, 2]
-    forces[:, :2] *= np.where(tangential > allowed, allowed / np.maximum(tangential, 1e-12), 1.0)[:, None]
+    forces[:, :2] *= np.where(tangential > allowed, allowed / np.maximum(tangential, 1e-12), 1.0)[
+        :, None
+    ]
     return forces

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gaits as data: which leg follows which, for how long it stands, and how often it steps.
 
-Speeds and cadences are dimensionless (Alexander & Jayes 1983, dynamic similarity), so that one gait serves robots
-of any size: speed û = u / sqrt(g l), cadence f̂ = f sqrt(l / g), with l the standing height of the hip.
+Speeds and cadences are dimensionless (Alexander & Jayes 1983, dynamic similarity), so that one
+gait serves robots of any size: speed û = u / sqrt(g l), cadence f̂ = f sqrt(l / g), with l the
+standing height of the hip.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ class BodyScale:
     leg_length : float
         Standing height l of the hips [m].
     hip_radius : float
-        Horizontal distance from the base's origin to a foot [m]: a turn at γ moves a foot at γ times this.
+        Horizontal distance from the base's origin to a foot [m]: a turn at γ moves a foot at γ
+        times this.
     """
 
     leg_length: float
@@ -57,7 +59,8 @@ class Gait:
     lag : ndarray (4,)
         Fraction of a cycle by which each leg (fl, fr, rl, rr) follows fl, in [0, 1).
     speed : ndarray (n,)
-        Increasing dimensionless foot speeds at which the next two are given; held constant outside.
+        Increasing dimensionless foot speeds at which the next two are given; held constant
+        outside.
     cadence : ndarray (n,)
         Dimensionless stride frequencies.
     duty_factor : ndarray (n,)
@@ -70,14 +73,20 @@ class Gait:
     cadence: Array
     duty_factor: Array
     rest: float = field(init=False)
-    _tables: tuple[list[float], list[float], list[float]] = field(init=False, repr=False, compare=False)
+    _tables: tuple[list[float], list[float], list[float]] = field(
+        init=False, repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         """Validate and find the rest phase."""
         if self.lag.shape != (len(LEGS),) or not np.all((self.lag >= 0.0) & (self.lag < 1.0)):
-            raise ParameterError(f"gait '{self.name}': lag needs four fractions in [0, 1), not {self.lag}")
+            raise ParameterError(
+                f"gait '{self.name}': lag needs four fractions in [0, 1), not {self.lag}"
+            )
         if not len(self.speed) == len(self.cadence) == len(self.duty_factor) > 0:
-            raise ParameterError(f"gait '{self.name}': speed, cadence and duty_factor must have equal lengths")
+            raise ParameterError(
+                f"gait '{self.name}': speed, cadence and duty_factor must have equal lengths"
+            )
         if np.any(np.diff(self.speed) <= 0.0) or not np.all(np.isfinite(self.speed)):
             raise ParameterError(f"gait '{self.name}': speed must increase")
         if not np.all((self.duty_factor > 0.0) & (self.duty_factor < 1.0)):
@@ -85,8 +94,11 @@ class Gait:
         if not np.all((self.cadence > 0.0) & np.isfinite(self.cadence)):
             raise ParameterError(f"gait '{self.name}': cadence must be positive")
         object.__setattr__(self, 'rest', _rest_phase(self.lag))
-        object.__setattr__(self, '_tables', tuple(
-            table.tolist() for table in (self.speed, self.cadence, self.duty_factor)))
+        object.__setattr__(
+            self,
+            '_tables',
+            tuple(table.tolist() for table in (self.speed, self.cadence, self.duty_factor)),
+        )
 
     @classmethod
     def from_mapping(cls, name: str, values: Mapping[str, Any]) -> Gait:
@@ -125,13 +137,20 @@ class Gait:
             The robot's lengths.
         """
         root = (GRAVITY / scale.leg_length) ** 0.5
-        return 2.0 * np.pi * root * _interpolated(
-            foot_speed / (root * scale.leg_length), self._tables[0], self._tables[1])
+        return (
+            2.0
+            * np.pi
+            * root
+            * _interpolated(
+                foot_speed / (root * scale.leg_length), self._tables[0], self._tables[1]
+            )
+        )
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed."""
         return _interpolated(
-            foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self._tables[0], self._tables[2])
+            foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self._tables[0], self._tables[2]
+        )
 
     def scalar_cycle_position(self, phi: float) -> float:
         """As :meth:`cycle_position` for one leg, without arrays."""
@@ -140,8 +159,8 @@ class Gait:
     def cycle_position(self, phi: Array | float) -> Array:
         """Where legs are in their cycle: 0 at mid-swing, in [−1/2, 1/2).
 
-        The phase φ = 0 of oscillator fl, where inhibition holds it, is the moment at which all legs are farthest from
-        mid-swing.
+        The phase φ = 0 of oscillator fl, where inhibition holds it, is the moment at which all
+        legs are farthest from mid-swing.
 
         Parameters
         ----------
@@ -152,7 +171,9 @@ class Gait:
 
 
 def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:
-    """Piecewise linear interpolation, constant outside; plain floats, because it runs in every node at every tick."""
+    """Piecewise linear interpolation, constant outside; plain floats, because it runs in every
+    node at every tick.
+    """
     place = bisect_right(xs, at)
     if place == 0:
         return ys[0]
@@ -163,11 +184,13 @@ def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:
 
 
 def _rest_phase(lag: Array) -> float:
-    """Cycle position of fl at which the leg nearest to its mid-swing is as far from it as possible.
+    """Cycle position of fl at which the leg nearest to its mid-swing is as far from it as
+    possible.
 
-    Of several such positions the one at which fl itself is farthest from mid-swing, and of two the earlier one.
+    Of several such positions the one at which fl itself is farthest from mid-swing, and of two the
+    earlier one.
     """
-    mid_swings = np.unique(np.round(lag % 1.0, 9))                # cycle positions of fl
+    mid_swings = np.unique(np.round(lag % 1.0, 9))  # cycle positions of fl
     gaps = np.diff(np.append(mid_swings, mid_swings[0] + 1.0))
     middles = (mid_swings + 0.5 * gaps)[gaps > gaps.max() - 1e-6] % 1.0
     own = np.abs((middles + 0.5) % 1.0 - 0.5)

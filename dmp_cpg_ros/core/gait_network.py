@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The four coupled oscillators of a gait: what the canonical node runs and what predictions are made with."""
+"""The four coupled oscillators of a gait: what the canonical node runs and what predictions are
+made with.
+"""
 
 from __future__ import annotations
 
@@ -30,11 +32,18 @@ LONGEST_STEP = 0.005
 class CanonicalParameters(Parameters):
     """Parameters of the coupled canonical oscillators."""
 
-    rho: float = parameter(8.0, 'attraction rho to the limit cycle', unit='1/s', minimum=0.1, maximum=1e3)
+    rho: float = parameter(
+        8.0, 'attraction rho to the limit cycle', unit='1/s', minimum=0.1, maximum=1e3
+    )
     radius: float = parameter(1.0, 'radius r of the limit cycle', minimum=0.01, maximum=100.0)
-    coupling_gain: float = parameter(100.0, 'gain k of every coupling', unit='1/s', minimum=0.0, maximum=1e4)
-    coupling_graph: str = parameter('all_to_all', 'who is coupled with whom',
-                                    choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'))
+    coupling_gain: float = parameter(
+        100.0, 'gain k of every coupling', unit='1/s', minimum=0.0, maximum=1e4
+    )
+    coupling_graph: str = parameter(
+        'all_to_all',
+        'who is coupled with whom',
+        choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'),
+    )
 
 
 class GaitNetwork:
@@ -53,17 +62,27 @@ class GaitNetwork:
     def __init__(self, parameters: CanonicalParameters, gait: Gait, scale: BodyScale) -> None:
         """Build the coupled system; inhibition pulls each leg to its place when fl has phase 0."""
         self.parameters, self.gait, self.scale = parameters, gait, scale
-        graph = graph_from_edges(len(LEGS), topology(parameters.coupling_graph, len(LEGS)),
-                                 parameters.coupling_gain, gait.phases)
-        self.system = CanonicalSystem(graph, AndronovHopf(parameters.rho, parameters.radius),
-                                      state_at(gait.phases, parameters.radius))
+        graph = graph_from_edges(
+            len(LEGS),
+            topology(parameters.coupling_graph, len(LEGS)),
+            parameters.coupling_gain,
+            gait.phases,
+        )
+        self.system = CanonicalSystem(
+            graph,
+            AndronovHopf(parameters.rho, parameters.radius),
+            state_at(gait.phases, parameters.radius),
+        )
 
     def omega(self, r: Array) -> float:
         """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""
-        return self.gait.omega(self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2])), self.scale)
+        return self.gait.omega(
+            self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2])), self.scale
+        )
 
     def step(self, x: Array, r: Array, inhibition: Inhibition, dt: float) -> Array:
-        """Advance the states (4, 2) by dt [s] at reference r under an inhibition that is switched by region.
+        """Advance the states (4, 2) by dt [s] at reference r under an inhibition that is
+        switched by region.
 
         After a gap in the robot's states the time is made up in parts of at most ``LONGEST_STEP``.
         """
@@ -79,11 +98,17 @@ class GaitNetwork:
         return self.system.field(x, self.omega(r), gains)
 
     def locked_state(self, phi: float = 0.0) -> Array:
-        """States (4, 2) on the limit cycle with fl at phase φ [rad] and all legs in their places."""
+        """States (4, 2) on the limit cycle with fl at phase φ [rad] and all legs in their
+        places.
+        """
         return state_at(phi + self.gait.phases, self.parameters.radius)
 
-    def rest_state(self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0) -> Array:
-        """Equilibrium (4, 2) that is reached from the locked state under inhibition at zero reference."""
+    def rest_state(
+        self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0
+    ) -> Array:
+        """Equilibrium (4, 2) that is reached from the locked state under inhibition at zero
+        reference.
+        """
         x, r = self.locked_state(), np.zeros(3)
         for _ in range(round(duration / tick)):
             following = self.step(x, r, inhibition, tick)
@@ -93,7 +118,9 @@ class GaitNetwork:
         return x
 
     def phase_errors(self, x: Array) -> Array:
-        """Deviation of each leg's phase from its place, relative to the circular mean, ndarray (4,) [rad]."""
+        """Deviation of each leg's phase from its place, relative to the circular mean, ndarray
+        (4,) [rad].
+        """
         relative = phase(x) - self.gait.phases
         mean = np.arctan2(np.sin(relative).sum(), np.cos(relative).sum())
         return wrapped(relative - mean)

@@ -1,12 +1,13 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Stopping and starting the gait: requests in, the inhibition of the next tick and its state word out.
+"""Stopping and starting the gait: requests in, the next tick's inhibition and its state word out.
 
-    free ──► walking          uninhibited; walking once the legs are in their places and the reference moves
-    waiting                   a stop is requested: the reference slows, then inhibition is armed until x enters C
-    captured                  inhibition holds an oscillator, the others follow
-    at_rest                   the oscillators, the reference and the swings have come to rest
-    releasing                 a start is requested: oscillators run up until they are phase-locked
+- ``free``, ``walking``: uninhibited; walking once the legs are in their places and the reference
+  moves.
+- ``waiting``: a stop is requested; the reference slows, then inhibition is armed until x enters C.
+- ``captured``: inhibition holds an oscillator and the others follow.
+- ``at_rest``: oscillators, reference and swings have come to rest.
+- ``releasing``: a start is requested; the oscillators run up until they are phase-locked.
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ class SupervisorState:
     requested : bool
         Whether a stop is requested.
     automatic : bool
-        Whether the stop was requested by ``auto_inhibit`` (or by starting at rest) and not by a service call.
+        Whether the stop was requested by ``auto_inhibit`` (or by starting at rest) and not by a
+        service call.
     request_ns : int
         Stamp at which the present stop or start was requested [ns].
     armed : bool
@@ -92,30 +94,59 @@ class GaitSupervisor:
         Rate of the legs' swing activity [1/s].
     """
 
-    def __init__(self, parameters: InhibitionParameters, network: GaitNetwork, activity_rate: float) -> None:
+    def __init__(
+        self, parameters: InhibitionParameters, network: GaitNetwork, activity_rate: float
+    ) -> None:
         """Keep the parts."""
         self.parameters, self.network, self.activity_rate = parameters, network, activity_rate
 
     def initial_state(self, time_ns: int = 0) -> SupervisorState:
         """At rest, or free when ``start_inhibited`` is false."""
         stopped = self.parameters.start_inhibited
-        return SupervisorState(time_ns, 'at_rest' if stopped else 'free', stopped, True, time_ns, stopped,
-                               np.zeros(4) if stopped else np.ones(4), measured_s=0.0)
+        return SupervisorState(
+            time_ns,
+            'at_rest' if stopped else 'free',
+            stopped,
+            True,
+            time_ns,
+            stopped,
+            np.zeros(4) if stopped else np.ones(4),
+            measured_s=0.0,
+        )
 
     def inhibition(self, state: SupervisorState) -> Inhibition:
         """Inhibition that the canonical system applies at the tick after ``state``."""
         gains = self.parameters.armed_gains if state.armed else np.zeros(len(state.activity))
         return Inhibition(state.requested, gains, self.parameters.region_radius)
 
-    def request(self, state: SupervisorState, stop: bool, automatic: bool = False) -> SupervisorState:
-        """Ask for a stop or a start; asking for what is already asked changes nothing but its origin."""
+    def request(
+        self, state: SupervisorState, stop: bool, automatic: bool = False
+    ) -> SupervisorState:
+        """Ask for a stop or a start; asking for what is already asked changes nothing but its
+        origin.
+        """
         if stop == state.requested:
             return replace(state, automatic=automatic)
-        return replace(state, word='waiting' if stop else 'releasing', requested=stop, automatic=automatic,
-                       request_ns=state.time_ns, armed=False, measured_s=float('nan'), idle_ns=-1)
+        return replace(
+            state,
+            word='waiting' if stop else 'releasing',
+            requested=stop,
+            automatic=automatic,
+            request_ns=state.time_ns,
+            armed=False,
+            measured_s=float('nan'),
+            idle_ns=-1,
+        )
 
-    def step(self, state: SupervisorState, time_ns: int, x: Array, x_dot: Array, r: Array,
-             command: tuple[float, float, float]) -> SupervisorState:
+    def step(
+        self,
+        state: SupervisorState,
+        time_ns: int,
+        x: Array,
+        x_dot: Array,
+        r: Array,
+        command: tuple[float, float, float],
+    ) -> SupervisorState:
         """Advance by one tick.
 
         Parameters
@@ -146,13 +177,19 @@ class GaitSupervisor:
             return self._stopping(state, x, rates, speed)
         return self._running(state, x, speed)
 
-    def _automatic(self, state: SupervisorState, command: tuple[float, float, float]) -> SupervisorState:
-        """Stop after a time of zero command, and start at a command, when ``auto_inhibit`` is on."""
+    def _automatic(
+        self, state: SupervisorState, command: tuple[float, float, float]
+    ) -> SupervisorState:
+        """Stop after a time of zero command, and start at a command, when ``auto_inhibit`` is
+        on.
+        """
         if not self.parameters.auto_inhibit:
             return state
         if any(command):
             state = replace(state, idle_ns=-1)
-            return self.request(state, False, True) if state.requested and state.automatic else state
+            return (
+                self.request(state, False, True) if state.requested and state.automatic else state
+            )
         if state.idle_ns < 0:
             state = replace(state, idle_ns=state.time_ns)
         waited = (state.time_ns - state.idle_ns) * 1e-9
@@ -160,13 +197,18 @@ class GaitSupervisor:
             return self.request(state, True, True)
         return state
 
-    def _stopping(self, state: SupervisorState, x: Array, rates: Array, speed: float) -> SupervisorState:
+    def _stopping(
+        self, state: SupervisorState, x: Array, rates: Array, speed: float
+    ) -> SupervisorState:
         armed = state.armed or speed <= self.parameters.capture_speed
         inhibition = self.inhibition(replace(state, armed=armed))
         if not np.any(inhibition.acting_gains(x, self.network.system.target)):
             return replace(state, armed=armed, word='waiting')
-        if (np.abs(rates).max() > REST_PHASE_RATE or speed > REST_SPEED
-                or state.activity.max() > REST_ACTIVITY):
+        if (
+            np.abs(rates).max() > REST_PHASE_RATE
+            or speed > REST_SPEED
+            or state.activity.max() > REST_ACTIVITY
+        ):
             return replace(state, armed=armed, word='captured')
         return replace(state, armed=armed, word='at_rest', measured_s=self._measured(state))
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Coupling graphs: who is pulled by whom, how strongly, and at which phase offset.
 
-An edge (i, j) means that oscillator i feels K_ij (R(φ_ij) x_j − x_i), with φ_ij the phase by which i leads j
-(paper, Section 5; Wang & Slotine 2005 for the block Laplacian).
+An edge (i, j) means that oscillator i feels K_ij (R(φ_ij) x_j − x_i), with φ_ij the phase by which
+i leads j (paper, Section 5; Wang & Slotine 2005 for the block Laplacian).
 """
 
 from __future__ import annotations
@@ -38,12 +38,14 @@ class CouplingGraph:
     gains : ndarray (E, 2, 2)
         K_ij of each edge [1/s]; its symmetric part is positive definite.
     phases : ndarray (N,)
-        Phase of each oscillator relative to oscillator 0 when locked [rad]; φ_ij = phases[i] − phases[j].
+        Phase of each oscillator relative to oscillator 0 when locked [rad]; φ_ij = phases[i] −
+        phases[j].
 
     Raises
     ------
     ParameterError
-        If an edge names a node that is not there, or a gain's symmetric part is not positive definite.
+        If an edge names a node that is not there, or a gain's symmetric part is not positive
+        definite.
     """
 
     size: int
@@ -55,8 +57,10 @@ class CouplingGraph:
         """Validate."""
         if self.gains.shape != (len(self.edges), 2, 2) or self.phases.shape != (self.size,):
             raise ParameterError(
-                f'{len(self.edges)} edges and {self.size} nodes need gains ({len(self.edges)}, 2, 2) and '
-                f'phases ({self.size},), not {self.gains.shape} and {self.phases.shape}')
+                f'{len(self.edges)} edges and {self.size} nodes need gains '
+                f'({len(self.edges)}, 2, 2) and phases ({self.size},), '
+                f'not {self.gains.shape} and {self.phases.shape}'
+            )
         if not (np.all(np.isfinite(self.gains)) and np.all(np.isfinite(self.phases))):
             raise ParameterError('coupling gains and phase offsets must be finite')
         _check_edges(self.edges, self.size)
@@ -64,8 +68,9 @@ class CouplingGraph:
         for edge, smallest in zip(self.edges, np.linalg.eigvalsh(symmetric)[:, 0], strict=True):
             if smallest <= 0.0:
                 raise ParameterError(
-                    f'gain of edge {edge} must have a positive definite symmetric part; its smallest '
-                    f'eigenvalue is {smallest:.4g}')
+                    f'gain of edge {edge} must have a positive definite symmetric part; '
+                    f'its smallest eigenvalue is {smallest:.4g}'
+                )
 
     def coupling_matrix(self) -> Array:
         """Matrix −L with ẋ = … − L x in the original coordinates (offsets included).
@@ -75,7 +80,8 @@ class CouplingGraph:
         ndarray (2N, 2N)
         """
         return self._block_matrix(
-            self.gains, lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j])))
+            self.gains, lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j]))
+        )
 
     def block_laplacian(self) -> Array:
         """Block Laplacian L in the co-rotated coordinates, where locked states are equal.
@@ -83,12 +89,17 @@ class CouplingGraph:
         Returns
         -------
         ndarray (2N, 2N)
-            Σ over edges of K̃_ij at (i, i) and −K̃_ij at (i, j), with K̃_ij = R(φ_i)ᵀ K_ij R(φ_i) the gain as the
-            locked coordinates x̃_i = R(φ_i)ᵀ x_i see it; K̃ = K for every K = a I + b S, such as k I.
+            Σ over edges of K̃_ij at (i, i) and −K̃_ij at (i, j), with K̃_ij = R(φ_i)ᵀ K_ij R(φ_i)
+            the gain as the locked coordinates x̃_i = R(φ_i)ᵀ x_i see it; K̃ = K for every K = a I
+            + b S, such as k I.
         """
         turns = [phase_rotation(float(phi)) for phi in self.phases]
-        turned = np.array([turns[i].T @ gain @ turns[i]
-                           for (i, _), gain in zip(self.edges, self.gains, strict=True)])
+        turned = np.array(
+            [
+                turns[i].T @ gain @ turns[i]
+                for (i, _), gain in zip(self.edges, self.gains, strict=True)
+            ]
+        )
         return -self._block_matrix(turned.reshape(-1, 2, 2), lambda i, j: np.eye(2))
 
     def with_phases(self, phases: Array) -> CouplingGraph:
@@ -98,12 +109,14 @@ class CouplingGraph:
     def _block_matrix(self, gains: Array, seen_from: Callable[[int, int], Array]) -> Array:
         matrix = np.zeros((2 * self.size, 2 * self.size))
         for (i, j), gain in zip(self.edges, gains, strict=True):
-            matrix[2 * i:2 * i + 2, 2 * i:2 * i + 2] -= gain
-            matrix[2 * i:2 * i + 2, 2 * j:2 * j + 2] += gain @ seen_from(i, j)
+            matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] -= gain
+            matrix[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] += gain @ seen_from(i, j)
         return matrix
 
 
-def graph_from_edges(size: int, edges: Edges, gain: float | Array, phases: Array | None = None) -> CouplingGraph:
+def graph_from_edges(
+    size: int, edges: Edges, gain: float | Array, phases: Array | None = None
+) -> CouplingGraph:
     """Graph in which every edge has the same gain.
 
     Parameters
@@ -123,7 +136,9 @@ def graph_from_edges(size: int, edges: Edges, gain: float | Array, phases: Array
     """
     K = gain * np.eye(2) if np.ndim(gain) == 0 else np.asarray(gain, dtype=float)
     gains = np.broadcast_to(K, (len(edges), 2, 2)).copy()
-    return CouplingGraph(size, edges, gains, np.zeros(size) if phases is None else np.asarray(phases, float))
+    return CouplingGraph(
+        size, edges, gains, np.zeros(size) if phases is None else np.asarray(phases, float)
+    )
 
 
 def topology(name: str, size: int) -> Edges:
@@ -149,7 +164,8 @@ def topology(name: str, size: int) -> Edges:
         return tuple((j, i) for i, j in following + [(size - 1, 0)])
     if name not in undirected:
         raise ParameterError(
-            f"topology '{name}' is not known; valid are {', '.join(undirected)}, directed_ring")
+            f"topology '{name}' is not known; valid are {', '.join(undirected)}, directed_ring"
+        )
     return tuple(edge for i, j in undirected[name] for edge in ((i, j), (j, i)))
 
 
@@ -171,8 +187,8 @@ def phases_from_offsets(size: int, offsets: dict[tuple[int, int], float]) -> Arr
     Raises
     ------
     ParameterError
-        If the offsets around a loop do not add up to a multiple of 2π (the loop is named), a node is
-        not connected, an edge names a node that is not there, or an offset is not finite.
+        If the offsets around a loop do not add up to a multiple of 2π (the loop is named), a node
+        is not connected, an edge names a node that is not there, or an offset is not finite.
     """
     _check_edges(offsets, size)
     if not np.all(np.isfinite(list(offsets.values()))):
@@ -192,8 +208,9 @@ def phases_from_offsets(size: int, offsets: dict[tuple[int, int], float]) -> Arr
                 loop = _loop_through(parent, i, j)
                 error = float(wrapped(phases[j] + offset - phases[i]))
                 raise ParameterError(
-                    f"phase offsets around the loop {' - '.join(map(str, loop))} add up to {error:.4g} rad "
-                    'instead of a multiple of 2 pi')
+                    f'phase offsets around the loop {" - ".join(map(str, loop))} add up to '
+                    f'{error:.4g} rad instead of a multiple of 2 pi'
+                )
     missing = [i for i in range(size) if i not in phases]
     if missing:
         raise ParameterError(f'nodes {missing} are not connected to node 0')
@@ -203,15 +220,19 @@ def phases_from_offsets(size: int, offsets: dict[tuple[int, int], float]) -> Arr
 def _check_edges(edges: Iterable[tuple[int, int]], size: int) -> None:
     for i, j in edges:
         if not (0 <= i < size and 0 <= j < size and i != j):
-            raise ParameterError(f'edge ({i}, {j}) is not between two of the nodes 0 to {size - 1}')
+            raise ParameterError(
+                f'edge ({i}, {j}) is not between two of the nodes 0 to {size - 1}'
+            )
 
 
 def _loop_through(parent: dict[int, int], i: int, j: int) -> list[int]:
-    """Nodes of the loop that the edge (i, j) closes in the tree, first node repeated at the end."""
+    """Nodes of the loop that the edge (i, j) closes in the tree, first node repeated at the
+    end.
+    """
     up_i, up_j = [i], [j]
     while up_i[-1] != parent[up_i[-1]]:
         up_i.append(parent[up_i[-1]])
     while up_j[-1] not in up_i:
         up_j.append(parent[up_j[-1]])
     common = up_j[-1]
-    return up_i[:up_i.index(common) + 1] + up_j[-2::-1] + [i]
+    return up_i[: up_i.index(common) + 1] + up_j[-2::-1] + [i]

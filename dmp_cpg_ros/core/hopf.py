@@ -1,6 +1,9 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The Andronov-Hopf oscillator, the canonical system of a rhythmic primitive (paper eqs. hopf1, hopf2)."""
+"""The Andronov-Hopf oscillator, the canonical system of a rhythmic primitive (paper eqs.
+
+hopf1, hopf2).
+"""
 
 from __future__ import annotations
 
@@ -76,9 +79,11 @@ class AndronovHopf:
         ndarray (..., 2, 2)
         """
         growth = self.rho * (self.radius**2 - np.sum(x * x, axis=-1))
-        return (np.asarray(omega)[..., None, None] * phase_generator()
-                + growth[..., None, None] * np.eye(2)
-                - 2.0 * self.rho * x[..., :, None] * x[..., None, :])
+        return (
+            np.asarray(omega)[..., None, None] * phase_generator()
+            + growth[..., None, None] * np.eye(2)
+            - 2.0 * self.rho * x[..., :, None] * x[..., None, :]
+        )
 
     def symmetric_eigenvalues(self, x: Array) -> Array:
         """Eigenvalues of A_s: ρ(r² − |x|²) along the flow and ρ(r² − 3|x|²) along the radius.
@@ -89,5 +94,7 @@ class AndronovHopf:
             The larger one first; their supremum over the plane is ρr².
         """
         squared = np.sum(x * x, axis=-1)
-        return np.stack([self.rho * (self.radius**2 - squared),
-                         self.rho * (self.radius**2 - 3.0 * squared)], axis=-1)
+        return np.stack(
+            [self.rho * (self.radius**2 - squared), self.rho * (self.radius**2 - 3.0 * squared)],
+            axis=-1,
+        )

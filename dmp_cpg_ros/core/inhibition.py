@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Sparse inhibition: the switched dynamic g(x_i) = α_i (x_{i,d} − x_i) and what its parameters are (paper, Section 5)."""
+"""Sparse inhibition: the switched dynamic g(x_i) = α_i (x_{i,d} − x_i) and what its parameters
+are (paper, Section 5).
+"""
 
 from __future__ import annotations
 
@@ -20,29 +22,54 @@ Array = NDArray[np.float64]
 class InhibitionParameters(Parameters):
     """Parameters of the inhibition."""
 
-    inhibition_gain: float = parameter(400.0, 'gain k_inh of the inhibition', unit='1/s', minimum=0.0,
-                                       maximum=1e5)
-    region_radius: float = parameter(0.3, 'radius r0 of the region C in which inhibition is switched on',
-                                     minimum=1e-3, maximum=2.0)
-    inhibited_legs: tuple[str, ...] = parameter(('fl',), 'legs whose oscillators are inhibited', choices=LEGS)
-    capture_speed: float = parameter(0.1, 'reference foot speed below which inhibition is armed', unit='m/s',
-                                     minimum=0.0, maximum=10.0)
-    start_inhibited: bool = parameter(True, 'whether the gait starts at rest and waits to be resumed')
-    auto_inhibit: bool = parameter(True, 'whether a zero command stops the gait and a new command resumes it')
-    auto_delay: float = parameter(1.0, 'time of zero command after which auto_inhibit stops the gait', unit='s',
-                                  minimum=0.0, maximum=60.0)
+    inhibition_gain: float = parameter(
+        400.0, 'gain k_inh of the inhibition', unit='1/s', minimum=0.0, maximum=1e5
+    )
+    region_radius: float = parameter(
+        0.3,
+        'radius r0 of the region C in which inhibition is switched on',
+        minimum=1e-3,
+        maximum=2.0,
+    )
+    inhibited_legs: tuple[str, ...] = parameter(
+        ('fl',), 'legs whose oscillators are inhibited', choices=LEGS
+    )
+    capture_speed: float = parameter(
+        0.1,
+        'reference foot speed below which inhibition is armed',
+        unit='m/s',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    start_inhibited: bool = parameter(
+        True, 'whether the gait starts at rest and waits to be resumed'
+    )
+    auto_inhibit: bool = parameter(
+        True, 'whether a zero command stops the gait and a new command resumes it'
+    )
+    auto_delay: float = parameter(
+        1.0,
+        'time of zero command after which auto_inhibit stops the gait',
+        unit='s',
+        minimum=0.0,
+        maximum=60.0,
+    )
 
     def __post_init__(self) -> None:
         """Validate; at least one leg, none twice."""
         super().__post_init__()
         if not self.inhibited_legs or len(set(self.inhibited_legs)) != len(self.inhibited_legs):
-            raise ParameterError(f"inhibited_legs = {list(self.inhibited_legs)} must name one or more of "
-                                 f"{', '.join(LEGS)}, none twice")
+            raise ParameterError(
+                f'inhibited_legs = {list(self.inhibited_legs)} must name one or more of '
+                f'{", ".join(LEGS)}, none twice'
+            )
 
     @property
     def armed_gains(self) -> Array:
         """Gains α_i of the four legs when inhibition is armed, ndarray (4,) [1/s]."""
-        return np.array([self.inhibition_gain if leg in self.inhibited_legs else 0.0 for leg in LEGS])
+        return np.array(
+            [self.inhibition_gain if leg in self.inhibited_legs else 0.0 for leg in LEGS]
+        )
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,13 @@
 
     p = Rx(s₀ q₀) (o + Ry(s₁ q₁) (t + Ry(s₂ q₂) c)),    foot_in_base = hip_in_base + p
 
-with o, t, c the offsets of :class:`~dmp_cpg_ros.core.robot_description.LegGeometry`. Plain floats instead of arrays:
-each function runs for every leg at every tick.
+with o, t, c the offsets of :class:`~dmp_cpg_ros.core.robot_description.LegGeometry`. Plain floats
+instead of arrays: each function runs for every leg at every tick.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import acos, atan2, cos, hypot, sin, sqrt
 
 import numpy as np
@@ -40,17 +41,21 @@ class LegKinematics:
         self._lateral = self._o[1] + self._t[1] + self._c[1]
         self.thigh_length = hypot(self._t[0], self._t[2])
         self.shank_length = hypot(self._c[0], self._c[2])
-        self._thigh_angle = atan2(-self._t[0], -self._t[2])    # about +y, from straight down
+        self._thigh_angle = atan2(-self._t[0], -self._t[2])  # about +y, from straight down
         self._shank_angle = atan2(-self._c[0], -self._c[2])
-        self._reach = (abs(self.thigh_length - self.shank_length) + 1e-3,
-                       self.thigh_length + self.shank_length - 1e-3)
+        self._reach = (
+            abs(self.thigh_length - self.shank_length) + 1e-3,
+            self.thigh_length + self.shank_length - 1e-3,
+        )
 
     @property
     def lateral_offset(self) -> float:
-        """Sideways distance from the abduction axis to the leg's plane [m], positive to the left."""
+        """Sideways distance from the abduction axis to the leg's plane [m], positive to the
+        left.
+        """
         return self._lateral
 
-    def foot_in_base(self, q: ArrayLike) -> Array:
+    def foot_in_base(self, q: Array | Sequence[float]) -> Array:
         """Position of the foot's centre.
 
         Parameters
@@ -66,7 +71,7 @@ class LegKinematics:
         x, y, z, *_ = self._chain(q)
         return np.array((self._hip[0] + x, self._hip[1] + y, self._hip[2] + z))
 
-    def jacobian_in_base(self, q: ArrayLike) -> Array:
+    def jacobian_in_base(self, q: Array | Sequence[float]) -> Array:
         """Jacobian of :meth:`foot_in_base`.
 
         Returns
@@ -76,13 +81,17 @@ class LegKinematics:
         """
         x, y, z, reach_x, reach_z, shank_x, shank_z, s0, c0 = self._chain(q)
         sign_0, sign_1, sign_2 = self._s
-        return np.array((
-            (0.0, sign_1 * reach_z, sign_2 * shank_z),
-            (-sign_0 * z, sign_1 * s0 * reach_x, sign_2 * s0 * shank_x),
-            (sign_0 * y, -sign_1 * c0 * reach_x, -sign_2 * c0 * shank_x)))
+        return np.array(
+            (
+                (0.0, sign_1 * reach_z, sign_2 * shank_z),
+                (-sign_0 * z, sign_1 * s0 * reach_x, sign_2 * s0 * shank_x),
+                (sign_0 * y, -sign_1 * c0 * reach_x, -sign_2 * c0 * shank_x),
+            )
+        )
 
     def inverse(self, foot_in_base: ArrayLike) -> Array:
-        """Joint angles that bring the foot to a point; a point out of reach is brought to the nearest reach.
+        """Joint angles that bring the foot to a point; a point out of reach is brought to the
+        nearest reach.
 
         The solution bends the knee the way of ``geometry.knee_sign`` with the foot below the hip.
 
@@ -112,8 +121,8 @@ class LegKinematics:
         q2 = knee - self._shank_angle + self._thigh_angle
         return np.array((self._s[0] * q0, self._s[1] * _wrapped(q1), self._s[2] * _wrapped(q2)))
 
-    def _chain(self, q: ArrayLike) -> tuple[float, ...]:
-        q0, q1, q2 = q.tolist() if isinstance(q, np.ndarray) else q  # type: ignore[misc]
+    def _chain(self, q: Array | Sequence[float]) -> tuple[float, ...]:
+        q0, q1, q2 = q.tolist() if isinstance(q, np.ndarray) else q
         s0, c0 = sin(self._s[0] * q0), cos(self._s[0] * q0)
         angle_1 = self._s[1] * q1
         s1, c1 = sin(angle_1), cos(angle_1)
@@ -124,8 +133,17 @@ class LegKinematics:
         reach_x = c1 * self._t[0] + s1 * self._t[2] + shank_x
         reach_z = c1 * self._t[2] - s1 * self._t[0] + shank_z
         plane_x, plane_y, plane_z = self._o[0] + reach_x, self._lateral, self._o[2] + reach_z
-        return (plane_x, c0 * plane_y - s0 * plane_z, s0 * plane_y + c0 * plane_z,
-                reach_x, reach_z, shank_x, shank_z, s0, c0)
+        return (
+            plane_x,
+            c0 * plane_y - s0 * plane_z,
+            s0 * plane_y + c0 * plane_z,
+            reach_x,
+            reach_z,
+            shank_x,
+            shank_z,
+            s0,
+            c0,
+        )
 
 
 def _wrapped(angle: float) -> float:

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """One leg's rhythmic primitive: oscillator state and reference in, joint targets out.
 
-The goals g_θ(x_i, r), g_θ̇(x_i, r) are the foot path through the leg's inverse kinematics and Jacobian.
+The goals g_θ(x_i, r), g_θ̇(x_i, r) are the foot path through the leg's inverse kinematics and
+Jacobian.
 """
 
 from __future__ import annotations
@@ -30,18 +31,34 @@ Array = NDArray[np.float64]
 class LegParameters(Parameters):
     """Parameters of a leg's transformation systems."""
 
-    stiffness: float = parameter(6400.0, 'stiffness k of the transformation system', unit='1/s^2',
-                                 minimum=1.0, maximum=1e6)
-    damping: float = parameter(160.0, 'damping b of the transformation system', unit='1/s', minimum=0.1,
-                               maximum=1e4)
-    reading: str = parameter('kinematic', 'whether the joint follows the primitive or receives its torque',
-                             choices=('kinematic', 'torque'))
-    clearance: float = parameter(0.2, 'height of the swing as a fraction of the standing height',
-                                 minimum=0.0, maximum=0.6)
-    activity_rate: float = parameter(12.0, 'rate at which the swing height follows the phase speed',
-                                     unit='1/s', minimum=0.1, maximum=1e3)
-    placement_rate: float = parameter(25.0, 'rate at which a swinging foot follows its placement shift',
-                                      unit='1/s', minimum=0.1, maximum=1e3)
+    stiffness: float = parameter(
+        6400.0, 'stiffness k of the transformation system', unit='1/s^2', minimum=1.0, maximum=1e6
+    )
+    damping: float = parameter(
+        160.0, 'damping b of the transformation system', unit='1/s', minimum=0.1, maximum=1e4
+    )
+    reading: str = parameter(
+        'kinematic',
+        'whether the joint follows the primitive or receives its torque',
+        choices=('kinematic', 'torque'),
+    )
+    clearance: float = parameter(
+        0.2, 'height of the swing as a fraction of the standing height', minimum=0.0, maximum=0.6
+    )
+    activity_rate: float = parameter(
+        12.0,
+        'rate at which the swing height follows the phase speed',
+        unit='1/s',
+        minimum=0.1,
+        maximum=1e3,
+    )
+    placement_rate: float = parameter(
+        25.0,
+        'rate at which a swinging foot follows its placement shift',
+        unit='1/s',
+        minimum=0.1,
+        maximum=1e3,
+    )
 
 
 @dataclass(frozen=True)
@@ -78,8 +95,9 @@ class LegPrimitive:
         Gains and swing.
     """
 
-    def __init__(self, leg: str, description: RobotDescription, gait: Gait,
-                 parameters: LegParameters) -> None:
+    def __init__(
+        self, leg: str, description: RobotDescription, gait: Gait, parameters: LegParameters
+    ) -> None:
         """Derive foothold and scale from the description."""
         self.parameters, self.gait = parameters, gait
         geometry = description.legs[LEGS.index(leg)]
@@ -88,16 +106,27 @@ class LegPrimitive:
         self.foothold_in_base = nominal_foothold(description, leg)
         self.rolling = rolling_share(self.kinematics, self.foothold_in_base)
         self.clearance = parameters.clearance * description.stance_height
-        self.transformation = TransformationSystem(parameters.stiffness, parameters.damping,
-                                                   np.asarray(geometry.rotor_inertia, dtype=float))
+        self.transformation = TransformationSystem(
+            parameters.stiffness,
+            parameters.damping,
+            np.asarray(geometry.rotor_inertia, dtype=float),
+        )
 
     def initial_state(self) -> LegState:
         """State of a leg that stands at its foothold."""
         q = self.kinematics.inverse(self.foothold_in_base)
         return LegState(TransformationState(q, np.zeros(3)), 0.0, np.zeros(2))
 
-    def step(self, state: LegState, x: Array, x_dot: Array, r: Array, shift_in_base: Array,
-             correction: Array, dt: float) -> tuple[LegState, Array, Array]:
+    def step(
+        self,
+        state: LegState,
+        x: Array,
+        x_dot: Array,
+        r: Array,
+        shift_in_base: Array,
+        correction: Array,
+        dt: float,
+    ) -> tuple[LegState, Array, Array]:
         """Advance the leg to the time at which the inputs hold.
 
         Parameters
@@ -134,8 +163,16 @@ class LegPrimitive:
         shift_rate = (shift_in_base - state.shift_in_base) * (share / dt if dt > 0.0 else 0.0)
         shift = state.shift_in_base + shift_rate * dt
         more_x, more_y, more_gamma = correction.tolist()
-        path = FootPath(self.foothold_in_base, v_x + more_x, v_y + more_y, gamma + more_gamma, omega, duty,
-                        activity * self.clearance, self.rolling)
+        path = FootPath(
+            self.foothold_in_base,
+            v_x + more_x,
+            v_y + more_y,
+            gamma + more_gamma,
+            omega,
+            duty,
+            activity * self.clearance,
+            self.rolling,
+        )
         foot, slope = path.at(position)
         velocity = slope * (rate / (2.0 * pi))
         foot[:2] += shift
@@ -145,8 +182,14 @@ class LegPrimitive:
         joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, shift), goal, goal_velocity
 
-    def targets(self, state: LegState, goal: Array, goal_velocity: Array, feedback: Array,
-                measured: TransformationState | None = None) -> JointTargets:
+    def targets(
+        self,
+        state: LegState,
+        goal: Array,
+        goal_velocity: Array,
+        feedback: Array,
+        measured: TransformationState | None = None,
+    ) -> JointTargets:
         """Joint targets of the parameters' reading.
 
         Parameters
@@ -165,9 +208,12 @@ class LegPrimitive:
         JointTargets
         """
         joints = state.joints if measured is None else measured
-        acceleration = self.transformation.acceleration(joints.position, joints.velocity, goal, goal_velocity)
-        return JointTargets(joints.position, joints.velocity,
-                            self.transformation.torque(acceleration, feedback))
+        acceleration = self.transformation.acceleration(
+            joints.position, joints.velocity, goal, goal_velocity
+        )
+        return JointTargets(
+            joints.position, joints.velocity, self.transformation.torque(acceleration, feedback)
+        )
 
 
 def body_scale(description: RobotDescription) -> BodyScale:
@@ -178,7 +224,8 @@ def body_scale(description: RobotDescription) -> BodyScale:
 
 
 def nominal_foothold(description: RobotDescription, leg: str) -> Array:
-    """Foot centre at mid-stance: under the hip, shifted so that the feet are around the centre of mass.
+    """Foot centre at mid-stance: under the hip, shifted so that the feet are around the centre
+    of mass.
 
     Returns
     -------
@@ -199,7 +246,10 @@ def _joint_velocity(J: Array, velocity: Array) -> Array:
     minor_0, minor_1, minor_2 = e * i - f * h, f * g - d * i, d * h - e * g
     determinant = a * minor_0 + b * minor_1 + c * minor_2
     inverse = determinant / (determinant * determinant + 1e-12)
-    return np.array((
-        (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
-        (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
-        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse))
+    return np.array(
+        (
+            (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
+            (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
+            (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse,
+        )
+    )

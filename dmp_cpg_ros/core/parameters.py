@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters as fields of frozen dataclasses: description, unit and range in one place.
 
-A class that derives from :class:`Parameters` validates itself when it is made, and the ROS layer declares its
-node parameters from the same fields.
+A class that derives from :class:`Parameters` validates itself when it is made, and the ROS layer
+declares its node parameters from the same fields.
 """
 
 from __future__ import annotations
@@ -18,8 +18,15 @@ from dmp_cpg_ros.core.errors import ParameterError
 P = TypeVar('P', bound='Parameters')
 
 
-def parameter(default: Any, description: str, *, unit: str = '', minimum: float | None = None,
-              maximum: float | None = None, choices: tuple[str, ...] = ()) -> Any:
+def parameter(
+    default: Any,
+    description: str,
+    *,
+    unit: str = '',
+    minimum: float | None = None,
+    maximum: float | None = None,
+    choices: tuple[str, ...] = (),
+) -> Any:
     """Describe one parameter.
 
     Parameters
@@ -40,9 +47,16 @@ def parameter(default: Any, description: str, *, unit: str = '', minimum: float 
     dataclasses.Field
         For use as a default in a class body.
     """
-    return dataclasses.field(default=default, metadata={
-        'description': description, 'unit': unit, 'minimum': minimum, 'maximum': maximum,
-        'choices': choices})
+    return dataclasses.field(
+        default=default,
+        metadata={
+            'description': description,
+            'unit': unit,
+            'minimum': minimum,
+            'maximum': maximum,
+            'choices': choices,
+        },
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +81,8 @@ class Parameters:
         for name in values:
             if name not in names:
                 raise ParameterError(
-                    f"{where}: there is no parameter '{name}'; valid are {', '.join(names)}")
+                    f"{where}: there is no parameter '{name}'; valid are {', '.join(names)}"
+                )
         return cls(**values)
 
 
@@ -91,7 +106,7 @@ def _checked_scalar(field: dataclasses.Field[Any], like: Any, value: Any) -> Any
     if isinstance(like, str):
         choices = field.metadata.get('choices', ())
         if not isinstance(value, str) or (choices and value not in choices):
-            valid = f"one of {', '.join(choices)}" if choices else 'text'
+            valid = f'one of {", ".join(choices)}' if choices else 'text'
             raise ParameterError(f"parameter '{name}' must be {valid}, not {value!r}")
         return value
     if isinstance(like, int) and not (isinstance(value, int) and not isinstance(value, bool)):
@@ -99,10 +114,15 @@ def _checked_scalar(field: dataclasses.Field[Any], like: Any, value: Any) -> Any
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ParameterError(f"parameter '{name}' must be a number, not {value!r}")
     low, high = field.metadata.get('minimum'), field.metadata.get('maximum')
-    if not math.isfinite(value) or (low is not None and value < low) or (
-            high is not None and value > high):
+    if (
+        not math.isfinite(value)
+        or (low is not None and value < low)
+        or (high is not None and value > high)
+    ):
         low_text = '-inf' if low is None else f'{low:g}'
         high_text = 'inf' if high is None else f'{high:g}'
-        raise ParameterError(f"parameter '{name}' = {value!r} {unit} is outside its range "
-                             f'[{low_text}, {high_text}] {unit}'.replace('  ', ' ').rstrip())
+        raise ParameterError(
+            f"parameter '{name}' = {value!r} {unit} is outside its range "
+            f'[{low_text}, {high_text}] {unit}'.replace('  ', ' ').rstrip()
+        )
     return value if isinstance(like, int) else float(value)

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Phase of an oscillator state: the one place that knows the direction of rotation.
 
-With the signs that the paper prints (eqs. hopf1, hopf2) the state turns clockwise. The phase is defined as
-φ = atan2(−x₂, x₁), so that it *grows* at the rate ω on the limit cycle; φ = 0 is the paper's x_d = [1, 0].
+With the signs that the paper prints (eqs. hopf1, hopf2) the state turns clockwise. The phase is
+defined as φ = atan2(−x₂, x₁), so that it *grows* at the rate ω on the limit cycle; φ = 0 is the
+paper's x_d = [1, 0].
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def state_at(phi: ArrayLike, radius: ArrayLike = 1.0) -> Array:
     -------
     ndarray (..., 2)
     """
-    phi = np.asarray(phi, dtype=float)
+    phi, radius = np.asarray(phi, dtype=float), np.asarray(radius, dtype=float)
     return np.stack([radius * np.cos(phi), -radius * np.sin(phi)], axis=-1)
 
 

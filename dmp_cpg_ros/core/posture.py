@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Virtual model control of the body: feedback torques and foot placement.
 
-Virtual springs and dampers hold the base at its height, level, and at the reference velocity (Pratt et al. 2001;
-Ajallooeian et al. 2013, as the paper's experiment). Their wrench is shared by the stance feet
-(:mod:`~dmp_cpg_ros.core.force_distribution`) and becomes joint torques τ_fb = −Jᵀ f. Swinging feet are placed further
-along a velocity that exceeds the reference (Raibert 1986), and a slow loop corrects the velocity with which the
-stance feet move, so that speed and heading are kept without a steady error.
+Virtual springs and dampers hold the base at its height, level, and at the reference velocity
+(Pratt et al. 2001; Ajallooeian et al. 2013, as the paper's experiment). Their wrench is shared by
+the stance feet (:mod:`~dmp_cpg_ros.core.force_distribution`) and becomes joint torques τ_fb = −Jᵀ
+f. Swinging feet are placed further along a velocity that exceeds the reference (Raibert 1986), and
+a slow loop corrects the velocity with which the stance feet move, so that speed and heading are
+kept without a steady error.
 """
 
 from __future__ import annotations
@@ -34,36 +35,74 @@ Array = NDArray[np.float64]
 class PostureParameters(Parameters):
     """Gains of the virtual model, per unit of mass or inertia: squares and products of rates."""
 
-    height_stiffness: float = parameter(80.0, 'virtual spring of the height, per mass', unit='1/s^2',
-                                        minimum=0.0, maximum=1e4)
-    height_damping: float = parameter(12.0, 'virtual damper of the height, per mass', unit='1/s',
-                                      minimum=0.0, maximum=1e3)
-    attitude_stiffness: float = parameter(150.0, 'virtual spring of roll and pitch, per inertia',
-                                          unit='1/s^2', minimum=0.0, maximum=1e4)
-    attitude_damping: float = parameter(15.0, 'virtual damper of roll and pitch, per inertia', unit='1/s',
-                                        minimum=0.0, maximum=1e3)
-    velocity_gain: float = parameter(4.0, 'force per mass and error of horizontal velocity', unit='1/s',
-                                     minimum=0.0, maximum=1e3)
-    yaw_rate_gain: float = parameter(8.0, 'moment per inertia and error of the turn rate', unit='1/s',
-                                     minimum=0.0, maximum=1e3)
-    friction: float = parameter(0.6, 'friction coefficient that the forces respect', minimum=0.05,
-                                maximum=2.0)
-    load_transfer: float = parameter(0.08, 'fraction of the cycle over which a foot takes and gives load',
-                                     minimum=0.001, maximum=0.3)
-    placement_gain: float = parameter(0.12, 'foot placement per error of horizontal velocity', unit='s',
-                                      minimum=0.0, maximum=1.0)
-    placement_limit: float = parameter(0.12, 'largest foot placement shift', unit='m', minimum=0.0,
-                                       maximum=0.5)
-    speed_integral: float = parameter(0.8, 'rate at which the stance velocity is corrected by the velocity error',
-                                      unit='1/s', minimum=0.0, maximum=10.0)
-    speed_correction_limit: float = parameter(0.2, 'largest correction of the stance velocity, as a fraction of '
-                                              'the speed, at least of 0.5 m/s', minimum=0.0, maximum=1.0)
-    heading_gain: float = parameter(1.5, 'turn rate per error of heading', unit='1/s', minimum=0.0,
-                                    maximum=20.0)
-    heading_limit: float = parameter(0.3, 'largest error of heading that is remembered', unit='rad',
-                                     minimum=0.0, maximum=1.5)
-    activity_rate: float = parameter(12.0, 'rate at which planned swings fade when the phase stops',
-                                     unit='1/s', minimum=0.1, maximum=1e3)
+    height_stiffness: float = parameter(
+        80.0, 'virtual spring of the height, per mass', unit='1/s^2', minimum=0.0, maximum=1e4
+    )
+    height_damping: float = parameter(
+        12.0, 'virtual damper of the height, per mass', unit='1/s', minimum=0.0, maximum=1e3
+    )
+    attitude_stiffness: float = parameter(
+        150.0,
+        'virtual spring of roll and pitch, per inertia',
+        unit='1/s^2',
+        minimum=0.0,
+        maximum=1e4,
+    )
+    attitude_damping: float = parameter(
+        15.0, 'virtual damper of roll and pitch, per inertia', unit='1/s', minimum=0.0, maximum=1e3
+    )
+    velocity_gain: float = parameter(
+        4.0,
+        'force per mass and error of horizontal velocity',
+        unit='1/s',
+        minimum=0.0,
+        maximum=1e3,
+    )
+    yaw_rate_gain: float = parameter(
+        8.0, 'moment per inertia and error of the turn rate', unit='1/s', minimum=0.0, maximum=1e3
+    )
+    friction: float = parameter(
+        0.6, 'friction coefficient that the forces respect', minimum=0.05, maximum=2.0
+    )
+    load_transfer: float = parameter(
+        0.08,
+        'fraction of the cycle over which a foot takes and gives load',
+        minimum=0.001,
+        maximum=0.3,
+    )
+    placement_gain: float = parameter(
+        0.12, 'foot placement per error of horizontal velocity', unit='s', minimum=0.0, maximum=1.0
+    )
+    placement_limit: float = parameter(
+        0.12, 'largest foot placement shift', unit='m', minimum=0.0, maximum=0.5
+    )
+    speed_integral: float = parameter(
+        0.8,
+        'rate at which the stance velocity is corrected by the velocity error',
+        unit='1/s',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    speed_correction_limit: float = parameter(
+        0.2,
+        'largest correction of the stance velocity, as a fraction of '
+        'the speed, at least of 0.5 m/s',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    heading_gain: float = parameter(
+        1.5, 'turn rate per error of heading', unit='1/s', minimum=0.0, maximum=20.0
+    )
+    heading_limit: float = parameter(
+        0.3, 'largest error of heading that is remembered', unit='rad', minimum=0.0, maximum=1.5
+    )
+    activity_rate: float = parameter(
+        12.0,
+        'rate at which planned swings fade when the phase stops',
+        unit='1/s',
+        minimum=0.1,
+        maximum=1e3,
+    )
 
 
 @dataclass(frozen=True)
@@ -120,7 +159,9 @@ class PostureController:
         Gains.
     """
 
-    def __init__(self, description: RobotDescription, gait: Gait, parameters: PostureParameters) -> None:
+    def __init__(
+        self, description: RobotDescription, gait: Gait, parameters: PostureParameters
+    ) -> None:
         """Scale the virtual model by the robot's mass and inertia."""
         self.description, self.gait, self.parameters = description, gait, parameters
         self.kinematics = [LegKinematics(leg) for leg in description.legs]
@@ -133,8 +174,9 @@ class PostureController:
         """State of a robot that stands."""
         return PostureState(np.zeros(len(self.kinematics)), np.zeros(2), 0.0, float('nan'))
 
-    def step(self, memory: PostureState, state: RobotState, x: Array, x_dot: Array, r: Array,
-             dt: float) -> tuple[PostureState, PostureFeedback]:
+    def step(
+        self, memory: PostureState, state: RobotState, x: Array, x_dot: Array, r: Array, dt: float
+    ) -> tuple[PostureState, PostureFeedback]:
         """Compute the feedback of one tick.
 
         Parameters
@@ -165,12 +207,17 @@ class PostureController:
         memory = self._corrected(memory, activity, state, velocity, r, dt)
         rate = R_level_base @ state.base_rate_in_base
         q = state.joint_position.reshape(4, 3).tolist()
-        feet_in_base = np.array([leg.foot_in_base(angles) for leg, angles in zip(
-            self.kinematics, q, strict=True)])
-        feet = (feet_in_base - self.description.com_in_base) @ R_level_base.T      # from the COM, levelled
+        feet_in_base = np.array(
+            [leg.foot_in_base(angles) for leg, angles in zip(self.kinematics, q, strict=True)]
+        )
+        feet = (
+            feet_in_base - self.description.com_in_base
+        ) @ R_level_base.T  # from the COM, levelled
         wrench = self._wrench(R_level_base, velocity, rate, feet, load, r)
         forces = distribute(wrench, feet, load, p.friction, 2.0 * self.description.mass * GRAVITY)
-        J = np.array([leg.jacobian_in_base(angles) for leg, angles in zip(self.kinematics, q, strict=True)])
+        J = np.array(
+            [leg.jacobian_in_base(angles) for leg, angles in zip(self.kinematics, q, strict=True)]
+        )
         torque = -np.einsum('lij,li->lj', J, forces @ R_level_base)
         torque = np.clip(torque, -self.torque_limit, self.torque_limit).ravel()
         shift = p.placement_gain * np.array((velocity[0] - r[0], velocity[1] - r[1]))
@@ -178,12 +225,24 @@ class PostureController:
         if length > p.placement_limit:
             shift *= p.placement_limit / length
         moving = float(activity.mean())
-        correction = np.array((moving * memory.correction[0], moving * memory.correction[1],
-                               moving * p.heading_gain * memory.heading_error))
+        correction = np.array(
+            (
+                moving * memory.correction[0],
+                moving * memory.correction[1],
+                moving * p.heading_gain * memory.heading_error,
+            )
+        )
         return memory, PostureFeedback(torque, np.tile(shift, (4, 1)), correction)
 
-    def _corrected(self, memory: PostureState, activity: Array, state: RobotState, velocity: Array, r: Array,
-                   dt: float) -> PostureState:
+    def _corrected(
+        self,
+        memory: PostureState,
+        activity: Array,
+        state: RobotState,
+        velocity: Array,
+        r: Array,
+        dt: float,
+    ) -> PostureState:
         """Integrate the errors of speed and heading while the legs move; forget them at rest."""
         p = self.parameters
         x, y, z, w = state.base_quaternion.tolist()
@@ -191,35 +250,49 @@ class PostureController:
         moving = float(activity.mean())
         limit = p.speed_correction_limit * max(float(np.hypot(r[0], r[1])), 0.5)
         wanted = memory.correction + (p.speed_integral * moving * dt) * (r[:2] - velocity[:2])
-        correction = np.clip(wanted, -limit, limit) * np.exp(-(1.0 - moving) * p.activity_rate * dt)
+        correction = np.clip(wanted, -limit, limit) * np.exp(
+            -(1.0 - moving) * p.activity_rate * dt
+        )
         turned = 0.0 if isnan(memory.yaw) else float(wrapped(yaw - memory.yaw))
         heading_error = (memory.heading_error + float(r[2]) * dt - turned) * moving
         heading_error = min(max(heading_error, -p.heading_limit), p.heading_limit)
         return PostureState(activity, correction, heading_error, yaw)
 
     def _load(self, cycle_position: Array, duty: float, activity: Array) -> Array:
-        """Share of the load that each foot may take, in [0, 1]: a trapezoid over the planned stance."""
+        """Share of the load that each foot may take, in [0, 1]: a trapezoid over the planned
+        stance.
+        """
         into_stance = np.abs(cycle_position) - 0.5 * (1.0 - duty)
         planned = np.clip(into_stance / self.parameters.load_transfer, 0.0, 1.0)
         return np.maximum(planned, 1.0 - activity)
 
-    def _wrench(self, R_level_base: Array, velocity: Array, rate: Array, feet: Array, load: Array,
-                r: Array) -> Array:
+    def _wrench(
+        self, R_level_base: Array, velocity: Array, rate: Array, feet: Array, load: Array, r: Array
+    ) -> Array:
         """Force and moment about the centre of mass in the levelled base frame, ndarray (6,)."""
         p, m = self.parameters, self.description.mass
         total = load.sum()
         ground = float(load @ feet[:, 2]) / total if total > 1e-6 else float(feet[:, 2].min())
         height = self.foot_radius - ground
         wanted = self.description.stance_height + float(self.description.com_in_base[2])
-        roll, pitch = R_level_base[2, 1], -R_level_base[2, 0]      # small-angle axes of the tilt
+        roll, pitch = R_level_base[2, 1], -R_level_base[2, 0]  # small-angle axes of the tilt
         moment_x = self.inertia[0] * (-p.attitude_stiffness * roll - p.attitude_damping * rate[0])
         moment_y = self.inertia[1] * (-p.attitude_stiffness * pitch - p.attitude_damping * rate[1])
-        return np.array((
-            m * p.velocity_gain * (r[0] - velocity[0]),
-            m * p.velocity_gain * (r[1] - velocity[1]),
-            m * (GRAVITY + p.height_stiffness * (wanted - height) - p.height_damping * velocity[2]),
-            moment_x, moment_y,
-            self.inertia[2] * p.yaw_rate_gain * (r[2] - rate[2])))
+        return np.array(
+            (
+                m * p.velocity_gain * (r[0] - velocity[0]),
+                m * p.velocity_gain * (r[1] - velocity[1]),
+                m
+                * (
+                    GRAVITY
+                    + p.height_stiffness * (wanted - height)
+                    - p.height_damping * velocity[2]
+                ),
+                moment_x,
+                moment_y,
+                self.inertia[2] * p.yaw_rate_gain * (r[2] - rate[2]),
+            )
+        )
 
 
 def level_from_base(quaternion: Array) -> Array:
@@ -239,7 +312,11 @@ def level_from_base(quaternion: Array) -> Array:
     z_world = np.array((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))
     forward = np.array((1.0, 0.0, 0.0)) - z_world[0] * z_world
     forward /= np.sqrt(forward @ forward) + 1e-12
-    left = np.array((z_world[1] * forward[2] - z_world[2] * forward[1],
-                     z_world[2] * forward[0] - z_world[0] * forward[2],
-                     z_world[0] * forward[1] - z_world[1] * forward[0]))
+    left = np.array(
+        (
+            z_world[1] * forward[2] - z_world[2] * forward[1],
+            z_world[2] * forward[0] - z_world[0] * forward[2],
+            z_world[0] * forward[1] - z_world[1] * forward[0],
+        )
+    )
     return np.stack((forward, left, z_world))

@@ -1,8 +1,9 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The reference system: commanded speed and turn rate through first-order filters (paper, Section 5).
+"""The reference system: commanded speed and turn rate through first-order filters (paper,
+Section 5).
 
-    v̇ = α_r (v_ext − v),   γ̇ = α_r (γ_ext − γ)
+v̇ = α_r (v_ext − v),   γ̇ = α_r (γ_ext − γ)
 """
 
 from __future__ import annotations
@@ -22,19 +23,30 @@ Array = NDArray[np.float64]
 class ReferenceParameters(Parameters):
     """Parameters of the reference system."""
 
-    alpha_r: float = parameter(3.0, 'rate of the reference filters', unit='1/s', minimum=0.05, maximum=50.0)
-    max_speed: float = parameter(1.0, 'largest forward speed that is accepted', unit='m/s', minimum=0.0,
-                                 maximum=10.0)
-    max_lateral_speed: float = parameter(0.4, 'largest sideways speed that is accepted', unit='m/s',
-                                         minimum=0.0, maximum=10.0)
-    max_turn_rate: float = parameter(1.2, 'largest turn rate that is accepted', unit='rad/s', minimum=0.0,
-                                     maximum=10.0)
-    cmd_vel_timeout: float = parameter(0.5, 'silence of cmd_vel after which the command is zero; 0: never',
-                                       unit='s', minimum=0.0, maximum=3600.0)
+    alpha_r: float = parameter(
+        3.0, 'rate of the reference filters', unit='1/s', minimum=0.05, maximum=50.0
+    )
+    max_speed: float = parameter(
+        1.0, 'largest forward speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
+    )
+    max_lateral_speed: float = parameter(
+        0.4, 'largest sideways speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
+    )
+    max_turn_rate: float = parameter(
+        1.2, 'largest turn rate that is accepted', unit='rad/s', minimum=0.0, maximum=10.0
+    )
+    cmd_vel_timeout: float = parameter(
+        0.5,
+        'silence of cmd_vel after which the command is zero; 0: never',
+        unit='s',
+        minimum=0.0,
+        maximum=3600.0,
+    )
 
 
 class CommandGate:
-    """The external command r_ext: checked, limited, and zero when its source falls silent or the gait is stopped.
+    """The external command r_ext: checked, limited, and zero when its source falls silent or
+    the gait is stopped.
 
     Parameters
     ----------
@@ -63,10 +75,15 @@ class CommandGate:
             If a value is not finite; the former command stays.
         """
         if not np.all(np.isfinite((v_x, v_y, gamma))):
-            raise DataError(f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite')
+            raise DataError(
+                f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite'
+            )
         p = self.parameters
-        self._command = (_limited(v_x, p.max_speed), _limited(v_y, p.max_lateral_speed),
-                         _limited(gamma, p.max_turn_rate))
+        self._command = (
+            _limited(v_x, p.max_speed),
+            _limited(v_y, p.max_lateral_speed),
+            _limited(gamma, p.max_turn_rate),
+        )
         self._fresh = True
 
     def at(self, time_ns: int) -> tuple[float, float, float]:

@@ -24,13 +24,13 @@ class LegGeometry:
     hip_in_base : ndarray (3,)
         Anchor of the abduction joint in ``base_link`` [m].
     hip_offset, thigh, shank : ndarray (3,)
-        Abduction joint → hip joint, hip joint → knee joint, knee joint → centre of the foot's contact
-        sphere, each in the frame of its link with all joints at zero [m].
+        Abduction joint → hip joint, hip joint → knee joint, knee joint → centre of the foot's
+        contact sphere, each in the frame of its link with all joints at zero [m].
     axis_sign : ndarray (3,)
         +1 or −1: whether each joint turns about +x / +y or −x / −y.
     knee_sign : int
-        Sign of the rotation about +y that takes the thigh's direction to the shank's in the home pose:
-        −1 for knees that bend backwards (the shank swung forwards), +1 for the other way.
+        Sign of the rotation about +y that takes the thigh's direction to the shank's in the home
+        pose: −1 for knees that bend backwards (the shank swung forwards), +1 for the other way.
     position_lower, position_upper : ndarray (3,)
         Joint limits [rad].
     torque_limit, velocity_limit : ndarray (3,)
@@ -69,7 +69,8 @@ class RobotDescription:
     mass : float
         Total mass [kg].
     base_inertia : ndarray (3, 3)
-        Inertia of the whole robot about its centre of mass in the home pose, in ``base_link`` [kg m^2].
+        Inertia of the whole robot about its centre of mass in the home pose, in ``base_link`` [kg
+        m^2].
     com_in_base : ndarray (3,)
         Centre of mass in ``base_link`` in the home pose [m].
     stance_height : float

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenarios: what is asked of the robot, and when on the robot's clock.
 
-A scenario is a list of events. A command event holds until the next one and is repeated like a joystick does, so that
-a timeout of cmd_vel can be tried by ``command: silence``.
+A scenario is a list of events. A command event holds until the next one and is repeated like a
+joystick does, so that a timeout of cmd_vel can be tried by ``command: silence``.
 """
 
 from __future__ import annotations
@@ -74,22 +74,34 @@ class Scenario:
         Raises
         ------
         DataError
-            If a key is missing or unknown, or a value cannot be used; the text says which and what is valid.
+            If a key is missing or unknown, or a value cannot be used; the text says which and what
+            is valid.
         """
         _known(values, ('name', 'duration', 'events', 'parameters'), where)
         try:
             duration = float(values['duration'])
             entries = list(values['events'])
         except (KeyError, TypeError, ValueError) as error:
-            raise DataError(f'{where} needs duration (a number of seconds) and events (a list): {error}') from error
+            raise DataError(
+                f'{where} needs duration (a number of seconds) and events (a list): {error}'
+            ) from error
         if not 0.0 < duration <= 86400.0:
             raise DataError(f'{where}: duration = {duration} s must be positive and at most a day')
-        parsed = [_event(entry, f'{where}, event {place + 1}') for place, entry in enumerate(entries)]
+        parsed = [
+            _event(entry, f'{where}, event {place + 1}') for place, entry in enumerate(entries)
+        ]
         times = [at for at, _, _ in parsed]
         if times != sorted(times) or (times and times[-1] > duration):
-            raise DataError(f'{where}: the times of the events must increase and lie within the duration')
-        return cls(str(values.get('name', 'scenario')), duration, tuple((at, what) for at, what, _ in parsed),
-                   tuple(label for _, _, label in parsed), dict(values.get('parameters') or {}))
+            raise DataError(
+                f'{where}: the times of the events must increase and lie within the duration'
+            )
+        return cls(
+            str(values.get('name', 'scenario')),
+            duration,
+            tuple((at, what) for at, what, _ in parsed),
+            tuple(label for _, _, label in parsed),
+            dict(values.get('parameters') or {}),
+        )
 
     def timeline(self, tick_ns: int) -> tuple[Action, ...]:
         """All actions in order, each at the first tick that is not before its time."""
@@ -106,8 +118,13 @@ class Scenario:
             if what is None:
                 continue
             for repeated in range(time_ns, max(ends[begun], time_ns + 1), COMMAND_PERIOD_NS):
-                actions.append(Action(_tick_after(repeated, tick_ns), command=what,
-                                      label=label if repeated == time_ns else ''))
+                actions.append(
+                    Action(
+                        _tick_after(repeated, tick_ns),
+                        command=what,
+                        label=label if repeated == time_ns else '',
+                    )
+                )
         return tuple(sorted(actions, key=lambda action: action.time_ns))
 
     def ticks(self, tick_ns: int) -> int:
@@ -115,8 +132,13 @@ class Scenario:
         return _tick_after(round(self.duration_s * 1e9), tick_ns) // tick_ns
 
 
-def play(scenario: Scenario, tick_ns: int, step: Callable[[], RobotState], command: Callable[[Command], None],
-         inhibit: Callable[[bool], None]) -> None:
+def play(
+    scenario: Scenario,
+    tick_ns: int,
+    step: Callable[[], RobotState],
+    command: Callable[[Command], None],
+    inhibit: Callable[[bool], None],
+) -> None:
     """Play a scenario on the plain loop.
 
     Parameters
@@ -154,7 +176,7 @@ def _event(entry: Any, where: str) -> tuple[float, Command | bool | None, str]:
         raise DataError(f'{where}: at = {at} s must lie between 0 and a day')
     if 'inhibit' in entry:
         if not isinstance(entry['inhibit'], bool):
-            raise DataError(f"{where}: inhibit must be true or false, not {entry['inhibit']!r}")
+            raise DataError(f'{where}: inhibit must be true or false, not {entry["inhibit"]!r}')
         return at, entry['inhibit'], label or ('inhibit' if entry['inhibit'] else 'resume')
     if entry['command'] == 'silence':
         return at, None, label or 'silence'

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """When will it be at rest, when will it be walking: the model run ahead of the robot.
 
-The canonical system and the reference form a closed hierarchy: nothing of the body enters them. From their present
-state the same code that drives the legs can therefore be run ahead, and its answer is kept to the tick.
+The canonical system and the reference form a closed hierarchy: nothing of the body enters them.
+From their present state the same code that drives the legs can therefore be run ahead, and its
+answer is kept to the tick.
 """
 
 from __future__ import annotations
@@ -20,8 +21,17 @@ from dmp_cpg_ros.core.reference import ReferenceSystem
 Array = NDArray[np.float64]
 
 
-def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, state: SupervisorState, published: Inhibition,
-            x: Array, r: Array, command: tuple[float, float, float], dt: float, horizon: float = 10.0) -> float:
+def predict(
+    supervisor: GaitSupervisor,
+    reference: ReferenceSystem,
+    state: SupervisorState,
+    published: Inhibition,
+    x: Array,
+    r: Array,
+    command: tuple[float, float, float],
+    dt: float,
+    horizon: float = 10.0,
+) -> float:
     """Time from now to rest (of a requested stop) or to phase lock (of a start).
 
     Parameters
@@ -54,7 +64,9 @@ def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, state: Super
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
         r = reference.step(r, r_ext, dt)
         x = network.step(x, r, inhibition, dt)
-        state = supervisor.step(state, start_ns + k * tick_ns, x, network.rate(x, r, inhibition), r, command)
+        state = supervisor.step(
+            state, start_ns + k * tick_ns, x, network.rate(x, r, inhibition), r, command
+        )
         inhibition = supervisor.inhibition(state)
         if state.word in ('at_rest', 'walking', 'free'):
             return k * dt

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which node has which parameters; each is described in the file of the part that it belongs to.
 
-A node that predicts or certifies another part declares that part's set too. In a parameter file such shared
-values stand once, under ``/**``.
+A node that predicts or certifies another part declares that part's set too. In a parameter file
+such shared values stand once, under ``/**``.
 """
 
 from __future__ import annotations
@@ -35,14 +35,18 @@ class SuiteParameters:
 class RobotFileParameters(Parameters):
     """Which robot walks."""
 
-    robot: str = parameter('robots/mini_quadruped.yaml', 'robot file, in the config folder or by its path')
+    robot: str = parameter(
+        'robots/mini_quadruped.yaml', 'robot file, in the config folder or by its path'
+    )
 
 
 @dataclass(frozen=True)
 class GaitParameters(Parameters):
     """How it walks."""
 
-    gaits_file: str = parameter('gaits.yaml', 'file with the gaits, in the config folder or by its path')
+    gaits_file: str = parameter(
+        'gaits.yaml', 'file with the gaits, in the config folder or by its path'
+    )
     gait: str = parameter('amble', 'name of the gait')
 
 
@@ -57,15 +61,22 @@ class CommandParameters(Parameters):
 class TickParameters(Parameters):
     """How often the robot tells its state."""
 
-    control_rate: float = parameter(250.0, "rate of the robot's states; its period must be a whole number of "
-                                    'physics steps', unit='Hz', minimum=1.0, maximum=2000.0)
+    control_rate: float = parameter(
+        250.0,
+        "rate of the robot's states; its period must be a whole number of physics steps",
+        unit='Hz',
+        minimum=1.0,
+        maximum=2000.0,
+    )
 
     def __post_init__(self) -> None:
         """Validate; the period must be a whole number of microseconds."""
         super().__post_init__()
         if abs(1e6 / self.control_rate - round(1e6 / self.control_rate)) > 1e-6:
-            raise ParameterError(f'control_rate = {self.control_rate:g} Hz must have a period of whole '
-                                 f'microseconds; 200, 250, 500 and 1000 Hz have')
+            raise ParameterError(
+                f'control_rate = {self.control_rate:g} Hz must have a period of whole '
+                f'microseconds; 200, 250, 500 and 1000 Hz have'
+            )
 
     @property
     def tick_ns(self) -> int:
@@ -84,20 +95,44 @@ class LegChoice(Parameters):
 class RobotParameters(Parameters):
     """How the robot behind the port is run."""
 
-    physics: str = parameter('mujoco', 'what moves the robot: MuJoCo, or joints that track perfectly',
-                             choices=('mujoco', 'perfect_tracking'))
-    reading: str = parameter('kinematic', 'whether joints follow targets or receive torques only',
-                             choices=('kinematic', 'torque'))
-    gated: bool = parameter(False, 'whether the robot waits for mujoco_robot/advance_until: for each tick in '
-                            'lock-step, to begin in real time')
+    physics: str = parameter(
+        'mujoco',
+        'what moves the robot: MuJoCo, or joints that track perfectly',
+        choices=('mujoco', 'perfect_tracking'),
+    )
+    reading: str = parameter(
+        'kinematic',
+        'whether joints follow targets or receive torques only',
+        choices=('kinematic', 'torque'),
+    )
+    gated: bool = parameter(
+        False,
+        'whether the robot waits for mujoco_robot/advance_until: for each tick in '
+        'lock-step, to begin in real time',
+    )
     seed: int = parameter(0, 'seed of the initial spread', minimum=0)
-    initial_spread: float = parameter(0.0, 'joints start at the home pose plus a uniform draw from plus or minus '
-                                      'this', unit='rad', minimum=0.0, maximum=0.3)
-    target_timeout: float = parameter(0.2, 'age of a leg\'s targets after which the robot holds a stand by itself',
-                                      unit='s', minimum=0.01, maximum=10.0)
-    longest_lag: float = parameter(0.02, "real time: age of a leg's targets beyond which the simulation waits for newer "
-                                   'ones, up to target_timeout of wall time; 0: it never waits', unit='s',
-                                   minimum=0.0, maximum=10.0)
+    initial_spread: float = parameter(
+        0.0,
+        'joints start at the home pose plus a uniform draw from plus or minus this',
+        unit='rad',
+        minimum=0.0,
+        maximum=0.3,
+    )
+    target_timeout: float = parameter(
+        0.2,
+        "age of a leg's targets after which the robot holds a stand by itself",
+        unit='s',
+        minimum=0.01,
+        maximum=10.0,
+    )
+    longest_lag: float = parameter(
+        0.02,
+        "real time: age of a leg's targets beyond which the simulation waits for newer "
+        'ones, up to target_timeout of wall time; 0: it never waits',
+        unit='s',
+        minimum=0.0,
+        maximum=10.0,
+    )
     viewer: bool = parameter(False, 'whether to open a window with the robot')
 
 
@@ -105,14 +140,25 @@ class RobotParameters(Parameters):
 class CertificateParameters(Parameters):
     """What happens without a certificate."""
 
-    allow_uncertified: bool = parameter(False, 'whether the gait may start, and parameters may change, although the '
-                                               'certificate fails')
+    allow_uncertified: bool = parameter(
+        False,
+        'whether the gait may start, and parameters may change, although the certificate fails',
+    )
 
 
 CERTIFIED: tuple[type[Parameters], ...] = (
-    CanonicalParameters, InhibitionParameters, ReferenceParameters, LegParameters, PostureParameters, TickParameters,
-    GaitParameters, RobotFileParameters)
-"""Parameter sets that the certificate is computed from; nodes that compute it declare all of them."""
+    CanonicalParameters,
+    InhibitionParameters,
+    ReferenceParameters,
+    LegParameters,
+    PostureParameters,
+    TickParameters,
+    GaitParameters,
+    RobotFileParameters,
+)
+"""Parameter sets that the certificate is computed from; nodes that compute it declare all of
+them.
+"""
 
 NODE_PARAMETERS: dict[str, tuple[type[Parameters], ...]] = {
     'reference_filter': (ReferenceParameters, CommandParameters),

@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much a leg swings: a filtered measure of its phase speed.
 
-When inhibition stops a phase inside the swing, the foot must come down; when the phase moves again it must lift.
-The clearance of the swing is therefore scaled by an activity that follows the phase speed (notes on the paper: for duty
-factors below 3/4 no phase has all four feet down), through a first-order filter as the paper uses for amplitudes.
+When inhibition stops a phase inside the swing, the foot must come down; when the phase moves again
+it must lift. The clearance of the swing is therefore scaled by an activity that follows the phase
+speed (notes on the paper: for duty factors below 3/4 no phase has all four feet down), through a
+first-order filter as the paper uses for amplitudes.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from numpy.typing import NDArray
 ActivityT = TypeVar('ActivityT', float, NDArray[np.float64])
 
 
-def activity_step(activity: ActivityT, phase_rate: ActivityT, omega: float, rate: float, dt: float) -> ActivityT:
+def activity_step(
+    activity: ActivityT, phase_rate: ActivityT, omega: float, rate: float, dt: float
+) -> ActivityT:
     """Advance ȧ = rate · (sat(φ̇/ω) − a) exactly for a held phase rate.
 
     Parameters
@@ -38,6 +41,9 @@ def activity_step(activity: ActivityT, phase_rate: ActivityT, omega: float, rate
     -------
     float or ndarray (...)
     """
-    wanted: Any = (min(max(phase_rate / omega, 0.0), 1.0) if isinstance(phase_rate, float)
-                   else np.minimum(np.maximum(phase_rate / omega, 0.0), 1.0))
+    wanted: Any = (
+        min(max(phase_rate / omega, 0.0), 1.0)
+        if isinstance(phase_rate, float)
+        else np.minimum(np.maximum(phase_rate / omega, 0.0), 1.0)
+    )
     return wanted + (activity - wanted) * exp(-rate * dt)

@@ -4,8 +4,8 @@
 
     θ̈ = k (g_θ(x, r) − θ) + b (g_θ̇(x, r) − θ̇),    τ = J θ̈ + τ_fb
 
-Two readings: *kinematic*, in which θ is this system's own state and the joint is told to follow it, and *torque*, in
-which θ is measured and only the torque goes out.
+Two readings: *kinematic*, in which θ is this system's own state and the joint is told to follow
+it, and *torque*, in which θ is measured and only the torque goes out.
 """
 
 from __future__ import annotations
@@ -50,12 +50,15 @@ class TransformationSystem:
         self.stiffness, self.damping, self.inertia = stiffness, damping, inertia
         self._matrices: dict[float, Array] = {}
 
-    def acceleration(self, position: Array, velocity: Array, goal: Array, goal_velocity: Array) -> Array:
+    def acceleration(
+        self, position: Array, velocity: Array, goal: Array, goal_velocity: Array
+    ) -> Array:
         """θ̈ [rad/s^2] at a state, ndarray (n,)."""
         return self.stiffness * (goal - position) + self.damping * (goal_velocity - velocity)
 
-    def step(self, state: TransformationState, goal: Array, goal_velocity: Array,
-             dt: float) -> TransformationState:
+    def step(
+        self, state: TransformationState, goal: Array, goal_velocity: Array, dt: float
+    ) -> TransformationState:
         """Advance the kinematic reading to the time at which the goals hold.
 
         Exact for goals that move at ``goal_velocity`` during the step.
@@ -79,8 +82,10 @@ class TransformationSystem:
             self._matrices[dt] = matrix = phi_functions(system * dt, 1)[0]
         error = state.position - (goal - goal_velocity * dt)
         error_rate = state.velocity - goal_velocity
-        return TransformationState(goal + matrix[0, 0] * error + matrix[0, 1] * error_rate,
-                                   goal_velocity + matrix[1, 0] * error + matrix[1, 1] * error_rate)
+        return TransformationState(
+            goal + matrix[0, 0] * error + matrix[0, 1] * error_rate,
+            goal_velocity + matrix[1, 0] * error + matrix[1, 1] * error_rate,
+        )
 
     def torque(self, acceleration: Array, feedback: Array) -> Array:
         """τ = J θ̈ + τ_fb [N m], ndarray (n,)."""

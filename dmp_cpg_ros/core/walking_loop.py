@@ -70,8 +70,9 @@ class WalkingLoop:
         Parameters of all parts.
     """
 
-    def __init__(self, description: RobotDescription, gait: Gait,
-                 parameters: SuiteParameters | None = None) -> None:
+    def __init__(
+        self, description: RobotDescription, gait: Gait, parameters: SuiteParameters | None = None
+    ) -> None:
         """Build the parts at rest (or free, with ``start_inhibited`` false)."""
         self.parameters = p = parameters or SuiteParameters()
         self.network = GaitNetwork(p.canonical, gait, body_scale(description))
@@ -89,15 +90,25 @@ class WalkingLoop:
         self._dt = 0.004
 
     def command(self, v_x: float, v_y: float = 0.0, gamma: float = 0.0) -> None:
-        """Command a velocity; acts from the next tick on. Raises DataError for values that are not finite."""
+        """Command a velocity; acts from the next tick on. Raises DataError for values that are
+        not finite.
+        """
         self.gate.accept(v_x, v_y, gamma)
 
     def request(self, stop: bool) -> float:
         """Request a stop or a start, as the service does; returns the predicted time to it [s]."""
         self.stop = self.supervisor.request(self.stop, stop)
         command = self.gate.at(self.stop.time_ns)
-        return predict(self.supervisor, self.reference, self.stop, self.inhibition, self.x, self.r, command,
-                       self._dt)
+        return predict(
+            self.supervisor,
+            self.reference,
+            self.stop,
+            self.inhibition,
+            self.x,
+            self.r,
+            command,
+            self._dt,
+        )
 
     def tick(self, state: RobotState) -> Tick:
         """Run all parts on the robot's state of one tick.
@@ -121,25 +132,54 @@ class WalkingLoop:
         x_dot = self.network.rate(self.x, self.r, inhibition)
         self.stop = self.supervisor.step(self.stop, state.time_ns, self.x, x_dot, self.r, command)
         self.inhibition = self.supervisor.inhibition(self.stop)
-        self.posture_state, feedback = self.posture.step(self.posture_state, state, self.x, x_dot, self.r, dt)
+        self.posture_state, feedback = self.posture.step(
+            self.posture_state, state, self.x, x_dot, self.r, dt
+        )
         targets = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
-        return Tick(state.time_ns, self.r, self.x, x_dot, self.stop, feedback, JointTargets(
-            *(np.concatenate([getattr(target, name) for target in targets])
-              for name in ('position', 'velocity', 'effort'))))
+        return Tick(
+            state.time_ns,
+            self.r,
+            self.x,
+            x_dot,
+            self.stop,
+            feedback,
+            JointTargets(
+                *(
+                    np.concatenate([getattr(target, name) for target in targets])
+                    for name in ('position', 'velocity', 'effort')
+                )
+            ),
+        )
 
-    def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
-             dt: float) -> JointTargets:
+    def _leg(
+        self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float
+    ) -> JointTargets:
         leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
         self.leg_states[i], goal, goal_velocity = leg.step(
-            self.leg_states[i], self.x[i], x_dot[i], self.r, feedback.shift_in_base[i],
-            feedback.correction, dt)
+            self.leg_states[i],
+            self.x[i],
+            x_dot[i],
+            self.r,
+            feedback.shift_in_base[i],
+            feedback.correction,
+            dt,
+        )
         measured = None
         if leg.parameters.reading == 'torque':
-            measured = TransformationState(state.joint_position[joints], state.joint_velocity[joints])
-        return leg.targets(self.leg_states[i], goal, goal_velocity, feedback.torque[joints], measured)
+            measured = TransformationState(
+                state.joint_position[joints], state.joint_velocity[joints]
+            )
+        return leg.targets(
+            self.leg_states[i], goal, goal_velocity, feedback.torque[joints], measured
+        )
 
 
 def initial_canonical_state(network: GaitNetwork, parameters: InhibitionParameters) -> Array:
-    """States (4, 2) at which the oscillators start: at rest under inhibition, or in their places."""
-    return network.rest_state(initial_inhibition(parameters)) if parameters.start_inhibited else (
-        network.locked_state())
+    """States (4, 2) at which the oscillators start: at rest under inhibition, or in their
+    places.
+    """
+    return (
+        network.rest_state(initial_inhibition(parameters))
+        if parameters.start_inhibited
+        else (network.locked_state())
+    )

@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``canonical_oscillators``: the coupled Andronov-Hopf network, inhibited where its state is in the region C."""
+"""``canonical_oscillators``: the coupled Andronov-Hopf network, inhibited where its state is in
+the region C.
+"""
 
 from __future__ import annotations
 
@@ -40,12 +42,26 @@ class CanonicalOscillators(ManagedNode):
         self._x, self._last_ns = initial_canonical_state(self._network, inhibition), -1
         self._inhibition = initial_inhibition(inhibition)
         self._writer, self._publisher = CanonicalStateWriter(), self.publisher('canonical_state')
-        self._ticks = self.match(('reference',), 'reference', delayed=('inhibition_state',),
-                                 lock_step=self.parameters_of(LockStepParameters).lock_step)
-        self.listen('reference', lambda message: self._ticks.add(
-            'reference', header_ns(message), read_reference(message)))
-        self.listen('inhibition_state', lambda message: self._ticks.add(
-            'inhibition_state', header_ns(message), inhibition_from(read_inhibition_state(message))))
+        self._ticks = self.match(
+            ('reference',),
+            'reference',
+            delayed=('inhibition_state',),
+            lock_step=self.parameters_of(LockStepParameters).lock_step,
+        )
+        self.listen(
+            'reference',
+            lambda message: self._ticks.add(
+                'reference', header_ns(message), read_reference(message)
+            ),
+        )
+        self.listen(
+            'inhibition_state',
+            lambda message: self._ticks.add(
+                'inhibition_state',
+                header_ns(message),
+                inhibition_from(read_inhibition_state(message)),
+            ),
+        )
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the oscillators to the stamp of the reference."""
@@ -61,18 +77,24 @@ class CanonicalOscillators(ManagedNode):
     def _without_certificate(self, reason: str) -> None:
         """Refuse to walk without a certificate, or say loudly that nothing is guaranteed."""
         if not self.parameters_of(CertificateParameters).allow_uncertified:
-            raise ParameterError(f'the gait is not certified to stop: {reason} (allow_uncertified:=true walks all the same; '
-                                 'certify --suggest proposes gains that hold)')
+            raise ParameterError(
+                f'the gait is not certified to stop: {reason} '
+                '(allow_uncertified:=true walks all the same; certify --suggest proposes gains that hold)'
+            )
         self.warn('certificate', f'walking WITHOUT a certificate: {reason}', error=True)
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Phase error of the legs [rad]."""
-        return {'phase_error_rad': float(np.abs(self._network.phase_errors(self._x)).max()),
-                'certificate': certificate_words(self._certificate)}
+        return {
+            'phase_error_rad': float(np.abs(self._network.phase_errors(self._x)).max()),
+            'certificate': certificate_words(self._certificate),
+        }
 
 
 def inhibition_from(message: InhibitionMessage) -> Inhibition:
-    """Inhibition that ``inhibition_state`` announces; raises DataError for numbers that are not finite."""
+    """Inhibition that ``inhibition_state`` announces; raises DataError for numbers that are not
+    finite.
+    """
     gains = np.array([message.number(f'gain_{leg}') for leg in LEGS])
     return Inhibition(message.flag('requested'), gains, message.number('region_radius'))
 

@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes that walk have in common: the robot's description and the gait named by their parameters."""
+"""What the nodes that walk have in common: the robot's description and the gait named by their
+parameters.
+"""
 
 from __future__ import annotations
 
@@ -32,19 +34,27 @@ def gait_of(node: ManagedNode) -> Gait:
 
 def network_of(node: ManagedNode) -> GaitNetwork:
     """Coupled oscillators of a node's gait, robot and canonical parameters."""
-    return GaitNetwork(node.parameters_of(CanonicalParameters), gait_of(node), body_scale(description_of(node)))
+    return GaitNetwork(
+        node.parameters_of(CanonicalParameters), gait_of(node), body_scale(description_of(node))
+    )
 
 
 def certificate_of(node: ManagedNode, network: GaitNetwork) -> Certificate:
     """Certificate of a node's parameters; the node declares the sets in ``CERTIFIED``."""
     of = node.parameters_of
-    return certify(network, of(InhibitionParameters), of(ReferenceParameters), of(LegParameters),
-                   of(PostureParameters), of(TickParameters).tick_ns * 1e-9)
+    return certify(
+        network,
+        of(InhibitionParameters),
+        of(ReferenceParameters),
+        of(LegParameters),
+        of(PostureParameters),
+        of(TickParameters).tick_ns * 1e-9,
+    )
 
 
 def certificate_words(certificate: Certificate) -> str:
     """Certificate in a few words: whether it holds, its grade, what is sampled."""
     if not certificate.holds:
-        return f"certificate fails: {', '.join(entry.name for entry in certificate.failing)}"
-    sampled = f", sampled: {', '.join(certificate.sampled)}" if certificate.sampled else ''
+        return f'certificate fails: {", ".join(entry.name for entry in certificate.failing)}'
+    sampled = f', sampled: {", ".join(certificate.sampled)}' if certificate.sampled else ''
     return f'certificate holds, {certificate.contraction_grade} grade{sampled}'

@@ -29,7 +29,9 @@ from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 
 class InhibitionNode(ManagedNode):
-    """Stops and starts the gait on request, says when it will be at rest, and watches that it is."""
+    """Stops and starts the gait on request, says when it will be at rest, and watches that it
+    is.
+    """
 
     KIND = 'inhibition'
     PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
@@ -37,11 +39,15 @@ class InhibitionNode(ManagedNode):
 
     def configure(self) -> None:
         """Build the supervisor and its topics and service."""
-        parameters, reference = self.parameters_of(InhibitionParameters), self.parameters_of(ReferenceParameters)
+        parameters, reference = (
+            self.parameters_of(InhibitionParameters),
+            self.parameters_of(ReferenceParameters),
+        )
         network = network_of(self)
         self._certificate = certificate_of(self, network)
-        self._supervisor = GaitSupervisor(parameters, network,
-                                          self.parameters_of(LegParameters).activity_rate)
+        self._supervisor = GaitSupervisor(
+            parameters, network, self.parameters_of(LegParameters).activity_rate
+        )
         self._gate, self._reference = CommandGate(reference), ReferenceSystem(reference)
         self._state = self._supervisor.initial_state()
         self._acting = self._supervisor.inhibition(self._state)
@@ -51,16 +57,32 @@ class InhibitionNode(ManagedNode):
         self._told: tuple[Any, ...] = ()
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = InhibitionStateWriter(), self.publisher('inhibition_state')
-        self._ticks = self.match(('canonical_state', 'reference'), 'canonical_state', lock_step=self._lock_step)
+        self._ticks = self.match(
+            ('canonical_state', 'reference'), 'canonical_state', lock_step=self._lock_step
+        )
         canonical = CanonicalStateReader()
-        self.listen('canonical_state', lambda message: self._ticks.add(
-            'canonical_state', header_ns(message), canonical.read(message)))
-        self.listen('reference', lambda message: self._ticks.add(
-            'reference', header_ns(message), read_reference(message)))
+        self.listen(
+            'canonical_state',
+            lambda message: self._ticks.add(
+                'canonical_state', header_ns(message), canonical.read(message)
+            ),
+        )
+        self.listen(
+            'reference',
+            lambda message: self._ticks.add(
+                'reference', header_ns(message), read_reference(message)
+            ),
+        )
         if self.parameters_of(CommandParameters).stamped_cmd_vel:
-            self.listen(STAMPED_CMD_VEL, lambda message: self._gate.accept(*read_twist(message.twist)), command=True)
+            self.listen(
+                STAMPED_CMD_VEL,
+                lambda message: self._gate.accept(*read_twist(message.twist)),
+                command=True,
+            )
         else:
-            self.listen('cmd_vel', lambda message: self._gate.accept(*read_twist(message)), command=True)
+            self.listen(
+                'cmd_vel', lambda message: self._gate.accept(*read_twist(message)), command=True
+            )
         self.serve('inhibit', self._answer_inhibit)
 
     def activate(self) -> None:
@@ -76,7 +98,9 @@ class InhibitionNode(ManagedNode):
         """Advance the state of the stop to the stamp of the canonical state."""
         (self._x, x_dot), self._r = values['canonical_state'], values['reference']
         before, published = self._state, self._acting
-        self._state = self._supervisor.step(before, stamp_ns, self._x, x_dot, self._r, self._gate.at(stamp_ns))
+        self._state = self._supervisor.step(
+            before, stamp_ns, self._x, x_dot, self._r, self._gate.at(stamp_ns)
+        )
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
             self._predict(published)
@@ -85,7 +109,11 @@ class InhibitionNode(ManagedNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop."""
-        return {'inhibition': self._state.word, 'requested': self._state.requested, 'command': self._gate.at(self._state.time_ns)}
+        return {
+            'inhibition': self._state.word,
+            'requested': self._state.requested,
+            'command': self._gate.at(self._state.time_ns),
+        }
 
     def _news(self) -> tuple[Any, ...]:
         """What is told when it changes."""
@@ -93,14 +121,21 @@ class InhibitionNode(ManagedNode):
         return now.word, now.requested, now.armed, now.automatic, now.request_ns
 
     def _answer_inhibit(self, request: Any, response: Any) -> Any:
-        """Take a request; the answer says when it will be fulfilled. It acts from the next tick on."""
+        """Take a request; the answer says when it will be fulfilled. It acts from the next tick
+        on.
+        """
         verb = 'at rest' if request.data else 'walking'
         if not self.active:
-            response.success, response.message = False, f'inhibition is {self.state_label}, not active'
+            response.success, response.message = (
+                False,
+                f'inhibition is {self.state_label}, not active',
+            )
             return response
         if self._x is None:
             response.success = False
-            response.message = 'no canonical_state and reference yet; is canonical_oscillators running?'
+            response.message = (
+                'no canonical_state and reference yet; is canonical_oscillators running?'
+            )
             return response
         already = request.data == self._state.requested
         self._state = self._supervisor.request(self._state, request.data)
@@ -110,24 +145,47 @@ class InhibitionNode(ManagedNode):
             return response
         self._predict(self._acting)
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
-        response.message = f'{verb} {when}, at most {self._bound:.3f} s; {certificate_words(self._certificate)}'
+        response.message = (
+            f'{verb} {when}, at most {self._bound:.3f} s; {certificate_words(self._certificate)}'
+        )
         return response
 
     def _predict(self, published: Inhibition) -> None:
         """Look ahead to the rest or the walk that was just requested."""
         tick_s = self.parameters_of(TickParameters).tick_ns * 1e-9
-        self._predicted = predict(self._supervisor, self._reference, self._state, published, self._x, self._r,
-                                  self._gate.at(self._state.time_ns), tick_s)
+        self._predicted = predict(
+            self._supervisor,
+            self._reference,
+            self._state,
+            published,
+            self._x,
+            self._r,
+            self._gate.at(self._state.time_ns),
+            tick_s,
+        )
         certificate = self._certificate
-        self._bound = certificate.time_to_rest if self._state.requested else certificate.time_to_walking
+        self._bound = (
+            certificate.time_to_rest if self._state.requested else certificate.time_to_walking
+        )
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()
-        values: dict[str, Any] = {'requested': state.requested, 'armed': state.armed, 'automatic': state.automatic}
-        values.update((f'gain_{leg}', gain) for leg, gain in zip(LEGS, acting.gains.tolist(), strict=True))
-        values.update(region_radius=acting.region_radius, request_stamp=state.request_ns * 1e-9,
-                      predicted_s=self._predicted, bound_s=self._bound, measured_s=state.measured_s,
-                      grade=certificate_words(self._certificate))
+        values: dict[str, Any] = {
+            'requested': state.requested,
+            'armed': state.armed,
+            'automatic': state.automatic,
+        }
+        values.update(
+            (f'gain_{leg}', gain) for leg, gain in zip(LEGS, acting.gains.tolist(), strict=True)
+        )
+        values.update(
+            region_radius=acting.region_radius,
+            request_stamp=state.request_ns * 1e-9,
+            predicted_s=self._predicted,
+            bound_s=self._bound,
+            measured_s=state.measured_s,
+            grade=certificate_words(self._certificate),
+        )
         self._publisher.publish(self._writer.fill(state.time_ns, state.word, values))
 
 

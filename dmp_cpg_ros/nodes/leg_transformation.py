@@ -46,25 +46,44 @@ class LegTransformation(ManagedNode):
         """Build the leg's primitive and its topics."""
         leg, parameters = self.parameters_of(LegChoice).leg, self.parameters_of(LegParameters)
         self._place = LEGS.index(leg)
-        self._joints = slice(len(JOINTS_OF_LEG) * self._place, len(JOINTS_OF_LEG) * (self._place + 1))
+        self._joints = slice(
+            len(JOINTS_OF_LEG) * self._place, len(JOINTS_OF_LEG) * (self._place + 1)
+        )
         self._primitive = LegPrimitive(leg, description_of(self), gait_of(self), parameters)
         self._state, self._last_ns = self._primitive.initial_state(), -1
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
         inputs = ['canonical_state', 'reference', 'posture_feedback']
         canonical, feedback = CanonicalStateReader(), PostureFeedbackReader()
-        self.listen('canonical_state', lambda message: self._ticks.add(
-            'canonical_state', header_ns(message), canonical.read(message)))
-        self.listen('reference', lambda message: self._ticks.add(
-            'reference', header_ns(message), read_reference(message)))
-        self.listen('posture_feedback', lambda message: self._ticks.add(
-            'posture_feedback', header_ns(message), feedback.read(message)))
+        self.listen(
+            'canonical_state',
+            lambda message: self._ticks.add(
+                'canonical_state', header_ns(message), canonical.read(message)
+            ),
+        )
+        self.listen(
+            'reference',
+            lambda message: self._ticks.add(
+                'reference', header_ns(message), read_reference(message)
+            ),
+        )
+        self.listen(
+            'posture_feedback',
+            lambda message: self._ticks.add(
+                'posture_feedback', header_ns(message), feedback.read(message)
+            ),
+        )
         if parameters.reading == 'torque':
             joints = JointsReader()
             inputs.append('joint_states')
-            self.listen('joint_states', lambda message: self._ticks.add(
-                'joint_states', header_ns(message), joints.read(message)))
-        self._ticks = self.match(inputs, 'canonical_state',
-                                 lock_step=self.parameters_of(LockStepParameters).lock_step)
+            self.listen(
+                'joint_states',
+                lambda message: self._ticks.add(
+                    'joint_states', header_ns(message), joints.read(message)
+                ),
+            )
+        self._ticks = self.match(
+            inputs, 'canonical_state', lock_step=self.parameters_of(LockStepParameters).lock_step
+        )
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the leg to the stamp of the canonical state."""
@@ -73,13 +92,21 @@ class LegTransformation(ManagedNode):
         x, x_dot = values['canonical_state']
         feedback, joints = values['posture_feedback'], self._joints
         self._state, goal, goal_velocity = self._primitive.step(
-            self._state, x[self._place], x_dot[self._place], values['reference'],
-            feedback.shift_in_base[self._place], feedback.correction, dt)
+            self._state,
+            x[self._place],
+            x_dot[self._place],
+            values['reference'],
+            feedback.shift_in_base[self._place],
+            feedback.correction,
+            dt,
+        )
         measured = None
         if 'joint_states' in values:
             position, velocity, _ = values['joint_states']
             measured = TransformationState(position[joints], velocity[joints])
-        targets = self._primitive.targets(self._state, goal, goal_velocity, feedback.torque[joints], measured)
+        targets = self._primitive.targets(
+            self._state, goal, goal_velocity, feedback.torque[joints], measured
+        )
         self._publisher.publish(self._writer.fill(stamp_ns, targets))
 
     def diagnostic_values(self) -> Mapping[str, Any]:

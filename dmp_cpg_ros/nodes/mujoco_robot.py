@@ -1,6 +1,9 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``mujoco_robot``: the robot. In real time it keeps the wall clock's pace; in lock-step it waits for every target."""
+"""``mujoco_robot``: the robot.
+
+In real time it keeps the wall clock's pace; in lock-step it waits for every target.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +41,9 @@ READY_PERIOD_S = 0.05
 """How often a lock-step robot without a gate asks whether its partners are there [s]."""
 
 MAKE_UP_NS = 100_000_000
-"""Wall time that a robot in real time may lag behind and make up again; what is more is lost [ns]."""
+"""Wall time that a robot in real time may lag behind and make up again; what is more is lost
+[ns].
+"""
 
 STATE_TOPICS = ('/clock', 'imu', 'odom', 'foot_contacts', 'joint_states')
 """What the robot publishes at every tick, the tick itself last."""
@@ -58,7 +63,11 @@ class MujocoRobotNode(ManagedNode):
         self._robot = self._make_robot()
         stand = home_joint_position(self._robot.description)
         self._guard = TargetGuard(stand, round(self._options.target_timeout * 1e9))
-        self._timing, self._writer, self._reader = RobotTiming(), RobotStateWriter(), JointTargetsReader()
+        self._timing, self._writer, self._reader = (
+            RobotTiming(),
+            RobotStateWriter(),
+            JointTargetsReader(),
+        )
         self._state: RobotState = self._robot.reset()
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._state_publishers = [self.publisher(name) for name in STATE_TOPICS]
@@ -69,6 +78,7 @@ class MujocoRobotNode(ManagedNode):
         self._viewer: Any = None
         if self._options.viewer and self._options.physics == 'mujoco':
             from dmp_cpg_ros.robot.camera import open_viewer
+
             self._viewer = open_viewer(self._robot.model, self._robot.data)  # type: ignore[attr-defined]
 
     def activate(self) -> None:
@@ -77,8 +87,11 @@ class MujocoRobotNode(ManagedNode):
         if self._options.gated:
             self._hold()
         elif self._lock_step:
-            self._timer = self.create_timer(READY_PERIOD_S, self._start_when_connected,
-                                            clock=Clock(clock_type=ClockType.STEADY_TIME))
+            self._timer = self.create_timer(
+                READY_PERIOD_S,
+                self._start_when_connected,
+                clock=Clock(clock_type=ClockType.STEADY_TIME),
+            )
         else:
             self._start_real_time()
 
@@ -96,10 +109,14 @@ class MujocoRobotNode(ManagedNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the robot has fallen or stands by itself."""
-        return {**self._timing.values(), 'fell': self._fell, 'time_s': self._state.time_ns * 1e-9,
-                'silent_legs': ' '.join(self._guard.silent(self._state.time_ns)) or 'none'}
+        return {
+            **self._timing.values(),
+            'fell': self._fell,
+            'time_s': self._state.time_ns * 1e-9,
+            'silent_legs': ' '.join(self._guard.silent(self._state.time_ns)) or 'none',
+        }
 
-    # The tick ------------------------------------------------------------------------------------------------
+    # The tick ------------------------------------------------------------------------------------
 
     def _publish_state(self) -> None:
         stamp = self._state.time_ns
@@ -107,7 +124,13 @@ class MujocoRobotNode(ManagedNode):
         self.begin_tick(stamp)
         writer = self._writer
         writer.fill(self._state)
-        messages = (writer.clock, writer.imu, writer.odom, writer.foot_contacts, writer.joint_states)
+        messages = (
+            writer.clock,
+            writer.imu,
+            writer.odom,
+            writer.foot_contacts,
+            writer.joint_states,
+        )
         self._timing.published(stamp)
         for publisher, message in zip(self._state_publishers, messages, strict=True):
             publisher.publish(message)
@@ -119,8 +142,12 @@ class MujocoRobotNode(ManagedNode):
         targets = self._guard.targets(now, self._state.joint_position)
         silent = self._guard.silent(now)
         if silent and any(self._guard.stamps):
-            self.warn('silent', f"no targets from {', '.join(silent)} for {self._options.target_timeout} s: "
-                      'the robot holds a stand by itself', error=True)
+            self.warn(
+                'silent',
+                f'no targets from {", ".join(silent)} for {self._options.target_timeout} s: '
+                'the robot holds a stand by itself',
+                error=True,
+            )
         elif not silent:
             self.clear('silent')
         self._state = self._robot.step(targets)
@@ -135,12 +162,16 @@ class MujocoRobotNode(ManagedNode):
         stamp = header_ns(message)
         self._guard.accept(leg, stamp, targets)
         self._timing.arrived(stamp)
-        if self._lock_step and not self._holding and stamp == self._state.time_ns and all(
-                known == stamp for known in self._guard.stamps):
+        if (
+            self._lock_step
+            and not self._holding
+            and stamp == self._state.time_ns
+            and all(known == stamp for known in self._guard.stamps)
+        ):
             self._step()
             self._hold()
 
-    # Lock-step -----------------------------------------------------------------------------------------------
+    # Lock-step -----------------------------------------------------------------------------------
 
     def _start_when_connected(self) -> None:
         if not self.missing():
@@ -166,13 +197,14 @@ class MujocoRobotNode(ManagedNode):
                 self._holding = False
                 self._start_real_time()
 
-    # Real time -----------------------------------------------------------------------------------------------
+    # Real time -----------------------------------------------------------------------------------
 
     def _start_real_time(self) -> None:
         self._publish_state()
         self._begun = time.monotonic_ns() - self._state.time_ns
-        self._timer = self.create_timer(self._tick_ns * 1e-9, self._on_timer,
-                                        clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = self.create_timer(
+            self._tick_ns * 1e-9, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
 
     def _on_timer(self) -> None:
         """Run the tick that is due, and one more when the process was kept from running before."""
@@ -189,7 +221,9 @@ class MujocoRobotNode(ManagedNode):
             self._publish_state()
 
     def _wait_for_targets(self) -> bool:
-        """Whether to let wall time pass: a machine too slow for real time shall not make the robot fall."""
+        """Whether to let wall time pass: a machine too slow for real time shall not make the
+        robot fall.
+        """
         now = self._state.time_ns
         lag = round(self._options.longest_lag * 1e9)
         if lag == 0 or self._guard.age_ns(now) <= lag or self._guard.silent(now):
@@ -201,13 +235,14 @@ class MujocoRobotNode(ManagedNode):
         self._timing.waited()
         return True
 
-    # Inside --------------------------------------------------------------------------------------------------
+    # Inside --------------------------------------------------------------------------------------
 
     def _make_robot(self) -> Robot:
         p, file = self._options, find_config(self.parameters_of(RobotFileParameters).robot)
         if p.physics == 'perfect_tracking':
             return PerfectTrackingRobot(load_description(file), self._tick_ns)
         from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+
         return MujocoRobot(file, self._tick_ns, p.seed, p.initial_spread)
 
 

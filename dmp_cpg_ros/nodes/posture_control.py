@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -34,18 +35,28 @@ class PostureControl(ManagedNode):
 
     def configure(self) -> None:
         """Build the controller and its topics."""
-        self._controller = PostureController(description_of(self), gait_of(self),
-                                             self.parameters_of(PostureParameters))
+        self._controller = PostureController(
+            description_of(self), gait_of(self), self.parameters_of(PostureParameters)
+        )
         self._memory, self._last_ns = self._controller.initial_state(), -1
         self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
         self._ticks = self.match(
-            ('joint_states', 'odom', 'reference', 'canonical_state'), 'canonical_state',
-            lock_step=self.parameters_of(LockStepParameters).lock_step)
+            ('joint_states', 'odom', 'reference', 'canonical_state'),
+            'canonical_state',
+            lock_step=self.parameters_of(LockStepParameters).lock_step,
+        )
         canonical, joints = CanonicalStateReader(), JointsReader()
-        for name, read in (('joint_states', joints.read), ('odom', read_odom),
-                           ('reference', read_reference), ('canonical_state', canonical.read)):
-            self.listen(name, lambda message, name=name, read=read: self._ticks.add(
-                name, header_ns(message), read(message)))
+        readers: dict[str, Callable[[Any], Any]] = {
+            'joint_states': joints.read,
+            'odom': read_odom,
+            'reference': read_reference,
+            'canonical_state': canonical.read,
+        }
+        for name, read in readers.items():
+            self.listen(name, self._taking(name, read))
+
+    def _taking(self, name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
+        return lambda message: self._ticks.add(name, header_ns(message), read(message))
 
     def on_parameters(self) -> None:
         """Take over the gains."""
@@ -57,7 +68,9 @@ class PostureControl(ManagedNode):
         self._last_ns = stamp_ns
         state = robot_state(stamp_ns, values['joint_states'], values['odom'], np.zeros(len(LEGS)))
         x, x_dot = values['canonical_state']
-        self._memory, feedback = self._controller.step(self._memory, state, x, x_dot, values['reference'], dt)
+        self._memory, feedback = self._controller.step(
+            self._memory, state, x, x_dot, values['reference'], dt
+        )
         self._publisher.publish(self._writer.fill(stamp_ns, feedback))
 
 

@@ -22,7 +22,9 @@ from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 
 class ReferenceFilter(ManagedNode):
-    """Filters the commanded velocity; brings it to zero when cmd_vel falls silent or a stop is requested."""
+    """Filters the commanded velocity; brings it to zero when cmd_vel falls silent or a stop is
+    requested.
+    """
 
     KIND = 'reference_filter'
     PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
@@ -34,15 +36,34 @@ class ReferenceFilter(ManagedNode):
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
         self._r, self._last_ns, self._requested = np.zeros(3), -1, False
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
-        self._ticks = self.match(('joint_states',), 'joint_states', delayed=('inhibition_state',),
-                                 lock_step=self.parameters_of(LockStepParameters).lock_step)
-        self.listen('joint_states', lambda message: self._ticks.add('joint_states', header_ns(message), None))
-        self.listen('inhibition_state', lambda message: self._ticks.add(
-            'inhibition_state', header_ns(message), read_inhibition_state(message).flag('requested')))
+        self._ticks = self.match(
+            ('joint_states',),
+            'joint_states',
+            delayed=('inhibition_state',),
+            lock_step=self.parameters_of(LockStepParameters).lock_step,
+        )
+        self.listen(
+            'joint_states',
+            lambda message: self._ticks.add('joint_states', header_ns(message), None),
+        )
+        self.listen(
+            'inhibition_state',
+            lambda message: self._ticks.add(
+                'inhibition_state',
+                header_ns(message),
+                read_inhibition_state(message).flag('requested'),
+            ),
+        )
         if self.parameters_of(CommandParameters).stamped_cmd_vel:
-            self.listen(STAMPED_CMD_VEL, lambda message: self._gate.accept(*read_twist(message.twist)), command=True)
+            self.listen(
+                STAMPED_CMD_VEL,
+                lambda message: self._gate.accept(*read_twist(message.twist)),
+                command=True,
+            )
         else:
-            self.listen('cmd_vel', lambda message: self._gate.accept(*read_twist(message)), command=True)
+            self.listen(
+                'cmd_vel', lambda message: self._gate.accept(*read_twist(message)), command=True
+            )
 
     def on_parameters(self) -> None:
         """Take over limits and rates."""
@@ -59,7 +80,12 @@ class ReferenceFilter(ManagedNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Reference and whether a stop holds it at zero."""
-        return {'v_x': self._r[0], 'v_y': self._r[1], 'gamma': self._r[2], 'stopping': self._requested}
+        return {
+            'v_x': self._r[0],
+            'v_y': self._r[1],
+            'gamma': self._r[2],
+            'stopping': self._requested,
+        }
 
 
 def main() -> int:

@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How well the suite keeps up with the robot: rate, latency from state to last target, missed deadlines."""
+"""How well the suite keeps up with the robot: rate, latency from state to last target, missed
+deadlines.
+"""
 
 from __future__ import annotations
 
@@ -55,14 +57,22 @@ class RobotTiming:
         self.waits += 1
 
     def values(self) -> dict[str, float | int]:
-        """Rate [Hz], real-time factor, latency [ms] and misses since the start; NaN without ticks."""
+        """Rate [Hz], real-time factor, latency [ms] and misses since the start; NaN without
+        ticks.
+        """
         values: dict[str, float | int] = {
-            'deadline_misses': self.misses, 'waits': self.waits, 'timed_ticks': self.ticks}
+            'deadline_misses': self.misses,
+            'waits': self.waits,
+            'timed_ticks': self.ticks,
+        }
         wall = robot = float('nan')
         if self._first is not None and self._last is not None and self._last[0] > self._first[0]:
             wall, robot = self._last[0] - self._first[0], (self._last[1] - self._first[1]) * 1e-9
         latency = np.frombuffer(self._latency) if self._latency else np.array([np.nan])
-        values.update(rate_hz=(self.ticks - 1) / wall, real_time_factor=robot / wall,
-                      latency_ms_p50=float(np.percentile(latency, 50)),
-                      latency_ms_p99=float(np.percentile(latency, 99)))
+        values.update(
+            rate_hz=(self.ticks - 1) / wall,
+            real_time_factor=robot / wall,
+            latency_ms_p50=float(np.percentile(latency, 50)),
+            latency_ms_p99=float(np.percentile(latency, 99)),
+        )
         return values

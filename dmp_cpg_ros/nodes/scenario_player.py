@@ -29,7 +29,8 @@ class PlayerError(DmpCpgError):
 
 
 class ScenarioPlayer(Node):  # type: ignore[misc]
-    """Holds the robot's gate and lets a tick pass when everything that is to act in it has been delivered.
+    """Holds the robot's gate and lets a tick pass when everything that is to act in it has been
+    delivered.
 
     Parameters
     ----------
@@ -50,10 +51,17 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         Stamp of the robot's last tick [ns].
     """
 
-    def __init__(self, scenario: Scenario, tick_ns: int, lock_step: bool, say: Callable[[float, str], None]) -> None:
+    def __init__(
+        self, scenario: Scenario, tick_ns: int, lock_step: bool, say: Callable[[float, str], None]
+    ) -> None:
         """Create the topics; nothing is sent before :meth:`begin`."""
         super().__init__('scenario_player')
-        self._actions, self._tick_ns, self._lock_step, self._say = scenario.timeline(tick_ns), tick_ns, lock_step, say
+        self._actions, self._tick_ns, self._lock_step, self._say = (
+            scenario.timeline(tick_ns),
+            tick_ns,
+            lock_step,
+            say,
+        )
         self._end_ns = scenario.ticks(tick_ns) * tick_ns
         self._next, self._begun, self._busy, self._word = 0, False, False, ''
         self._holding_ns, self._inhibition_ns = -1, -1
@@ -63,10 +71,15 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._command = self.create_publisher(Twist, command.name, command.publisher_qos)
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
         self._inhibit = self.create_client(SetBool, interface('inhibit').name)
-        self._takers = [self.create_client(Trigger, f'{node}/commands_taken') for node in command.subscribers]
+        self._takers = [
+            self.create_client(Trigger, f'{node}/commands_taken') for node in command.subscribers
+        ]
         self._sent = 0
-        for name, callback in ((f'{GATE_OWNER}/holding_at', self._on_holding),
-                               ('inhibition_state', self._on_inhibition), ('/clock', self._on_clock)):
+        for name, callback in (
+            (f'{GATE_OWNER}/holding_at', self._on_holding),
+            ('inhibition_state', self._on_inhibition),
+            ('/clock', self._on_clock),
+        ):
             topic = interface(name)
             if name != '/clock' or not lock_step:
                 self.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
@@ -75,8 +88,11 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """Whether the gate, the readers of commands and the service are there."""
         readers = len(interface('cmd_vel').subscribers)
         clients = (self._inhibit, *self._takers)
-        return (self._gate.get_subscription_count() > 0 and all(client.service_is_ready() for client in clients)
-                and self._command.get_subscription_count() >= readers)
+        return (
+            self._gate.get_subscription_count() > 0
+            and all(client.service_is_ready() for client in clients)
+            and self._command.get_subscription_count() >= readers
+        )
 
     def begin(self) -> None:
         """Begin with the first tick."""
@@ -86,7 +102,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         else:
             self._open(FAR_NS)
 
-    # Lock-step: the robot holds, everything is delivered, the robot goes on ------------------------------------
+    # Lock-step: the robot holds, everything is delivered, the robot goes on ----------------------
 
     def _on_holding(self, message: Clock) -> None:
         self._holding_ns = stamp_ns(message.clock)
@@ -102,8 +118,16 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._continue()
 
     def _continue(self) -> None:
-        """Deliver what acts at the held tick once all nodes have finished the tick before, then open the gate."""
-        if not self._begun or not self._lock_step or self._holding_ns < 0 or self._busy or self.finished.done():
+        """Deliver what acts at the held tick once all nodes have finished the tick before, then
+        open the gate.
+        """
+        if (
+            not self._begun
+            or not self._lock_step
+            or self._holding_ns < 0
+            or self._busy
+            or self.finished.done()
+        ):
             return
         if self._holding_ns > 0 and self._inhibition_ns < self._holding_ns - self._tick_ns:
             return
@@ -113,13 +137,17 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             return
         if self._deliver_due():
             return
-        following = self._actions[self._next].time_ns if self._next < len(self._actions) else self._end_ns
+        following = (
+            self._actions[self._next].time_ns if self._next < len(self._actions) else self._end_ns
+        )
         self._holding_ns = -1
         self._open(min(following, self._end_ns) - self._tick_ns)
 
     def _deliver_due(self) -> bool:
         """Deliver due actions; returns whether one is under way and will call back."""
-        while self._next < len(self._actions) and self._actions[self._next].time_ns <= self.time_ns:
+        while (
+            self._next < len(self._actions) and self._actions[self._next].time_ns <= self.time_ns
+        ):
             action = self._actions[self._next]
             self._next += 1
             if action.label:
@@ -164,17 +192,19 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     def _call(self, action: Action) -> None:
         self._busy = True
-        self._inhibit.call_async(SetBool.Request(data=bool(action.inhibit))).add_done_callback(self._answered)
+        self._inhibit.call_async(SetBool.Request(data=bool(action.inhibit))).add_done_callback(
+            self._answered
+        )
 
     def _answered(self, future: Future) -> None:
         answer = future.result()
         if answer is None or not answer.success:
-            self._fail(f"service inhibit: {'no answer' if answer is None else answer.message}")
+            self._fail(f'service inhibit: {"no answer" if answer is None else answer.message}')
             return
         self._say(self.time_ns * 1e-9, f'  inhibit: {answer.message}')
         self._delivered()
 
-    # Real time --------------------------------------------------------------------------------------------------
+    # Real time -----------------------------------------------------------------------------------
 
     def _on_clock(self, message: Clock) -> None:
         self.time_ns = stamp_ns(message.clock)
@@ -185,7 +215,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         elif not self._busy:
             self._deliver_due()
 
-    # Inside -----------------------------------------------------------------------------------------------------
+    # Inside --------------------------------------------------------------------------------------
 
     def _open(self, until_ns: int) -> None:
         message: Any = Clock()

@@ -1,7 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The nodes of the suite with their names, in the order of the data flow; the robot comes last, so that its first
-state finds everybody listening."""
+"""The nodes of the suite with their names, in the order of the data flow; the robot comes last,
+so that its first state finds everybody listening.
+"""
 
 from __future__ import annotations
 

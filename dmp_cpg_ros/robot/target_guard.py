@@ -46,8 +46,11 @@ class TargetGuard:
 
     def silent(self, now_ns: int) -> list[str]:
         """Legs whose targets are missing or too old."""
-        return [leg for leg, stamp in zip(LEGS, self.stamps, strict=True)
-                if stamp is None or now_ns - stamp > self._timeout_ns]
+        return [
+            leg
+            for leg, stamp in zip(LEGS, self.stamps, strict=True)
+            if stamp is None or now_ns - stamp > self._timeout_ns
+        ]
 
     def age_ns(self, now_ns: int) -> int:
         """Age of the oldest leg's targets [ns]; 0 while a leg has never sent any."""
