@@ -66,18 +66,29 @@ ifeq ($(DISPLAY)$(WAYLAND_DISPLAY),)
   export MPLBACKEND ?= Agg
 endif
 
-.PHONY: help demo test bench lint install clean
+STUDY_ARGS ?=
+
+.PHONY: help demo test study-stops doc-images bench lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
 	@echo 'make TARGET, with Python 3.10-3.13, its venv module and make; ROS 2 Jazzy is used if sourced'
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 10
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 13
 
 demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ (WALK_ARGS=...)
 	$(BIN)/walk $(WALK_ARGS)
 
 test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
 	cd test && $(BIN)/python -m pytest $(PYTEST_ARGS)
+
+study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, walk, trot (STUDY_ARGS=...)
+	$(BIN)/study_stops $(STUDY_ARGS)
+
+doc-images: $(INSTALLED) ## make the pictures of the README
+	rm -rf build/doc_images
+	$(BIN)/walk --lock-step --out build/doc_images
+	mkdir -p doc/images
+	cp $(addprefix build/doc_images/figures/,walking.png canonical_states.png footfall.png phase_portrait.png) doc/images/
 
 bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
 	$(BIN)/python -m dmp_cpg_ros.commands.bench $(BENCH_ARGS)

@@ -79,7 +79,8 @@ class CanonicalOscillators(ManagedNode):
         if not self.parameters_of(CertificateParameters).allow_uncertified:
             raise ParameterError(
                 f'the gait is not certified to stop: {reason} '
-                '(allow_uncertified:=true walks all the same; certify --suggest proposes gains that hold)'
+                '(allow_uncertified:=true walks all the same; '
+                'certify --suggest proposes gains that hold)'
             )
         self.warn('certificate', f'walking WITHOUT a certificate: {reason}', error=True)
 
