@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +50,15 @@ class Batch:
         self._stacks = [np.stack([np.stack(pair) for pair in zip(a, b, strict=True)])
                         for a, b in zip(zip(*free, strict=True), zip(*held, strict=True),
                                         strict=True)]                        # (settings, 2, …)
+
+    def subset(self, keep: np.ndarray) -> Batch:
+        """The same batch with only the settings whose mask (settings,) is true."""
+        part = copy(self)
+        part.settings = [s for s, kept in zip(self.settings, keep, strict=True) if kept]
+        for name in ('omega', 'gains', 'target', 'region', 'rho', 'linear'):
+            setattr(part, name, getattr(self, name)[keep])
+        part._stacks = [stack[keep] for stack in self._stacks]
+        return part
 
     def inside(self, x: np.ndarray) -> np.ndarray:
         """Which settings have their inhibited oscillators in C, (settings,)."""

@@ -179,7 +179,7 @@ def _grounded_solution(L: Array, g: Array, u: Array, free: Mask) -> Array:
     if not np.any(free):
         return solved
     grounded, kept = L[np.ix_(free, free)], ~free & heard
-    if slowest_rate(grounded) <= 0.0 or np.any(~heard):
+    if np.any(~heard) or slowest_rate(grounded) <= 1e-9 * float(np.abs(grounded).max()):
         solved[free] = np.inf if np.all(heard) else solved[free]
         return solved
     solved[free] = np.linalg.solve(grounded, g[free] - L[np.ix_(free, kept)] @ u[kept])
@@ -195,7 +195,8 @@ def _smallest_radii(system: CanonicalSystem, M: Array, omega: Array, u: Array, D
     M s ≥ ω t suffices, as long as every state at capture is inside.
     """
     inner = np.maximum(0.0, D - u)
-    if np.any(M.sum(axis=1) < -1e-9 * np.abs(M).max()) or slowest_rate(M) <= 0.0:
+    tiny = 1e-9 * float(np.abs(M).max())
+    if np.any(M.sum(axis=1) < -tiny) or slowest_rate(M) <= tiny:
         return inner
     beta = np.linspace(0.0, 1.2, 13)[:, None]                                # (13, 1) [rad]
     extent = np.clip(u - D * np.sin(beta), 0.0, largest)                 # (13, N)

@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 _MOST_PERIODS = 200
 _SETTLED = 1e-10
+_NEUTRAL = 1e-6  # decay per period that the integration cannot tell from none
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def transverse_metric(field: Field, jacobian: Callable[[Array], Array], orbit: O
     """
     local = [_local(field(x), jacobian(x)) for x in orbit.states]
     floquet = floquet_rate(jacobian, orbit)
-    if not floquet > 0.0:
+    if not floquet * orbit.period > _NEUTRAL:
         raise DataError(f'displacements across the orbit do not decay (rate {floquet:.4g} 1/s)')
     r = share * floquet
     Ms, m, P0, P1 = _periodic_solutions(local, orbit, r)

@@ -1,0 +1,69 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The inhibited network's rest: where the field vanishes and the simulation ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
+from dmp_cpg_ros.core.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.hopf import AndronovHopf
+from dmp_cpg_ros.core.phase import state_at
+
+
+def system(name: str, gain: float, size: int = 4, rho: float = 8.0) -> CanonicalSystem:
+    phases = np.linspace(0.0, 2.0, size)
+    graph = graph_from_edges(size, topology(name, size), gain, phases)
+    return CanonicalSystem(graph, AndronovHopf(rho), state_at(phases))
+
+
+@settings(max_examples=40)
+@given(name=st.sampled_from(['all_to_all', 'ring', 'path', 'star', 'directed_ring']),
+       gain=st.floats(40.0, 300.0), omega=st.floats(0.0, 15.0), node=st.integers(0, 3))
+def test_it_is_where_the_field_vanishes_and_the_simulation_ends(
+        name: str, gain: float, omega: float, node: int) -> None:
+    network, gains = system(name, gain), np.zeros(4)
+    gains[node] = 600.0
+    rest = inhibited_equilibrium(network, omega, gains)
+    assert rest is not None and rest.slowest_rate > 0.0
+    assert np.abs(network.field(rest.state, omega, gains)).max() < 1e-6
+    x = network.target.copy()
+    for _ in range(round(min(25.0 / rest.slowest_rate, 6.0) / 0.004)):
+        x = network.step(x, omega, gains, 0.004)
+    assert np.abs(x - rest.state).max() < 1e-6
+    assert np.allclose(rest.radius, np.linalg.norm(x, axis=1), atol=1e-6)
+
+
+@pytest.mark.parametrize(('gain', 'omega'), [(10.0, 8.8), (30.0, 8.8), (100.0, 8.8)])
+def test_a_follower_of_a_held_leader_rests_by_the_arctangent_ahead(gain: float,
+                                                                   omega: float) -> None:
+    # f(y) + k (x_d - y) = 0 with the leader at x_d: tan(angle) = omega/(k - rho(1 - R^2)).
+    network = CanonicalSystem(graph_from_edges(2, ((1, 0),), gain), AndronovHopf(8.0))
+    rest = inhibited_equilibrium(network, omega, np.array([1e6, 0.0]))
+    assert rest is not None
+    R = rest.radius[1]
+    expected = np.arctan2(omega, gain - 8.0 * (1.0 - R * R))
+    assert rest.phase_ahead[1] == pytest.approx(expected, abs=1e-3)
+    assert R < 1.0 and rest.phase_ahead[0] == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_leader_holds_all_rotors() -> None:
+    network, gains = system('all_to_all', 200.0), np.array([800.0, 0.0, 0.0, 0.0])
+    rest = inhibited_equilibrium(network, 10.0, gains)
+    assert rest is not None
+    assert rest.distance[0] == pytest.approx(4.0 * 10.0 / 800.0, rel=0.05)
+
+
+def test_without_enough_coupling_there_is_none() -> None:
+    assert inhibited_equilibrium(system('path', 5.0), 13.0, np.array([400.0, 0, 0, 0])) is None
+
+
+def test_at_zero_frequency_everyone_rests_in_place() -> None:
+    rest = inhibited_equilibrium(system('ring', 50.0), 0.0, np.array([0.0, 300.0, 0.0, 0.0]))
+    assert rest is not None
+    assert np.allclose(rest.phase_ahead, 0.0) and np.allclose(rest.radius, 1.0)

@@ -1,0 +1,90 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Votes: a majority stops the gait, fewer do not, and thresholds are those of simulation."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.contraction.voting import (
+    certified_threshold,
+    majority_clamp,
+    rest_threshold,
+)
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.hopf import AndronovHopf
+from dmp_cpg_ros.core.inhibition import Inhibition
+from dmp_cpg_ros.core.phase import state_at
+
+OMEGA, REGION = 10.0, 0.3
+
+
+def network(name: str, gain: float) -> CanonicalSystem:
+    phases = np.array([0.0, np.pi, 1.5 * np.pi, 0.5 * np.pi])
+    return CanonicalSystem(graph_from_edges(4, topology(name, 4), gain, phases),
+                           AndronovHopf(8.0), state_at(phases))
+
+
+def stopped(system: CanonicalSystem, alpha: float, voters: tuple[int, ...]) -> bool:
+    """Whether the vote stops the gait from its locked state; each vote acts in its own region."""
+    gains = np.zeros(4)
+    gains[list(voters)] = alpha
+    vote = Inhibition(True, gains, REGION)
+    x = state_at(1.0 + system.graph.phases)
+    for _ in range(700):
+        x = system.step(x, OMEGA, vote.acting_gains(x, system.target), 0.005)
+    acting = vote.acting_gains(x, system.target)
+    still = np.abs(system.field(x, OMEGA, acting)).max() < 1e-2
+    return bool(still and np.array_equal(acting, gains))
+
+
+@pytest.mark.parametrize('name', ['all_to_all', 'ring'])
+@pytest.mark.parametrize('voters', [(0,), (0, 1), (1, 2, 3)])
+def test_the_threshold_of_simulation_is_within_a_tenth_of_the_computed_one(
+        name: str, voters: tuple[int, ...]) -> None:
+    system = network(name, 100.0)
+    computed = rest_threshold(system, OMEGA, voters, REGION)
+    assert not stopped(system, 0.9 * computed, voters)
+    assert stopped(system, 1.1 * computed, voters)
+
+
+@pytest.mark.parametrize('name', ['all_to_all', 'ring', 'star'])
+def test_what_is_certified_is_never_below_the_threshold_and_stops(name: str) -> None:
+    system = network(name, 60.0)
+    for voters in ((0,), (1, 3), (0, 1, 2)):
+        certified = certified_threshold(system, OMEGA, voters, REGION)
+        assert certified >= rest_threshold(system, OMEGA, voters, REGION)
+        assert stopped(system, 1.01 * certified, voters)
+
+
+@pytest.mark.parametrize('majority', [2, 3])
+def test_a_majority_stops_the_gait_and_a_smaller_vote_does_not(majority: int) -> None:
+    system = network('all_to_all', 60.0)
+    clamp = majority_clamp(system, OMEGA, REGION, majority)
+    assert clamp.possible and clamp.majority == majority
+    alpha = 0.5 * (clamp.lowest + clamp.highest)
+    for voters in combinations(range(4), majority):
+        assert stopped(system, alpha, voters)
+    for voters in combinations(range(4), majority - 1):
+        assert not stopped(system, alpha, voters)
+
+
+def test_a_majority_stops_a_network_whose_couplings_are_too_weak_for_one_leg() -> None:
+    system = network('ring', 4.0)
+    assert certified_threshold(system, OMEGA, (0,), REGION) == np.inf
+    assert rest_threshold(system, OMEGA, (0,), REGION) == np.inf
+    clamp = majority_clamp(system, OMEGA, REGION, 4)
+    assert clamp.lowest < np.inf
+    assert stopped(system, 1.01 * clamp.lowest, (0, 1, 2, 3))
+    assert not stopped(system, 1.01 * clamp.lowest, (0,))
+
+
+def test_a_majority_of_none_or_of_more_than_there_are_is_refused() -> None:
+    for majority in (0, 5):
+        with pytest.raises(ParameterError, match='between 1 and 4'):
+            majority_clamp(network('ring', 50.0), OMEGA, REGION, majority)
