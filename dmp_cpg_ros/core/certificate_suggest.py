@@ -19,7 +19,7 @@ MARGIN = 1.25
 """Factor by which a suggested gain exceeds what its inequality needs."""
 
 GAIN_ROWS = ('synchronisation', 'contraction', 'capture', 'rest_in_region', 'time_step',
-             'hierarchy', 'rest_radius', 'time_to_rest')
+             'hierarchy', 'rest_posture', 'rest_radius', 'time_to_rest')
 """Inequalities that the two gains decide; the others depend on other parameters."""
 
 _LARGEST_COUPLING, _LARGEST_INHIBITION = 1e4, 1e5

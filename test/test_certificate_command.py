@@ -1,0 +1,77 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``certify``: its table, its JSON, its suggestions and its exit status."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from dmp_cpg_ros.commands.certify import main
+from dmp_cpg_ros.configuration import find_config
+
+
+def file_with(folder: Path, **changes: object) -> str:
+    """The suite's file with other values."""
+    text = find_config('suite.yaml').read_text(encoding='utf-8')
+    for name, value in changes.items():
+        lines = text.splitlines()
+        text = '\n'.join(line.split(name)[0] + f'{name}: {value}'
+                         if line.strip().startswith(f'{name}:') else line for line in lines)
+    path = folder / 'changed.yaml'
+    path.write_text(text, encoding='utf-8')
+    return str(path)
+
+
+def test_the_packages_own_parameters_hold(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([]) == 0
+    out = capsys.readouterr().out
+    assert 'certificate: holds' in out and 'capture' in out and 'k_inh = 400' in out
+
+
+@pytest.mark.parametrize('gait', ['walk', 'trot', 'pace', 'bound', 'pronk'])
+def test_every_gait_can_be_certified(gait: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['--gait', gait, '--ros-args', '-p', 'a:=1']) == 0
+    assert f': {gait} at up to' in capsys.readouterr().out
+
+
+def test_a_required_inequality_that_fails_is_named_with_status_1(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([file_with(tmp_path, inhibition_gain=120.0)]) == 1
+    captured = capsys.readouterr()
+    assert 'fails: capture:' in captured.err and 'is not < k_inh = 120' in captured.err
+    assert 'certificate: FAILS' in captured.out
+
+
+def test_json_has_every_inequality_and_the_suggestion(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = file_with(tmp_path, inhibition_gain=120.0, coupling_gain=6.0)
+    assert main([path, '--json', '--suggest']) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert not found['holds'] and 'capture' in found['failing']
+    better = file_with(tmp_path, **{name: float(value)
+                                    for name, value in found['suggestion'].items()})
+    assert main([better]) == 0
+
+
+@pytest.mark.parametrize(('arguments', 'said'), [
+    (['there_is_none.yaml'], 'does not exist'),
+    (['--gait', 'gallop'], 'valid are amble'),
+    (['--robot', 'robots/horse.yaml'], 'does not exist'),
+])
+def test_bad_input_has_status_2(arguments: list[str], said: str,
+                                capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(arguments) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_names_and_values_that_are_wrong_have_status_2(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'typo.yaml'
+    path.write_text('/**:\n  ros__parameters:\n    inhibition_gian: 400.0\n', encoding='utf-8')
+    assert main([str(path)]) == 2
+    assert "no parameter 'inhibition_gian'" in capsys.readouterr().err
+    assert main([file_with(tmp_path, region_radius=-1.0)]) == 2
+    assert "'region_radius' = -1.0" in capsys.readouterr().err

@@ -1,0 +1,116 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The bounds on the time to rest and to walking are never exceeded by what the nodes run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from core_examples import TICK, network
+
+from dmp_cpg_ros.core.certificate import certify
+from dmp_cpg_ros.core.gait_network import GaitNetwork
+from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.leg_primitive import LegParameters
+from dmp_cpg_ros.core.posture import PostureParameters
+from dmp_cpg_ros.core.reference import ReferenceParameters, ReferenceSystem
+
+LEG, POSTURE = LegParameters(), PostureParameters()
+
+
+class Gait:
+    """Reference, oscillators and supervisor in the order of a tick, without a robot."""
+
+    def __init__(self, gait: GaitNetwork, inhibition: InhibitionParameters,
+                 reference: ReferenceParameters, x: np.ndarray, r: np.ndarray,
+                 stop: SupervisorState | None = None) -> None:
+        self.network, self.reference = gait, ReferenceSystem(reference)
+        self.supervisor = GaitSupervisor(inhibition, gait, LEG.activity_rate)
+        self.stop = stop or replace(self.supervisor.initial_state(), word='walking',
+                                    requested=False, armed=False, activity=np.ones(4))
+        self.published, self.x, self.r = self.supervisor.inhibition(self.stop), x, r
+        self.command = tuple(r.tolist())
+        self.tick_count = 0
+
+    def tick(self) -> SupervisorState:
+        self.tick_count += 1
+        r_ext = np.zeros(3) if self.published.requested else np.array(self.command)
+        self.r = self.reference.step(self.r, r_ext, TICK)
+        self.x = self.network.step(self.x, self.r, self.published, TICK)
+        rate = self.network.rate(self.x, self.r, self.published)
+        self.stop = self.supervisor.step(self.stop, self.tick_count * round(TICK * 1e9), self.x,
+                                         rate, self.r, self.command)
+        self.published = self.supervisor.inhibition(self.stop)
+        return self.stop
+
+    def until(self, word: str, request: bool, limit: float) -> float:
+        """Time from a request to a state word [s]."""
+        self.stop = self.supervisor.request(self.stop, request)
+        begin = self.tick_count
+        while self.stop.word != word and (self.tick_count - begin) * TICK < limit:
+            self.tick()
+        return (self.tick_count - begin) * TICK
+
+
+def settings() -> list[tuple[str, dict[str, object], InhibitionParameters, ReferenceParameters]]:
+    plain, slow = ReferenceParameters(), ReferenceParameters(alpha_r=6.0, max_speed=0.5)
+    return [
+        ('amble', {}, InhibitionParameters(auto_inhibit=False), plain),
+        ('trot', {'coupling_graph': 'ring', 'coupling_gain': 60.0},
+         InhibitionParameters(auto_inhibit=False, inhibited_legs=('rr',)), slow),
+        ('walk', {'coupling_graph': 'path'},
+         InhibitionParameters(auto_inhibit=False, capture_speed=0.3), plain),
+        ('pace', {'coupling_graph': 'star', 'coupling_gain': 25.0, 'rho': 5.0},
+         InhibitionParameters(auto_inhibit=False, inhibition_gain=320.0, region_radius=0.4), slow),
+        ('amble', {'coupling_graph': 'directed_ring', 'radius': 0.5, 'rho': 30.0},
+         InhibitionParameters(auto_inhibit=False, region_radius=0.15,
+                              inhibited_legs=('fr', 'rl')), slow)]
+
+
+@pytest.mark.parametrize('case', range(5))
+def test_no_stop_takes_longer_than_its_bound_from_any_phase_and_speed(case: int) -> None:
+    gait, canonical, inhibition, reference = settings()[case]
+    oscillators = network(gait, **canonical)
+    found = certify(oscillators, inhibition, reference, LEG, POSTURE, TICK)
+    assert found.holds, found.explained()
+    limits = np.array([reference.max_speed, reference.max_lateral_speed, reference.max_turn_rate])
+    longest = 0.0
+    for phase in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
+        for share in (1.0, 0.25):
+            run = Gait(oscillators, inhibition, reference, oscillators.locked_state(phase),
+                       share * limits)
+            longest = max(longest, run.until('at_rest', True, 1.5 * found.time_to_rest))
+    assert longest <= found.time_to_rest
+    assert found.time_to_rest < 1.6 * longest            # a bound, and not a platitude
+
+
+@pytest.mark.parametrize('case', range(5))
+def test_no_start_takes_longer_than_its_bound_and_stops_within_starts_keep_theirs(
+        case: int) -> None:
+    gait, canonical, inhibition, reference = settings()[case]
+    oscillators = network(gait, **canonical)
+    found = certify(oscillators, inhibition, reference, LEG, POSTURE, TICK)
+    speed = np.array([reference.max_speed, 0.0, 0.0])
+    run = Gait(oscillators, inhibition, reference, oscillators.locked_state(), 0.2 * speed)
+    run.until('at_rest', True, 5.0)
+    for _ in range(100):
+        run.tick()
+    resting = (run.x, run.stop)
+    assert run.until('walking', False, 5.0) <= found.time_to_walking
+    for delay in (1, 20, 60, 150):                       # ticks after the release
+        again = Gait(oscillators, inhibition, reference, resting[0], np.zeros(3), resting[1])
+        again.command = tuple(speed.tolist())
+        again.tick_count = run.tick_count
+        again.stop = again.supervisor.request(again.stop, False)
+        for _ in range(delay):
+            again.tick()
+        assert again.until('at_rest', True, 2.0 * found.time_to_rest) <= found.time_to_rest
+
+
+def test_the_bound_grows_with_the_distance_to_the_speed_of_capture() -> None:
+    bounds = [certify(network(), InhibitionParameters(capture_speed=speed), ReferenceParameters(),
+                      LEG, POSTURE, TICK).time_to_rest for speed in (0.05, 0.1, 0.4)]
+    assert bounds[0] > bounds[1] > bounds[2]
