@@ -64,6 +64,7 @@ class CanonicalSystem:
             if target is None
             else np.asarray(target, dtype=float)
         )
+        self._growth_at_origin = self.rho * self.radius**2
         self._coupling = graph.coupling_matrix()
         self._steps: dict[tuple[bytes, float], ExponentialStep] = {}
 
@@ -144,7 +145,7 @@ class CanonicalSystem:
 
     def _nonlinear(self, omega: float | Array) -> Callable[[Array], Array]:
         """N(x) = ω S x + ρ(r² − |x|²) x as one product with the complex number x₁ + i x₂."""
-        rho, linear = self.rho, self.rho * self.radius**2 - 1j * np.asarray(omega)
+        rho, linear = self.rho, self._growth_at_origin - 1j * omega
 
         def nonlinear(x: Array) -> Array:
             z = x.view(complex)

