@@ -1,0 +1,155 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What really works, by simulation and bisection: the yardstick of the certificates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.certificate import certify
+from dmp_cpg_ros.core.contraction.connectivity import synchronisation_complement
+from dmp_cpg_ros.core.gait import BodyScale
+from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor
+from dmp_cpg_ros.core.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.hopf import AndronovHopf
+from dmp_cpg_ros.core.inhibition import Inhibition
+from dmp_cpg_ros.core.phase import state_at
+from dmp_cpg_ros.core.reference import ReferenceSystem
+from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.suite import load_gait
+
+Array = NDArray[np.float64]
+
+SIZE = 4
+STEP = 0.005  # [s]
+
+
+def network(graph: str, coupling: float, rho: float) -> CanonicalSystem:
+    """Four oscillators of radius 1 on a named graph, with the places of an amble."""
+    phases = -2.0 * np.pi * np.array([0.0, 0.5, 0.75, 0.25])
+    edges = topology(graph, SIZE)
+    return CanonicalSystem(graph_from_edges(SIZE, edges, coupling, phases), AndronovHopf(rho),
+                           state_at(phases))
+
+
+def threshold(works: Callable[[float], bool], failing: float, working: float,
+              precision: float = 0.01) -> float:
+    """Value at which something begins to work, by bisection between two positive ones.
+
+    Parameters
+    ----------
+    works : callable
+        float → bool.
+    failing, working : float
+        Values on either side, in either order; they are moved apart until they are.
+    precision : float
+        Relative precision.
+
+    Returns
+    -------
+    float
+        The last value that worked.
+    """
+    factor = 2.0 if working > failing else 0.5
+    for _ in range(12):
+        if works(working):
+            break
+        failing, working = working, working * factor
+    for _ in range(12):
+        if not works(failing):
+            break
+        failing /= factor
+    while abs(np.log(working / failing)) > precision:
+        middle = float(np.sqrt(working * failing))
+        failing, working = (failing, middle) if works(middle) else (middle, working)
+    return working
+
+
+def synchronises(graph: str, coupling: float, rho: float, omega: float) -> bool:
+    """Whether disagreement dies out from the state in which coupling is weakest.
+
+    Near the origin, where the oscillators grow apart fastest, in the eigenvector of the smallest
+    eigenvalue that counts.
+    """
+    system = network(graph, coupling, rho)
+    L, V = system.graph.block_laplacian(), synchronisation_complement(SIZE)
+    weakest = V.T @ np.linalg.eigh(V @ (L + L.T) @ V.T)[1][:, 0]
+    z = 1e-6 * (weakest[0::2] - 1j * weakest[1::2]) * np.exp(1j * system.graph.phases)
+    x = np.stack([z.real, -z.imag], axis=1)
+    for _ in range(600):
+        x = system.step(x, omega, np.zeros(SIZE), 0.5 * STEP)
+    z = (x[:, 0] - 1j * x[:, 1]) * np.exp(-1j * system.graph.phases)
+    return bool(np.linalg.norm(z - z.mean()) < 1e-6)
+
+
+def stops(system: CanonicalSystem, omega: float, gains: Array, region_radius: float,
+          seconds: float = 4.0, phases: int = 3) -> bool:
+    """Whether switched inhibition brings the locked gait to rest, from several phases."""
+    vote = Inhibition(True, gains, region_radius)
+    for phi in np.linspace(1.0, 1.0 + 2.0 * np.pi, phases, endpoint=False):
+        x = state_at(phi + system.graph.phases)
+        for _ in range(round(seconds / STEP)):
+            x = system.step(x, omega, vote.acting_gains(x, system.target), STEP)
+        acting = vote.acting_gains(x, system.target)
+        moving = np.abs(system.field(x, omega, acting)).max()
+        if not np.array_equal(acting, gains) or moving > 1e-2 * omega:
+            return False
+    return True
+
+
+def stays_together(system: CanonicalSystem, omega: float, mismatch: float,
+                   phase_spread: float) -> bool:
+    """Whether phases stay within a spread for every choice of signs of the mismatch."""
+    for signs in product((1.0, -1.0), repeat=SIZE - 1):
+        omegas = omega + mismatch * np.array([1.0, *signs])
+        x = state_at(system.graph.phases)
+        for _ in range(300):
+            x = system.step(x, omegas, np.zeros(SIZE), STEP)
+        z = (x[:, 0] - 1j * x[:, 1]) * np.exp(-1j * system.graph.phases)
+        if np.ptp(np.angle(z / z[0])) > phase_spread:
+            return False
+    return True
+
+
+def stop_times(graph: str, phases: int = 12) -> tuple[float, float]:
+    """Bound on the time to rest of the default amble, and its slowest stop at the highest speed.
+
+    Returns
+    -------
+    bound, slowest : float
+        [s]
+    """
+    p, tick = SuiteParameters(), 0.004
+    gait = GaitNetwork(CanonicalParameters(coupling_graph=graph), load_gait('amble'),
+                       BodyScale(0.28, 0.22))
+    bound = certify(gait, p.inhibition, p.reference, p.leg, p.posture, tick).time_to_rest
+    supervisor = GaitSupervisor(p.inhibition, gait, p.leg.activity_rate)
+    fastest = np.array([p.reference.max_speed, p.reference.max_lateral_speed,
+                        p.reference.max_turn_rate])
+    walking = replace(supervisor.initial_state(), word='walking', requested=False, armed=False,
+                      automatic=False, activity=np.ones(SIZE))
+    published = supervisor.inhibition(walking)
+    slowest = max(
+        predict(supervisor, ReferenceSystem(p.reference), supervisor.request(walking, True),
+                published, gait.locked_state(float(phi)), fastest, (0.0, 0.0, 0.0), tick)
+        for phi in np.linspace(0.0, 2.0 * np.pi, phases, endpoint=False))
+    return bound, slowest
+
+
+def keeps_walking(system: CanonicalSystem, omega: float, step: float) -> bool:
+    """Whether a perturbed network still comes to its limit cycle with this time step."""
+    rng = np.random.default_rng(0)
+    x = state_at(system.graph.phases) + 0.3 * rng.normal(size=(SIZE, 2))
+    with np.errstate(over='ignore', invalid='ignore'):
+        for _ in range(600):
+            x = system.step(x, omega, np.zeros(SIZE), step)
+        z = (x[:, 0] - 1j * x[:, 1]) * np.exp(-1j * system.graph.phases)
+        return bool(np.abs(z - z[0]).max() < 1e-6 and np.all(np.abs(np.abs(z) - 1.0) < 0.2))
