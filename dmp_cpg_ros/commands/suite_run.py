@@ -26,6 +26,7 @@ from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario import Scenario
 from dmp_cpg_ros.nodes.executors import make_executor
+from dmp_cpg_ros.nodes.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
 
@@ -100,6 +101,7 @@ def run_suite(plan: RunPlan, say: Say) -> None:
     group = ProcessGroup(plan.logs)
     with _interrupt() as interrupted:
         os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        prepare_middleware()
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         try:
             _start(plan, group)

@@ -17,6 +17,7 @@ from rclpy.clock_type import ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
@@ -26,6 +27,7 @@ from dmp_cpg_ros.core.suite_parameters import (
 )
 from dmp_cpg_ros.nodes.conversions import JointTargetsReader
 from dmp_cpg_ros.nodes.executors import run_node
+from dmp_cpg_ros.nodes.interfaces import Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
 from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
@@ -34,7 +36,7 @@ from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
-from dmp_cpg_ros.robot.port import Robot
+from dmp_cpg_ros.robot.port import Robot, RobotError
 from dmp_cpg_ros.robot.target_guard import TargetGuard
 
 READY_PERIOD_S = 0.05
@@ -44,6 +46,9 @@ MAKE_UP_NS = 100_000_000
 """Wall time that a robot in real time may lag behind and make up again; what is more is lost
 [ns].
 """
+
+CLOCK_EVERY = 4
+"""In real time ``/clock`` ticks with every so many states: the suite itself goes by stamps."""
 
 STATE_TOPICS = ('/clock', 'imu', 'odom', 'foot_contacts', 'joint_states')
 """What the robot publishes at every tick, the tick itself last."""
@@ -107,6 +112,16 @@ class MujocoRobotNode(ManagedNode):
         if self._viewer is not None:
             self._viewer.close()
 
+    def readers(self, topic: Interface) -> tuple[str, ...]:
+        """Count the legs among the readers of joint_states where they measure."""
+        readers = super().readers(topic)
+        if (
+            topic.name == 'joint_states'
+            and self.parameters_of(RobotParameters).reading == 'torque'
+        ):
+            readers = (*readers, 'leg_transformation')
+        return readers
+
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the robot has fallen or stands by itself."""
         return {
@@ -123,7 +138,10 @@ class MujocoRobotNode(ManagedNode):
         self._holding = False
         self.begin_tick(stamp)
         writer = self._writer
-        writer.fill(self._state)
+        try:
+            writer.fill(self._state)
+        except DataError as error:
+            raise RobotError(f'the robot at {stamp * 1e-9:.3f} s: {error}') from error
         messages = (
             writer.clock,
             writer.imu,
@@ -132,7 +150,10 @@ class MujocoRobotNode(ManagedNode):
             writer.joint_states,
         )
         self._timing.published(stamp)
-        for publisher, message in zip(self._state_publishers, messages, strict=True):
+        first = 0 if self._lock_step or stamp // self._tick_ns % CLOCK_EVERY == 0 else 1
+        for publisher, message in zip(
+            self._state_publishers[first:], messages[first:], strict=True
+        ):
             publisher.publish(message)
         self.end_tick()
 
