@@ -141,8 +141,12 @@ def _capture(network: GaitNetwork, inhibition: InhibitionParameters, span: Opera
     rest = analysis.rest_at_speed
     distance = float('inf') if rest is None or not rest.slowest_rate > 0.0 else float(
         rest.distance[held].max())
+    # The legs' oscillators are alike: only how many act on them makes a difference.
+    heard = np.array([sum(edge[0] == node for edge in network.system.graph.edges)
+                      for node in np.flatnonzero(held)])
+    different = np.flatnonzero(held)[np.unique(heard, return_index=True)[1]]
     anywhere = max(needed_gain_anywhere(network.system, span.omega[1], int(node), r0)
-                   for node in np.flatnonzero(held))
+                   for node in different)
     exists = '' if np.isfinite(distance) else '; there is none, the other legs break free'
     cadence = f'at the highest cadence, {span.omega[1]:.4g} rad/s'
     return [

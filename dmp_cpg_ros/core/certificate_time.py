@@ -41,7 +41,7 @@ DELAY_TICKS = 6
 """Ticks that requests, arming and sampling may add to the continuous bound."""
 
 _STEP = 0.01  # [s]
-_HORIZON = 30.0  # [s]
+_HORIZON = 10.0  # [s] beyond it a bound is of no use
 
 
 def time_to_rest(network: GaitNetwork, capture: CaptureSet, rest: InhibitedEquilibrium | None,
@@ -155,7 +155,7 @@ def _settling(network: GaitNetwork, capture: CaptureSet, rest: InhibitedEquilibr
     activity = np.ones(len(K))
     for k in range(int(_HORIZON / _STEP)):
         inner = np.maximum(capture.smallest_radius, rest.radius - e)
-        phase_rate = np.where(inner > 0.0, v / np.maximum(inner, 1e-300), np.inf)
+        phase_rate = np.divide(v, inner, out=np.full_like(v, np.inf), where=inner > 1e-12)
         if (phase_rate.max() <= REST_PHASE_RATE and speed <= REST_SPEED
                 and activity.max() <= REST_ACTIVITY):
             return k * _STEP

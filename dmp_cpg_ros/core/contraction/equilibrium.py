@@ -22,7 +22,8 @@ from dmp_cpg_ros.core.phase import phase, wrapped
 Array = NDArray[np.float64]
 
 _CONVERGED = 1e-11
-_SMALLEST_STEP = 1e-3
+_SMALLEST_STEP = 1e-3  # of ω, on the way from zero
+_MOST_STEPS = 50
 
 
 @dataclass(frozen=True)
@@ -75,15 +76,17 @@ def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array,
     if x is None:
         return None
     share, step = 0.0, 0.5
-    while share < 1.0:
+    for _ in range(_MOST_STEPS):
         ahead = min(1.0, share + step)
         following = _newton(system, x, ahead * np.asarray(omega), gains)
-        if following is None:
-            step *= 0.5
-            if step < _SMALLEST_STEP:
-                return None
-        else:
-            x, share = following, ahead
+        if following is not None:
+            x, share, step = following, ahead, 1.5 * step
+        elif step > _SMALLEST_STEP:
+            step *= 0.4
+        if share == 1.0 or (following is None and step <= _SMALLEST_STEP):
+            break
+    if share < 1.0:
+        return None
     rates = np.linalg.eigvals(system.jacobian(x, omega, gains)).real
     return InhibitedEquilibrium(
         x, wrapped(phase(x) - system.graph.phases), np.hypot(x[:, 0], x[:, 1]),
