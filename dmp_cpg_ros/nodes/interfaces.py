@@ -145,7 +145,8 @@ TOPICS: tuple[Interface, ...] = (
     Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds',
               (_ROBOT,), ('user',), latched=True, sometimes=(_ROBOT,)),
     Interface(f'{GATE_OWNER}/advance_until', Clock,
-              'stamp up to which the gate lets ticks pass', ('user',), (_ROBOT,)),
+              'stamp up to which the gate lets ticks pass', ('user',), (_ROBOT,),
+              sometimes=(_ROBOT,)),
 )
 """Topics of the suite."""
 

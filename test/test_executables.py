@@ -1,0 +1,157 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every executable alone: help, bad parameters, Ctrl-C, and input that is not a number."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import ros_processes
+from rcl_interfaces.srv import GetParameters
+from ros_processes import Processes, Ros
+from std_srvs.srv import SetBool
+
+from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.nodes.conversions import CANONICAL_NAMES, CORRECTION_NAMES, SHIFT_NAMES
+from dmp_cpg_ros.nodes.interfaces import INTERFACES, published_by, read_by
+
+processes, ros, ros_domain = (
+    ros_processes.processes,
+    ros_processes.ros,
+    ros_processes.ros_domain,
+)
+
+NODES = (
+    'reference_filter',
+    'canonical_oscillators',
+    'leg_transformation',
+    'inhibition',
+    'posture_control',
+    'mujoco_robot',
+    'bag_recorder',
+)
+COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'study_stops')
+
+NAMES = {
+    'joint_states': JOINT_NAMES,
+    'canonical_state': CANONICAL_NAMES,
+    'posture_feedback': JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES,
+    'joint_targets': tuple(f'fl_{joint}' for joint in JOINTS_OF_LEG),
+    'foot_contacts': tuple(f'{leg}_foot' for leg in LEGS),
+}
+OUTPUTS = (
+    'reference',
+    'canonical_state',
+    'posture_feedback',
+    'joint_targets',
+    'joint_states',
+    'odom',
+)
+
+
+@pytest.mark.parametrize('name', NODES + COMMANDS)
+def test_help_names_what_there_is(processes: Processes, name: str) -> None:
+    folder = 'nodes' if name in NODES else 'commands'
+    process = processes.python('-m', f'dmp_cpg_ros.{folder}.{name}', '--help')
+    assert process.wait() == 0
+    assert name in process.output
+    if name in NODES and name != 'bag_recorder':
+        for topic in (*published_by(name), *read_by(name)):
+            assert topic.name in process.output
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_a_bad_parameter_is_named_with_what_is_valid(processes: Processes, name: str) -> None:
+    bad = {
+        'reference_filter': ('alpha_r', -1.0, '0.05'),
+        'canonical_oscillators': ('gait', 'gallop', 'amble'),
+        'leg_transformation': ('leg', 'middle', 'fl, fr, rl, rr'),
+        'inhibition': ('region_radius', math.nan, '0.001'),
+        'posture_control': ('robot', 'no_robot.yaml', 'no_robot.yaml'),
+        'mujoco_robot': ('control_rate', 333.0, 'whole microseconds'),
+        'bag_recorder': ('storage', 'tape', 'mcap'),
+    }
+    parameter, value, valid = bad[name]
+    text = '.nan' if isinstance(value, float) and math.isnan(value) else str(value)
+    process = processes.python(
+        '-m', f'dmp_cpg_ros.nodes.{name}', '--ros-args', '-p', f'{parameter}:={text}'
+    )
+    assert process.wait() == 2, process
+    assert valid in process.output, process
+    assert 'Traceback' not in process.output
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_not_a_number_neither_ends_a_node_nor_leaves_it(
+    processes: Processes, ros: Ros, tmp_path: Path, name: str
+) -> None:
+    options = {'output': str(tmp_path / 'bag')} if name == 'bag_recorder' else {}
+    process = processes.node(name, **options)
+    ros.call(GetParameters, f'{name}/get_parameters', GetParameters.Request(names=['autostart']))
+    outputs = {
+        topic.name: ros.collect(topic.type, topic.name, topic.reader_qos)
+        for topic in published_by(name)
+    }
+    publishers = [
+        (ros.node.create_publisher(topic.type, topic.name, topic.publisher_qos), topic)
+        for topic in read_by(name)
+        if topic.name not in outputs
+        and topic.name != '/diagnostics'
+        and name not in topic.sometimes
+    ]
+    ros.spin_until(lambda: all(publisher.get_subscription_count() for publisher, _ in publishers))
+    for round_ in range(3):
+        for publisher, topic in publishers:
+            publisher.publish(poisoned(topic.type, topic.name, round_))
+    request = GetParameters.Request(names=['autostart'])
+    answer = ros.call(GetParameters, f'{name}/get_parameters', request)
+    assert answer.values[0].bool_value
+    if name == 'inhibition':
+        assert not ros.call(SetBool, 'inhibit', SetBool.Request(data=True)).success
+    for topic, messages in outputs.items():
+        for message in messages if topic in OUTPUTS else ():
+            assert all(math.isfinite(value) for value in numbers_of(message)), topic
+    process.interrupt()
+    assert process.wait() == 0, process
+    assert 'Traceback' not in process.output, process
+
+
+def poisoned(kind: type, name: str, round_: int) -> Any:
+    """Message of a topic with numbers that are not finite and otherwise right names and stamps."""
+    bad = (math.nan, math.inf, -math.inf)[round_]
+    message = kind()
+    if hasattr(message, 'header'):
+        message.header.stamp.sec = round_ + 1
+    if name in NAMES:
+        message.name = list(NAMES[name])
+        for field in ('position', 'velocity', 'effort'):
+            setattr(message, field, [bad] * len(message.name))
+    elif name in ('reference', 'odom', 'cmd_vel'):
+        twist = message
+        while hasattr(twist, 'twist'):
+            twist = twist.twist
+        twist.linear.x = twist.angular.z = bad
+    return message
+
+
+def numbers_of(message: Any) -> list[float]:
+    """All floats in a message."""
+    if isinstance(message, float):
+        return [message]
+    if hasattr(message, 'get_fields_and_field_types'):
+        fields = message.get_fields_and_field_types()
+        return [value for field in fields for value in numbers_of(getattr(message, field))]
+    if isinstance(message, (str, bytes, int)):
+        return []
+    return [value for entry in message for value in numbers_of(entry)]
+
+
+def test_every_node_of_the_contract_is_here() -> None:
+    kinds = {kind for topic in INTERFACES.values() for kind in topic.publishers}
+    assert kinds - {'user'} <= set(NODES)
