@@ -11,6 +11,7 @@ from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.executors import run_nodes
 from dmp_cpg_ros.nodes.inhibition import InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
+from dmp_cpg_ros.nodes.local_delivery import LocalDelivery
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.posture_control import PostureControl
@@ -42,8 +43,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if arguments is None else arguments)
 
     def make() -> Iterator[ManagedNode]:
+        local = LocalDelivery(CLASSES)
         for member in SUITE_NODES:
-            yield CLASSES[member.kind](member.name)
+            node = CLASSES[member.kind](member.name)
+            node.local = local
+            yield node
 
     return run_nodes('composed_suite', arguments, make)
 

@@ -115,6 +115,7 @@ class BagRecorder(ManagedNode):
                 self.end_tick()
 
         subscription = self.listen(topic, receive, raw=True, qos=topic.recorder_qos)
+        assert subscription is not None, 'the recorder is a process of its own'
         fields = topic.type.get_fields_and_field_types()
         writers.append(self._bag.add_topic(
             subscription.topic_name, topic.type_name, topic.publisher_qos,

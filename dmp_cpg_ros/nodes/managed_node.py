@@ -21,6 +21,7 @@ from rclpy.subscription import Subscription
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.diagnostics import NodeHealth
 from dmp_cpg_ros.nodes.interfaces import Interface, interface, partners
+from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, LocalPublisher
 from dmp_cpg_ros.nodes.parameterized_node import ParameterizedNode
 from dmp_cpg_ros.nodes.readiness import missing_connections
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
@@ -41,7 +42,11 @@ class ManagedNode(ParameterizedNode):
     ----------
     health : NodeHealth
         Ticks, stamp and problems.
+    local : LocalDelivery or None
+        How it reaches nodes of the same process; None where it is alone.
     """
+
+    local: LocalDelivery | None = None
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
@@ -50,6 +55,7 @@ class ManagedNode(ParameterizedNode):
         self._entities: list[Publisher | Subscription | Service] = []
         self._commands: list[Subscription] = []
         self._commands_taken = 0
+        self._local_readers: list[Callable[[Any], None]] = []
         self._inputs: list[tuple[Interface, Subscription]] = []
         topic, ready = interface('/diagnostics'), interface('~/ready')
         self._diagnostics = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
@@ -67,21 +73,24 @@ class ManagedNode(ParameterizedNode):
 
     def readers(self, topic: Interface) -> tuple[str, ...]:
         """Kinds of nodes that read one of this node's topics, for :meth:`missing`."""
-        return partners(topic, readers=True)
+        inside = self.local.kinds if self.local is not None else ()
+        return tuple(kind for kind in partners(topic, readers=True) if kind not in inside)
 
     # Topics and services -----------------------------------------------------------------------
 
-    def publisher(self, name: str) -> Publisher:
+    def publisher(self, name: str) -> Publisher | LocalPublisher:
         """Create a publisher of an interface of the table."""
         topic = interface(name)
         publisher = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._entities.append(publisher)
         self._outputs.append((topic, publisher))
-        return publisher
+        if self.local is None:
+            return publisher
+        return LocalPublisher(publisher, topic.name, self.local)
 
     def listen(self, topic: str | Interface, callback: Callable[[Any], None], *,
                command: bool = False, raw: bool = False,
-               qos: QoSProfile | None = None) -> Subscription:
+               qos: QoSProfile | None = None) -> Subscription | None:
         """Create a subscription whose callback runs while the node is active.
 
         A :class:`~dmp_cpg_ros.core.errors.DataError` that the callback raises drops the message:
@@ -99,9 +108,18 @@ class ManagedNode(ParameterizedNode):
             Whether the callback takes serialized bytes.
         qos : QoSProfile, optional
             Default: the profile of the interface for the suite's nodes.
+
+        Returns
+        -------
+        Subscription or None
+            None when all publishers are in this process.
         """
         topic = topic if isinstance(topic, Interface) else interface(topic)
         receive = self._guarded(topic, callback)
+        if self.local is not None and self.local.kinds.issuperset(topic.publishers):
+            self.local.attach(topic.name, receive)
+            self._local_readers.append(receive)
+            return None
         subscription = self.create_subscription(
             topic.type, topic.name, self._counted(receive) if command else receive,
             qos or topic.reader_qos, raw=raw)
@@ -129,7 +147,9 @@ class ManagedNode(ParameterizedNode):
                 self.destroy_subscription(entity)
             else:
                 self.destroy_service(entity)
-        self._entities, self._commands, self._inputs = [], [], []
+        for reader in self._local_readers if self.local is not None else ():
+            self.local.detach(reader)  # type: ignore[union-attr]
+        self._entities, self._commands, self._inputs, self._local_readers = [], [], [], []
         self._outputs = self._outputs[:1]
 
     def missing(self) -> list[str]:
