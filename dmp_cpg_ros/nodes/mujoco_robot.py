@@ -37,6 +37,7 @@ from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
+from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.target_guard import TargetGuard
 
 READY_PERIOD_S = 0.05
@@ -115,10 +116,8 @@ class MujocoRobotNode(ManagedNode):
     def readers(self, topic: Interface) -> tuple[str, ...]:
         """Count the legs among the readers of joint_states where they measure."""
         readers = super().readers(topic)
-        if (
-            topic.name == 'joint_states'
-            and self.parameters_of(RobotParameters).reading == 'torque'
-        ):
+        measuring = self.local is None and self._options.reading == 'torque'
+        if topic.name == 'joint_states' and measuring:
             readers = (*readers, 'leg_transformation')
         return readers
 
@@ -264,7 +263,10 @@ class MujocoRobotNode(ManagedNode):
             return PerfectTrackingRobot(load_description(file), self._tick_ns)
         from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
-        return MujocoRobot(file, self._tick_ns, p.seed, p.initial_spread)
+        robot_file = load_robot_file(file)
+        if p.reading == 'torque':
+            robot_file = robot_file.without_gains()
+        return MujocoRobot(robot_file, self._tick_ns, p.seed, p.initial_spread)
 
 
 def main() -> int:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.resources
 import importlib.util
 import math
@@ -57,6 +58,10 @@ class RobotFile:
     kd: Triple | None = None
     torque_limit: Triple | None = None
     velocity_limit: Triple | None = None
+
+    def without_gains(self) -> RobotFile:
+        """The same robot with a joint drive that applies torques only, for the torque reading."""
+        return dataclasses.replace(self, kp=(0.0, 0.0, 0.0), kd=(0.0, 0.0, 0.0))
 
 
 def own_robot_file() -> RobotFile:
