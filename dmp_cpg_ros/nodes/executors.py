@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import sys
 import time
@@ -80,6 +81,9 @@ def spin(nodes: Node | Sequence[Node], kind: str = 'events', until: Future | Non
     nodes = [nodes] if isinstance(nodes, Node) else list(nodes)
     context, until = nodes[0].context, until or Future()
     executor = make_executor(kind, context)
+    # What start-up made stays; without this the collector would look through it in mid-tick.
+    gc.collect()
+    gc.freeze()
     try:
         for node in nodes:
             executor.add_node(node)
