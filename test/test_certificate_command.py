@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+pytest.importorskip('mujoco')  # the robot's geometry is read from its model
+
 from dmp_cpg_ros.commands.certify import main
 from dmp_cpg_ros.configuration import find_config
 
