@@ -1,10 +1,15 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One stop and start of the MuJoCo robot in the plain loop, as the nodes would do in lock-step."""
+"""Stops and starts of the MuJoCo robot in the plain loop, as the nodes would do in lock-step.
+
+The robot walks once for all request phases of a gait and speed; every case goes on from a copy of
+robot and loop at its phase, and so gives the same numbers as a run of its own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +17,7 @@ import numpy as np
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.stop_outcome import WALKING_ERROR, StopOutcome, body_at_rest
 from dmp_cpg_ros.commands.loop_recording import recording_of
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.stop_baselines import FreezingLoop
@@ -73,16 +79,17 @@ def with_cadence(gait: Gait, factor: float) -> Gait:
     return replace(gait, cadence=gait.cadence * factor)
 
 
-def run_trial(robot: MujocoRobot, case: StopCase, gait: Gait, parameters: SuiteParameters,
-              time_bound: TimeBound | None = None) -> StopOutcome:
-    """Walk, stop, hold, resume, walk on.
+def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], gait: Gait,
+               parameters: SuiteParameters, time_bound: TimeBound | None = None
+               ) -> Iterator[StopOutcome]:
+    """Walk once; at the phase of each case stop, hold, resume, walk on.
 
     Parameters
     ----------
     robot : MujocoRobot
         Is reset; equal calls give equal outcomes.
-    case : StopCase
-        Everything but the leg, which is in the parameters.
+    cases : sequence of StopCase
+        Of one gait, speed and cadence, with ascending phases. The leg is in the parameters.
     gait : Gait
         The gait, its cadence included.
     parameters : SuiteParameters
@@ -90,22 +97,39 @@ def run_trial(robot: MujocoRobot, case: StopCase, gait: Gait, parameters: SuiteP
     time_bound : callable, optional
         Guaranteed time to rest, asked right after the request.
 
-    Returns
-    -------
+    Yields
+    ------
     StopOutcome
+        One per case, in order.
+
+    Raises
+    ------
+    ParameterError
+        If the phases do not ascend or the walks differ.
     """
+    phases = [case.phase for case in cases]
+    walks = {(case.gait, case.speed, case.cadence) for case in cases}
+    if phases != sorted(phases) or len(walks) > 1:
+        raise ParameterError('the cases of one walk need one gait, speed and cadence and '
+                             f'ascending phases, not {sorted(walks)} at {phases}')
     trial = _Trial(robot, FreezingLoop(robot.description, gait, parameters))
-    trial.loop.command(case.speed)
-    omega = trial.loop.network.omega(np.array((case.speed, 0.0, 0.0)))
-    trial.walk(WALKING_BEFORE + case.phase * 2.0 * np.pi / omega)
+    for case in cases:
+        trial.loop.command(case.speed)
+        omega = trial.loop.network.omega(np.array((case.speed, 0.0, 0.0)))
+        trial.walk_until(WALKING_BEFORE + case.phase * 2.0 * np.pi / omega)
+        yield _outcome(deepcopy(trial), case, time_bound)
+
+
+def _outcome(trial: _Trial, case: StopCase, time_bound: TimeBound | None) -> StopOutcome:
+    """Stop, hold, resume and walk on, with a trial that walks at the phase of the case."""
     if trial.fell():
         return StopOutcome(fell=True)
     predicted, bound, measured = trial.stop(case, time_bound)
     if trial.fell():
         return StopOutcome(True, predicted_s=predicted, bound_s=bound, measured_s=measured)
-    context = RunContext(robot=robot.description)
+    context = RunContext(robot=trial.robot.description)
     at_rest = body_at_rest(
-        recording_of(trial.states), robot.description, context.contact_force)
+        recording_of(trial.states), trial.robot.description, context.contact_force)
     resumed = trial.resume(case)
     return replace(at_rest, fell=trial.fell(), predicted_s=predicted, bound_s=bound,
                    measured_s=measured, resumed_speed=resumed,
@@ -132,6 +156,12 @@ class _Trial:
                 return
             self.state = self.robot.step(self.loop.tick(self.state).targets)
             self.states.append(self.state)
+
+    def walk_until(self, time: float) -> None:
+        """Tick until a time from the start [s]; keep no states."""
+        done = self.state.time_ns // self.robot.tick_ns
+        self.walk((round(time / self.tick_s) - done) * self.tick_s)
+        self.states.clear()
 
     def stop(self, case: StopCase, time_bound: TimeBound | None) -> tuple[float, float, float]:
         """Request a stop and hold; return the predicted, bounded and measured time to rest [s]."""

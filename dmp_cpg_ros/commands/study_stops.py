@@ -22,7 +22,7 @@ from pathlib import Path
 
 from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, summary
 from dmp_cpg_ros.analysis.strict_json import write_json
-from dmp_cpg_ros.commands.stop_trial import METHODS, StopCase, run_trial, with_cadence
+from dmp_cpg_ros.commands.stop_trial import METHODS, StopCase, run_trials, with_cadence
 from dmp_cpg_ros.core.certificate import certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait_network import GaitNetwork
@@ -100,23 +100,25 @@ def _bound_of(file: str | None, leg: str, gait: str, cadence: float) -> float:
                    suite.tick_ns * 1e-9).time_to_rest
 
 
-def run_case(case: StopCase, file: str | None) -> StopOutcome:
-    """Run one case with the robot and the parameters of a parameter file."""
+def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
+    """Run the cases of one walk with the robot and the parameters of a parameter file."""
+    case = cases[0]
     suite = suite_of(file, case.leg)
     robot = _robot_of(suite.robot_file, suite.tick_ns)
     gait = with_cadence(load_gait(case.gait), case.cadence)
     bound = _bound_of(file, case.leg, case.gait, case.cadence)
-    return run_trial(robot, case, gait, suite.parameters, lambda loop: bound)
+    return list(run_trials(robot, cases, gait, suite.parameters, lambda loop: bound))
 
 
 def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
               quiet: bool = True) -> Results:
     """Run cases on several processes; the results do not depend on how many."""
     results: Results = []
+    walks = [list(group) for _, group in groupby(cases, _key)]
     with Pool(jobs) as pool:
-        outcomes = pool.imap(partial(run_case, file=file), cases)
-        for case, outcome in zip(cases, outcomes, strict=True):
-            results.append((case, outcome))
+        outcomes = pool.imap(partial(run_walk, file=file), walks)
+        for walk, of_walk in zip(walks, outcomes, strict=True):
+            results.extend(zip(walk, of_walk, strict=True))
             if not quiet:
                 print(f'\r{len(results)}/{len(cases)}', end='', file=sys.stderr, flush=True)
     if not quiet:
