@@ -19,14 +19,17 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
+from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.task import Future
 
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
 
@@ -34,6 +37,9 @@ ROOT = Path(__file__).resolve().parent.parent
 
 DEADLINE_S = 30.0
 """How long a condition may take before a test fails; a loaded machine is no failure."""
+
+ASK_AGAIN_S = 3.0
+"""Time after which a request that may be repeated is repeated."""
 
 
 class NodeProcess:
@@ -181,22 +187,37 @@ class Ros:
     def spin_until(self, condition: Callable[[], bool], deadline_s: float = DEADLINE_S,
                    what: Callable[[], str] | None = None) -> None:
         """Run callbacks until a condition holds; fails at the deadline."""
-        wait_until(
-    condition,
-    deadline_s,
-    between=lambda: self.executor.spin_once(
-        timeout_sec=0.02),
-         what=what)
+        wait_until(condition, deadline_s, what=what,
+                   between=lambda: self.executor.spin_once(timeout_sec=0.02))
 
     def call(self, service_type: Any, name: str, request: Any,
              deadline_s: float = DEADLINE_S) -> Any:
-        """Call a service and return the response."""
+        """Call a service and return the response.
+
+        A server drops the response when it has not yet matched the client's reply reader; only
+        the client's own side is known here. So a request is repeated until it is answered. A
+        change of state must not be: before it, the node's state is asked for. Discovery tells a
+        participant's readers in the order in which they were made, so that an answer to a client
+        that was made later proves that the earlier one is heard as well.
+        """
         client = self.node.create_client(service_type, name)
         self.spin_until(client.service_is_ready, deadline_s, what=lambda: f'service {name}')
-        future = client.call_async(request)
-        self.spin_until(future.done, deadline_s, what=lambda: f'answer of {name}')
+        futures: list[Future] = []
+        if service_type is ChangeState:
+            self.call(GetState, name.replace('change_state', 'get_state'), GetState.Request())
+            futures.append(client.call_async(request))
+        asked = -inf
+
+        def answered() -> bool:
+            nonlocal asked
+            if service_type is not ChangeState and time.monotonic() > asked + ASK_AGAIN_S:
+                asked = time.monotonic()
+                futures.append(client.call_async(request))
+            return any(future.done() for future in futures)
+
+        self.spin_until(answered, deadline_s, what=lambda: f'answer of {name}')
         self.node.destroy_client(client)
-        return future.result()
+        return next(future for future in futures if future.done()).result()
 
     def collect(self, message_type: Any, topic: str, qos: Any = 10, *,
                 raw: bool = False) -> list[Any]:

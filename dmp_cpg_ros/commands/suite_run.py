@@ -136,7 +136,14 @@ def _start(plan: RunPlan, group: ProcessGroup) -> None:
 
 
 class _Watch:
-    """Spins the player while it watches the processes and Ctrl-C."""
+    """Spins the player while it watches the processes and Ctrl-C.
+
+    A server drops its response when it has not yet matched the client's reply reader, which the
+    client cannot see. Discovery tells a participant's readers in the order in which they were
+    made. So all clients whose requests must not be repeated are made first, the player's and those
+    for the end of the run; then every node is asked whether it is ready, as often as it takes, and
+    its answer proves that it knows the clients that were made before.
+    """
 
     def __init__(
         self,
@@ -151,6 +158,11 @@ class _Watch:
             group,
             interrupted,
         )
+        self._transitions = {
+            node.name: player.create_client(ChangeState, f'{node.name}/change_state')
+            for node in (*SUITE_NODES, RECORDER)
+        }
+        self._recorded = player.create_client(Trigger, f'{RECORDER.name}/recorded')
 
     def until(self, future: Future, patience_s: float) -> bool:
         """Spin until a future is done; returns whether it is."""
@@ -197,14 +209,14 @@ class _Watch:
             return
 
     def _deactivate(self, name: str) -> None:
-        client = self._player.create_client(ChangeState, f'{name}/change_state')
+        client = self._transitions[name]
         client.wait_for_service(timeout_sec=LAST_WORDS_S)
         request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
         self._ask(client, request, LAST_WORDS_S)
 
     def _until_recorded(self) -> None:
         """Wait until nothing more arrives at the recorder."""
-        client = self._player.create_client(Trigger, f'{RECORDER.name}/recorded')
+        client = self._recorded
         client.wait_for_service(timeout_sec=LAST_WORDS_S)
         deadline, before = time.monotonic() + LAST_WORDS_S, None
         while time.monotonic() < deadline:
