@@ -87,7 +87,7 @@ def plain_run(scenario_file: Path) -> tuple[list[RobotState], list[Any]]:
         states.append(robot.step(ticks[-1].targets))
         return states[-1]
 
-    play(scenario, suite.tick_ns, step, lambda command: loop.command(*command), loop.request)
+    play(scenario, suite.tick_ns, step, loop.takers)
     return states, ticks
 
 

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
-from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.scenario_events import LONGEST_S, Event, known
 
 COMMAND_PERIOD_NS = 100_000_000
 """Period at which a command is repeated [ns]."""
 
-Command = tuple[float, float, float]
+Takers = Mapping[str, Callable[[Any], Any]]
+"""Kind of event to the function that takes its value."""
 
 
 @dataclass(frozen=True)
@@ -29,17 +30,18 @@ class Action:
     ----------
     time_ns : int
         Stamp of the tick before which it happens [ns].
-    command : tuple of float or None
-        Velocity command (v_x, v_y, γ) [m/s, m/s, rad/s].
-    inhibit : bool or None
-        Request of the service: true stops, false resumes.
+    kind : str
+        A key of :data:`~dmp_cpg_ros.core.scenario_events.EVENT_KINDS`.
+    value : object
+        The event's value: (v_x, v_y, γ) [m/s, m/s, rad/s] of a command, true (stop) or false of
+        inhibit, a name of gait, ...
     label : str
         What to tell the user; empty for repetitions.
     """
 
     time_ns: int
-    command: Command | None = None
-    inhibit: bool | None = None
+    kind: str
+    value: Any
     label: str = ''
 
 
@@ -53,18 +55,15 @@ class Scenario:
         Short name.
     duration_s : float
         Length on the robot's clock [s].
-    events : tuple of (float, object)
-        Time [s], then a command, ``None`` for silence, or a bool for the service.
-    labels : tuple of str
-        One per event.
+    events : tuple of Event
+        In order of time.
     parameters : dict
         Parameters that every node that has them starts with.
     """
 
     name: str
     duration_s: float
-    events: tuple[tuple[float, Command | bool | None], ...]
-    labels: tuple[str, ...]
+    events: tuple[Event, ...]
     parameters: dict[str, Any]
 
     @classmethod
@@ -77,7 +76,7 @@ class Scenario:
             If a key is missing or unknown, or a value cannot be used; the text says which and what
             is valid.
         """
-        _known(values, ('name', 'duration', 'events', 'parameters'), where)
+        known(values, ('name', 'duration', 'events', 'parameters'), where)
         try:
             duration = float(values['duration'])
             entries = list(values['events'])
@@ -85,12 +84,13 @@ class Scenario:
             raise DataError(
                 f'{where} needs duration (a number of seconds) and events (a list): {error}'
             ) from error
-        if not 0.0 < duration <= 86400.0:
+        if not 0.0 < duration <= LONGEST_S:
             raise DataError(f'{where}: duration = {duration} s must be positive and at most a day')
-        parsed = [
-            _event(entry, f'{where}, event {place + 1}') for place, entry in enumerate(entries)
-        ]
-        times = [at for at, _, _ in parsed]
+        events = tuple(
+            Event.from_mapping(entry, f'{where}, event {place + 1}')
+            for place, entry in enumerate(entries)
+        )
+        times = [event.at for event in events]
         if times != sorted(times) or (times and times[-1] > duration):
             raise DataError(
                 f'{where}: the times of the events must increase and lie within the duration'
@@ -98,33 +98,26 @@ class Scenario:
         return cls(
             str(values.get('name', 'scenario')),
             duration,
-            tuple((at, what) for at, what, _ in parsed),
-            tuple(label for _, _, label in parsed),
+            events,
             dict(values.get('parameters') or {}),
         )
 
     def timeline(self, tick_ns: int) -> tuple[Action, ...]:
         """All actions in order, each at the first tick that is not before its time."""
         actions = []
-        ends = [round(at * 1e9) for at, what in self.events if not isinstance(what, bool)]
+        ends = [round(event.at * 1e9) for event in self.events if event.kind == 'command']
         ends.append(round(self.duration_s * 1e9))
         begun = 0
-        for (at, what), label in zip(self.events, self.labels, strict=True):
-            time_ns = round(at * 1e9)
-            if isinstance(what, bool):
-                actions.append(Action(_tick_after(time_ns, tick_ns), inhibit=what, label=label))
-                continue
-            begun += 1
-            if what is None:
-                continue
-            for repeated in range(time_ns, max(ends[begun], time_ns + 1), COMMAND_PERIOD_NS):
-                actions.append(
-                    Action(
-                        _tick_after(repeated, tick_ns),
-                        command=what,
-                        label=label if repeated == time_ns else '',
-                    )
-                )
+        for event in self.events:
+            time_ns, times = round(event.at * 1e9), range(1)
+            if event.kind == 'command':
+                begun += 1
+                lasts = 0 if event.value is None else max(ends[begun] - time_ns, 1)
+                times = range(0, lasts, COMMAND_PERIOD_NS)
+            for later in times:
+                label = '' if later else event.label
+                at = _tick_after(time_ns + later, tick_ns)
+                actions.append(Action(at, event.kind, event.value, label))
         return tuple(sorted(actions, key=lambda action: action.time_ns))
 
     def ticks(self, tick_ns: int) -> int:
@@ -132,13 +125,7 @@ class Scenario:
         return _tick_after(round(self.duration_s * 1e9), tick_ns) // tick_ns
 
 
-def play(
-    scenario: Scenario,
-    tick_ns: int,
-    step: Callable[[], RobotState],
-    command: Callable[[Command], None],
-    inhibit: Callable[[bool], None],
-) -> None:
+def play(scenario: Scenario, tick_ns: int, step: Callable[[], Any], takers: Takers) -> None:
     """Play a scenario on the plain loop.
 
     Parameters
@@ -147,56 +134,28 @@ def play(
         What happens.
     tick_ns : int
         Control tick [ns].
-    step : callable () → RobotState
+    step : callable ()
         Runs one tick of loop and robot.
-    command, inhibit : callable
-        Take a command and a request before the tick at which they act.
+    takers : mapping of str to callable (value)
+        Take events of their kind before the tick at which they act, such as
+        :meth:`~dmp_cpg_ros.core.walking_loop.WalkingLoop.takers`.
+
+    Raises
+    ------
+    DataError
+        If the scenario has events of a kind that nobody takes.
     """
     actions, place = scenario.timeline(tick_ns), 0
+    missing = {action.kind for action in actions} - set(takers)
+    if missing:
+        raise DataError(
+            f'nobody takes {", ".join(sorted(missing))}; taken are {", ".join(sorted(takers))}'
+        )
     for k in range(scenario.ticks(tick_ns)):
         while place < len(actions) and actions[place].time_ns <= k * tick_ns:
-            action = actions[place]
-            if action.command is not None:
-                command(action.command)
-            if action.inhibit is not None:
-                inhibit(action.inhibit)
+            takers[actions[place].kind](actions[place].value)
             place += 1
         step()
-
-
-def _event(entry: Any, where: str) -> tuple[float, Command | bool | None, str]:
-    _known(entry, ('at', 'command', 'inhibit', 'label'), where)
-    if 'at' not in entry or ('command' in entry) == ('inhibit' in entry):
-        raise DataError(f"{where} needs 'at' and either 'command' or 'inhibit', not {dict(entry)}")
-    try:
-        at, label = float(entry['at']), str(entry.get('label', ''))
-    except (TypeError, ValueError) as error:
-        raise DataError(f'{where}: at = {entry["at"]!r} must be a number of seconds') from error
-    if not 0.0 <= at <= 86400.0:
-        raise DataError(f'{where}: at = {at} s must lie between 0 and a day')
-    if 'inhibit' in entry:
-        if not isinstance(entry['inhibit'], bool):
-            raise DataError(f'{where}: inhibit must be true or false, not {entry["inhibit"]!r}')
-        return at, entry['inhibit'], label or ('inhibit' if entry['inhibit'] else 'resume')
-    if entry['command'] == 'silence':
-        return at, None, label or 'silence'
-    _known(entry['command'], ('v_x', 'v_y', 'gamma'), where)
-    try:
-        command = tuple(float(entry['command'].get(key, 0.0)) for key in ('v_x', 'v_y', 'gamma'))
-    except (TypeError, ValueError) as error:
-        raise DataError(f'{where}: command {entry["command"]} must hold numbers') from error
-    if not all(abs(value) <= 100.0 for value in command):
-        raise DataError(f'{where}: command {command} must be finite and at most 100')
-    v_x, v_y, gamma = command
-    return at, (v_x, v_y, gamma), label or f'v = ({v_x:g}, {v_y:g}) m/s, gamma = {gamma:g} rad/s'
-
-
-def _known(values: Any, valid: tuple[str, ...], where: str) -> None:
-    if not isinstance(values, Mapping):
-        raise DataError(f'{where} must be a mapping with {", ".join(valid)}, not {values!r}')
-    for name in values:
-        if name not in valid:
-            raise DataError(f"{where}: '{name}' is not known; valid are {', '.join(valid)}")
 
 
 def _tick_after(time_ns: int, tick_ns: int) -> int:

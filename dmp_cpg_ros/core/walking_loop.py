@@ -7,7 +7,9 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +111,13 @@ class WalkingLoop:
             command,
             self._dt,
         )
+
+    @property
+    def takers(self) -> dict[str, Callable[[Any], Any]]:
+        """What takes the events of a scenario, by kind, for
+        :func:`~dmp_cpg_ros.core.scenario.play`.
+        """
+        return {'command': lambda command: self.command(*command), 'inhibit': self.request}
 
     def tick(self, state: RobotState) -> Tick:
         """Run all parts on the robot's state of one tick.

@@ -9,19 +9,26 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist
+from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.scenario import Action, Command, Scenario
+from dmp_cpg_ros.core.scenario import Scenario
+from dmp_cpg_ros.core.scenario_events import Command
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
 
 FAR_NS = 2**31 * 10**9 - 1
 """A stamp later than every run [ns]."""
+
+
+GAIT_OWNER = 'canonical_oscillators'
+"""The node whose parameter ``gait`` changes the gait."""
 
 
 class PlayerError(DmpCpgError):
@@ -71,10 +78,16 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._command = self.create_publisher(Twist, command.name, command.publisher_qos)
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
         self._inhibit = self.create_client(SetBool, interface('inhibit').name)
+        self._gait = self.create_client(SetParameters, f'{GAIT_OWNER}/set_parameters')
         self._takers = [
             self.create_client(Trigger, f'{node}/commands_taken') for node in command.subscribers
         ]
         self._sent = 0
+        self._deliver: dict[str, Callable[[Any], None]] = {
+            'command': self._send,
+            'inhibit': self._call_inhibit,
+            'gait': self._set_gait,
+        }
         for name, callback in (
             (f'{GATE_OWNER}/holding_at', self._on_holding),
             ('inhibition_state', self._on_inhibition),
@@ -87,7 +100,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
     def connected(self) -> bool:
         """Whether the gate, the readers of commands and the service are there."""
         readers = len(interface('cmd_vel').subscribers)
-        clients = (self._inhibit, *self._takers)
+        clients = (self._inhibit, self._gait, *self._takers)
         return (
             self._gate.get_subscription_count() > 0
             and all(client.service_is_ready() for client in clients)
@@ -152,12 +165,9 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._next += 1
             if action.label:
                 self._say(self.time_ns * 1e-9, f'> {action.label}')
-            if action.command is not None:
-                self._send(action.command)
-                return True
-            if action.inhibit is not None:
-                self._call(action)
-                return True
+            self._busy = True
+            self._deliver[action.kind](action.value)
+            return True
         return False
 
     def _send(self, command: Command) -> None:
@@ -165,7 +175,6 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         message.linear.x, message.linear.y, message.angular.z = command
         self._command.publish(message)
         self._sent += 1
-        self._busy = True
         if self._lock_step:
             self._await_takers(list(self._takers))
         else:
@@ -190,11 +199,9 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         else:
             self._deliver_due()
 
-    def _call(self, action: Action) -> None:
-        self._busy = True
-        self._inhibit.call_async(SetBool.Request(data=bool(action.inhibit))).add_done_callback(
-            self._answered
-        )
+    def _call_inhibit(self, stop: bool) -> None:
+        request = SetBool.Request(data=stop)
+        self._inhibit.call_async(request).add_done_callback(self._answered)
 
     def _answered(self, future: Future) -> None:
         answer = future.result()
@@ -202,6 +209,22 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._fail(f'service inhibit: {"no answer" if answer is None else answer.message}')
             return
         self._say(self.time_ns * 1e-9, f'  inhibit: {answer.message}')
+        self._delivered()
+
+    def _set_gait(self, name: str) -> None:
+        """Set the parameter as ``ros2 param set`` does; a change that was accepted acts at the
+        held tick.
+        """
+        change = Parameter('gait', value=name).to_parameter_msg()
+        request = SetParameters.Request(parameters=[change])
+        self._gait.call_async(request).add_done_callback(self._gait_set)
+
+    def _gait_set(self, future: Future) -> None:
+        answer = future.result()
+        results = [] if answer is None else answer.results
+        if not results or not results[0].successful:
+            self._fail(f'gait: {results[0].reason if results else "no answer"}')
+            return
         self._delivered()
 
     # Real time -----------------------------------------------------------------------------------

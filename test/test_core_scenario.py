@@ -1,0 +1,69 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Scenarios: events of every kind at their ticks, and what is refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.scenario import COMMAND_PERIOD_NS, Scenario, play
+from dmp_cpg_ros.core.scenario_events import EVENT_KINDS
+
+TICK_NS = 4_000_000
+
+
+def scenario(*events: Any, duration: float = 2.0) -> Scenario:
+    return Scenario.from_mapping({'duration': duration, 'events': list(events)})
+
+
+def test_every_event_acts_at_the_first_tick_that_is_not_before_its_time() -> None:
+    played = scenario(
+        {'at': 0.0015, 'inhibit': False},
+        {'at': 0.5, 'gait': 'trot', 'label': 'faster'},
+        {'at': 0.5011, 'gait': 'walk'},
+    )
+    actions = played.timeline(TICK_NS)
+    assert [(action.time_ns, action.kind, action.value) for action in actions] == [
+        (TICK_NS, 'inhibit', False), (500_000_000, 'gait', 'trot'), (504_000_000, 'gait', 'walk')]
+    assert [action.label for action in actions] == ['resume', 'faster', 'gait walk']
+
+
+def test_a_command_is_repeated_until_the_next_one_and_silence_is_silent() -> None:
+    played = scenario({'at': 0.0, 'command': {'v_x': 0.5}}, {'at': 0.3, 'gait': 'trot'},
+                      {'at': 1.0, 'command': 'silence'})
+    commands = [action for action in played.timeline(TICK_NS) if action.kind == 'command']
+    assert [action.time_ns for action in commands] == [k * COMMAND_PERIOD_NS for k in range(10)]
+    assert [action.label for action in commands].count('') == 9
+
+
+def test_play_gives_each_kind_to_its_taker_before_the_tick() -> None:
+    log: list[Any] = []
+    played = scenario({'at': 0.004, 'gait': 'trot'}, {'at': 0.008, 'inhibit': True},
+                      duration=0.016)
+    takers = {kind: lambda value, kind=kind: log.append((kind, value)) for kind in EVENT_KINDS}
+    play(played, TICK_NS, lambda: log.append('tick'), takers)
+    assert log == ['tick', ('gait', 'trot'), 'tick', ('inhibit', True), 'tick', 'tick']
+    del takers['gait']
+    with pytest.raises(DataError, match='nobody takes gait; taken are'):
+        play(played, TICK_NS, lambda: None, takers)
+
+
+@pytest.mark.parametrize(('event', 'text'), [
+    ({'at': 1.0}, f'exactly one of {", ".join(EVENT_KINDS)}'),
+    ({'gait': 'trot'}, "needs 'at'"),
+    ({'at': 1.0, 'gait': 'trot', 'inhibit': True}, 'exactly one of'),
+    ({'at': 1.0, 'jump': True}, "'jump' is not known; valid are at, command"),
+    ({'at': 'soon', 'gait': 'trot'}, 'number of seconds'),
+    ({'at': float('nan'), 'gait': 'trot'}, 'between 0 and a day'),
+    ({'at': 1.0, 'gait': 3}, 'name of a gait'),
+    ({'at': 1.0, 'inhibit': 'yes'}, 'true or false'),
+    ({'at': 1.0, 'command': {'v_z': 1.0}}, "'v_z' is not known"),
+    ({'at': 1.0, 'command': {'v_x': float('nan')}}, 'finite'),
+    ({'at': 3.0, 'gait': 'trot'}, 'within the duration'),
+])
+def test_bad_events_are_refused_with_what_is_valid(event: dict[str, Any], text: str) -> None:
+    with pytest.raises(DataError, match=text):
+        scenario(event)
