@@ -34,7 +34,7 @@ from dmp_cpg_ros.core.primitives.demonstrations import (
     walking_joints,
 )
 from dmp_cpg_ros.core.primitives.learning import ranges
-from dmp_cpg_ros.core.primitives.period import find_period, spread_between_cycles
+from dmp_cpg_ros.core.primitives.period import find_period, mean_cycle, spread_between_cycles
 
 _REPEATS = 5
 
@@ -70,7 +70,7 @@ def demonstrations() -> dict[str, tuple[str, Demonstration]]:
 def single_cycles(
     rows: dict[str, tuple[str, Demonstration]],
 ) -> dict[str, tuple[str, Demonstration]]:
-    """First cycle of every rhythm as a discrete movement, which discrete libraries can learn.
+    """First and mean cycle of every rhythm as discrete movements, for discrete libraries.
 
     Parameters
     ----------
@@ -85,9 +85,11 @@ def single_cycles(
     cycles = {}
     for name, (kind, whole) in rows.items():
         if kind == 'rhythmic':
-            inside = whole.times - whole.times[0] <= find_period(whole)
-            cycle = Demonstration(whole.times[inside], whole.positions[inside])
-            cycles[f'one cycle of {name}'] = ('discrete', cycle)
+            period = find_period(whole)
+            for which, of in (('one', whole), ('mean', mean_cycle(whole, period))):
+                inside = of.times - of.times[0] <= period * (1.0 + 1e-9)
+                cycle = Demonstration(of.times[inside], of.positions[inside])
+                cycles[f'{which} cycle of {name}'] = ('discrete', cycle)
     return cycles
 
 
@@ -148,8 +150,9 @@ def learn_theirs(demonstration: Demonstration, bases: int) -> LearningResult | N
 def table(rows: dict[str, tuple[str, Demonstration]], bases: int) -> str:
     """Markdown table of both libraries.
 
-    Errors are of the median and of the worst degree of freedom. For rhythms there is also the
-    departure of the recorded cycles from their mean, which no periodic movement can reproduce.
+    Errors are of the median and of the worst degree of freedom. For rhythms there are also the
+    departure of the recorded cycles from their mean, which no periodic movement can reproduce,
+    and the error from that mean.
 
     Parameters
     ----------
@@ -162,20 +165,28 @@ def table(rows: dict[str, tuple[str, Demonstration]], bases: int) -> str:
     str
     """
     lines = [
-        '| demonstration | samples | degrees of freedom | differs between cycles | error | fit | '
+        '| demonstration | samples | degrees of freedom | differs between cycles | '
+        'error from the mean cycle | error | fit | '
         'error, movement_primitives | fit, movement_primitives |',
-        '|---|---|---|---|---|---|---|---|',
+        '|---|---|---|---|---|---|---|---|---|',
     ]
     for name, (kind, demonstration) in rows.items():
-        differs = '–'
+        differs = from_mean = '–'
         if kind == 'rhythmic':
-            spread = spread_between_cycles(demonstration, find_period(demonstration))
+            period = find_period(demonstration)
+            spread = spread_between_cycles(demonstration, period)
             differs = _percent(spread / ranges([demonstration]))
+            primitive = learning_rhythmic.learn_rhythmic(demonstration, bases, period=period)
+            from_mean = _percent(
+                learning_rhythmic.reproduction_errors(
+                    primitive, mean_cycle(demonstration, period), period
+                )
+            )
         ours = learn_ours(kind, demonstration, bases)
         theirs = learn_theirs(demonstration, bases) if kind == 'discrete' else None
         lines.append(
             f'| {name} | {len(demonstration.times)} | {demonstration.dofs} | {differs} | '
-            f'{_cells(ours)} | {_cells(theirs)} |'
+            f'{from_mean} | {_cells(ours)} | {_cells(theirs)} |'
         )
     return '\n'.join(lines)
 

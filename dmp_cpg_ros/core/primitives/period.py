@@ -108,6 +108,38 @@ def fourier_series(times: ArrayLike, values: ArrayLike, omega: float, harmonics:
     return coefficients
 
 
+CYCLE_SAMPLES = 200
+"""Samples of one cycle where cycles are compared."""
+
+
+def mean_cycle(demonstration: Demonstration, period: float) -> Demonstration:
+    """Mean of a recording's whole cycles: the periodic movement in it.
+
+    What differs from cycle to cycle averages out; a rhythmic primitive can encode no more.
+
+    Parameters
+    ----------
+    demonstration : Demonstration
+        At least two cycles.
+    period : float
+        [s]
+
+    Returns
+    -------
+    Demonstration
+        The mean cycle, twice, and the first sample once more, from the recording's first time on.
+
+    Raises
+    ------
+    DataError
+        If there are fewer than two cycles.
+    """
+    cycle = _cycles(demonstration, period).mean(axis=1)
+    times = demonstration.times[0] + np.arange(2 * CYCLE_SAMPLES + 1) * (period / CYCLE_SAMPLES)
+    positions = np.concatenate([cycle, cycle, cycle[:, :1]], axis=1).T
+    return Demonstration(times, positions, names=demonstration.names)
+
+
 def spread_between_cycles(demonstration: Demonstration, period: float) -> Array:
     """Largest departure of a cycle from the mean cycle; no periodic movement comes much closer.
 
@@ -128,16 +160,21 @@ def spread_between_cycles(demonstration: Demonstration, period: float) -> Array:
     DataError
         If there are fewer than two cycles.
     """
+    cycles = _cycles(demonstration, period)
+    departure = np.abs(cycles - cycles.mean(axis=1, keepdims=True))
+    return np.asarray(departure.max(axis=(1, 2)))
+
+
+def _cycles(demonstration: Demonstration, period: float) -> Array:
+    """Whole cycles of a recording, ndarray (n, cycles, CYCLE_SAMPLES)."""
     since = demonstration.times - demonstration.times[0]
     count = int(since[-1] / period + 1e-9)
     if count < 2:
         raise DataError(f'{since[-1]:g} s hold fewer than two cycles of {period:g} s')
-    fraction = np.linspace(0.0, 1.0, 200, endpoint=False)
+    fraction = np.linspace(0.0, 1.0, CYCLE_SAMPLES, endpoint=False)
     at = (np.arange(count)[:, None] + fraction).ravel() * period
     cycles = np.stack([np.interp(at, since, column) for column in demonstration.positions.T])
-    cycles = cycles.reshape(demonstration.dofs, count, -1)
-    departure = np.abs(cycles - cycles.mean(axis=1, keepdims=True))
-    return np.asarray(departure.max(axis=(1, 2)))
+    return cycles.reshape(demonstration.dofs, count, -1)
 
 
 def phase_lead(reference: Array, other: Array) -> float:
