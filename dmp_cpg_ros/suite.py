@@ -26,7 +26,10 @@ from dmp_cpg_ros.core.suite_parameters import (
     RobotParameters,
     SuiteParameters,
     TickParameters,
+    chosen_world,
 )
+from dmp_cpg_ros.core.world import World
+from dmp_cpg_ros.core.world_choice import WorldParameters
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""
@@ -44,6 +47,8 @@ class Suite:
         The gait that is named.
     robot : RobotParameters
         How the robot is run.
+    world : World
+        What it walks on.
     tick_ns : int
         Control tick [ns].
     robot_file : Path
@@ -55,6 +60,7 @@ class Suite:
     parameters: SuiteParameters
     gait: Gait
     robot: RobotParameters
+    world: World
     tick_ns: int
     robot_file: Path
     file: Path
@@ -134,6 +140,7 @@ def load_suite(
         parameters,
         load_gait(gait.gait, gait.gaits_file),
         robot[RobotParameters],
+        chosen_world(robot[WorldParameters], robot[RobotParameters]),
         robot[TickParameters].tick_ns,
         find_config(robot[RobotFileParameters].robot),
         path,

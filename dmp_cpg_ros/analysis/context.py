@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.world import World
 
 CONTACT_WEIGHT_SHARE = 0.02
 """A foot is on the ground while it carries more than this share of the weight."""
@@ -36,12 +37,15 @@ class RunContext:
         Region C and inhibited legs.
     radius : float
         Radius r of the limit cycle.
+    world : World
+        What the robot walked on.
     """
 
     robot: RobotDescription | None = None
     gait: Gait | None = None
     inhibition: InhibitionParameters = field(default_factory=InhibitionParameters)
     radius: float = 1.0
+    world: World = field(default_factory=World)
 
     @property
     def contact_force(self) -> float:

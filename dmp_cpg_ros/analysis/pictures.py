@@ -100,7 +100,7 @@ def write_pictures(
     if not (recording.joints.time.size and recording.odometry.time.size):
         return {}
     chosen = moments(recording, context)
-    poses = [_pose(recording, moment.time) for moment in chosen]
+    poses = [_pose(recording, moment.time, context.world.is_flat) for moment in chosen]
     if not poses:
         return {}
     pictures = draw(*(np.array(part) for part in zip(*poses, strict=True)))
@@ -117,17 +117,24 @@ def _reference(recording: Recording, time: float) -> Array:
     return held(recording.reference.time, recording.reference.value, np.array([time]))[0]
 
 
-def _pose(recording: Recording, time: float) -> tuple[Array, Array, Array]:
-    """Pose at a time, turned to face along x so that every picture is taken from the same side."""
+def _pose(recording: Recording, time: float, turn: bool) -> tuple[Array, Array, Array]:
+    """Pose at a time; on a flat floor turned to face along x, so that every picture is taken from
+    the same side.
+    """
     odometry, joints = recording.odometry, recording.joints
     row = min(int(np.searchsorted(odometry.time, time)), len(odometry.time) - 1)
+    position, angles = (
+        odometry.position_in_world[row],
+        held(joints.time, joints.position, np.array([time]))[0],
+    )
+    if not turn:
+        return position, odometry.quaternion[row], angles
     quaternion = odometry.quaternion[row : row + 1]
     yaw = float(roll_pitch_yaw(quaternion)[0, 2])
     x, y, z, w = quaternion[0]
     s, c = np.sin(-0.5 * yaw), np.cos(-0.5 * yaw)
     turned = np.array([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
-    position = odometry.position_in_world[row] * np.array([0.0, 0.0, 1.0])
-    return position, turned, held(joints.time, joints.position, np.array([time]))[0]
+    return position * np.array([0.0, 0.0, 1.0]), turned, angles
 
 
 def _foot_in_the_air(recording: Recording, context: RunContext, start: float, end: float) -> float:

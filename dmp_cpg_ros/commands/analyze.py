@@ -94,7 +94,9 @@ def analyze_run(
         **(BAG_ALONE if parameters is None else {}),
         **manifest_facts,
     )
-    draw = picture_taker(robot_path) if pictures and report and context.robot is not None else None
+    draw = None
+    if pictures and report and context.robot is not None:
+        draw = picture_taker(robot_path, context.world)
     folder = Path(out) if out is not None else run or bag.with_name(f'{bag.name}_analysis')
     return write_results(folder, recording, context, manifest, certificate, draw, report)
 

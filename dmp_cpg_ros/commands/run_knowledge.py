@@ -11,7 +11,7 @@ import dataclasses
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,15 @@ from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.world import World
+from dmp_cpg_ros.core.world_choice import WorldParameters
 from dmp_cpg_ros.suite import load_gait
 
 Array = NDArray[np.float64]
+
+P = TypeVar('P', bound=Parameters)
 
 _log = logging.getLogger(__name__)
 
@@ -56,17 +61,20 @@ def run_context(
     """
     robot, path = _robot(robot_file, find_parameter(parameters, 'robot'))
     radius = float(find_parameter(parameters, 'radius', 1.0))
-    return RunContext(robot, _gait(parameters), _inhibition(parameters), radius), path
+    context = RunContext(
+        robot, _gait(parameters), _inhibition(parameters), radius, _world(parameters)
+    )
+    return context, path
 
 
-def picture_taker(robot_path: Path | None) -> Draw:
+def picture_taker(robot_path: Path | None, world: World | None = None) -> Draw:
     """Return a function that draws poses of a robot, or says why it cannot and draws nothing."""
 
     def draw(positions: Array, quaternions: Array, joints: Array) -> Sequence[Any]:
         try:
             from dmp_cpg_ros.robot.camera import pose_pictures
 
-            return pose_pictures(robot_path, positions, quaternions, joints)
+            return pose_pictures(robot_path, positions, quaternions, joints, world=world)
         except (DmpCpgError, ImportError, AttributeError, OSError, RuntimeError) as error:
             _log.warning('no pictures: %s', error)
             return []
@@ -103,12 +111,24 @@ def _gait(parameters: Mapping[str, Any] | None) -> Gait | None:
 
 
 def _inhibition(parameters: Mapping[str, Any] | None) -> InhibitionParameters:
-    names = [field.name for field in dataclasses.fields(InhibitionParameters)]
-    values = {name: find_parameter(parameters, name) for name in names}
     try:
-        return InhibitionParameters.from_mapping(
-            {name: value for name, value in values.items() if value is not None}
-        )
+        return _parameter_set(InhibitionParameters, parameters)
     except DmpCpgError as error:
         _log.warning('the region C is drawn with default parameters: %s', error)
         return InhibitionParameters()
+
+
+def _world(parameters: Mapping[str, Any] | None) -> World:
+    try:
+        return _parameter_set(WorldParameters, parameters).build()
+    except DmpCpgError as error:
+        _log.warning('the world is taken to be flat: %s', error)
+        return World()
+
+
+def _parameter_set(kind: type[P], parameters: Mapping[str, Any] | None) -> P:
+    """Collect the parameters of a set from wherever they stand; defaults for those that do not."""
+    values = {
+        field.name: find_parameter(parameters, field.name) for field in dataclasses.fields(kind)
+    }
+    return kind.from_mapping({name: value for name, value in values.items() if value is not None})

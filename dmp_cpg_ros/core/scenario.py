@@ -14,6 +14,7 @@ from typing import Any
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.scenario_events import LONGEST_S, Event, known
+from dmp_cpg_ros.core.world_choice import world_overrides
 
 COMMAND_PERIOD_NS = 100_000_000
 """Period at which a command is repeated [ns]."""
@@ -58,7 +59,7 @@ class Scenario:
     events : tuple of Event
         In order of time.
     parameters : dict
-        Parameters that every node that has them starts with.
+        Parameters that every node that has them starts with, those of the world included.
     """
 
     name: str
@@ -76,7 +77,7 @@ class Scenario:
             If a key is missing or unknown, or a value cannot be used; the text says which and what
             is valid.
         """
-        known(values, ('name', 'duration', 'events', 'parameters'), where)
+        known(values, ('name', 'duration', 'events', 'parameters', 'world'), where)
         try:
             duration = float(values['duration'])
             entries = list(values['events'])
@@ -99,7 +100,10 @@ class Scenario:
             str(values.get('name', 'scenario')),
             duration,
             events,
-            dict(values.get('parameters') or {}),
+            {
+                **world_overrides(values.get('world'), where),
+                **(values.get('parameters') or {}),
+            },
         )
 
     def timeline(self, tick_ns: int) -> tuple[Action, ...]:

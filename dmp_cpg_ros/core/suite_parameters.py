@@ -18,6 +18,8 @@ from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.posture import PostureParameters
 from dmp_cpg_ros.core.reference import ReferenceParameters
 from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.world import World
+from dmp_cpg_ros.core.world_choice import WorldParameters
 
 
 @dataclass(frozen=True)
@@ -166,6 +168,22 @@ NODE_PARAMETERS: dict[str, tuple[type[Parameters], ...]] = {
     'leg_transformation': (LegChoice, LegParameters, GaitParameters, RobotFileParameters),
     'inhibition': (*CERTIFIED, CommandParameters),
     'posture_control': (PostureParameters, GaitParameters, RobotFileParameters),
-    'mujoco_robot': (RobotParameters, TickParameters, RobotFileParameters),
+    'mujoco_robot': (RobotParameters, WorldParameters, TickParameters, RobotFileParameters),
 }
 """Parameter sets of every kind of node that has a part of the core in it."""
+
+
+def chosen_world(world: WorldParameters, robot: RobotParameters) -> World:
+    """Make the world that the robot's parameters choose.
+
+    Raises
+    ------
+    ParameterError
+        If the robot has no physics for it.
+    """
+    if robot.physics != 'mujoco' and (world.world, world.world_friction) != ('flat', 0.0):
+        raise ParameterError(
+            f'world {world.world} needs physics: mujoco; with physics: {robot.physics} the body '
+            'rides level on its feet, and the only world is flat, without a friction of its own'
+        )
+    return world.build()

@@ -24,7 +24,9 @@ from dmp_cpg_ros.core.suite_parameters import (
     RobotFileParameters,
     RobotParameters,
     TickParameters,
+    chosen_world,
 )
+from dmp_cpg_ros.core.world_choice import WorldParameters
 from dmp_cpg_ros.nodes.conversions import JointTargetsReader
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.interfaces import Interface
@@ -259,6 +261,7 @@ class MujocoRobotNode(ManagedNode):
 
     def _make_robot(self) -> Robot:
         p, file = self._options, find_config(self.parameters_of(RobotFileParameters).robot)
+        world = chosen_world(self.parameters_of(WorldParameters), p)
         if p.physics == 'perfect_tracking':
             return PerfectTrackingRobot(load_description(file), self._tick_ns)
         from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -266,7 +269,9 @@ class MujocoRobotNode(ManagedNode):
         robot_file = load_robot_file(file)
         if p.reading == 'torque':
             robot_file = robot_file.without_gains()
-        return MujocoRobot(robot_file, self._tick_ns, p.seed, p.initial_spread)
+        return MujocoRobot(
+            robot_file, self._tick_ns, p.seed, p.initial_spread, world=world
+        )
 
 
 def main() -> int:

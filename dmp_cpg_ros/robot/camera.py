@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dmp_cpg_ros.core.world import World
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import find_ids, read_description
 from dmp_cpg_ros.robot.mujoco_import import has_screen, mujoco
@@ -35,6 +36,8 @@ class Camera:
         The robot; None is the package's own.
     width, height : int
         Size of the pictures [pixels].
+    world : World, optional
+        What it walks on; the flat floor without.
 
     Attributes
     ----------
@@ -48,10 +51,11 @@ class Camera:
     """
 
     def __init__(self, robot_file: RobotFile | Path | str | None = None, width: int = 1280,
-                 height: int = 720) -> None:
+                 height: int = 720, world: World | None = None) -> None:
         if not isinstance(robot_file, RobotFile):
             robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
-        self._model = load_model(robot_file.model, robot_file.base)
+        self._world = world or World()
+        self._model = load_model(robot_file.model, robot_file.base, self._world)
         self._ids = find_ids(self._model, robot_file)
         height_of_base = read_description(self._model, robot_file).stance_height
         self._distance = DISTANCE_OVER_HEIGHT * height_of_base
@@ -94,7 +98,8 @@ class Camera:
         mujoco.mj_camlight(model, data)
         view = mujoco.MjvCamera()
         view.type = mujoco.mjtCamera.mjCAMERA_FREE
-        view.lookat[:] = (place[0], place[1], 0.62 * place[2])
+        ground = float(self._world.height_at(place[0], place[1]))
+        view.lookat[:] = (place[0], place[1], ground + 0.62 * (place[2] - ground))
         view.azimuth, view.elevation = azimuth, elevation
         view.distance = self._distance if distance is None else distance
         self._renderer.update_scene(data, view)
@@ -118,7 +123,8 @@ class Camera:
 
 def pose_pictures(robot_file: RobotFile | Path | str | None, base_positions_in_world: ArrayLike,
                   base_quaternions: ArrayLike, joint_positions: ArrayLike, width: int = 1280,
-                  height: int = 720, **view: float) -> list[Picture]:
+                  height: int = 720, world: World | None = None,
+                  **view: float) -> list[Picture]:
     """Draw recorded poses, without simulating them again.
 
     Parameters
@@ -133,6 +139,8 @@ def pose_pictures(robot_file: RobotFile | Path | str | None, base_positions_in_w
         [rad]
     width, height : int
         [pixels]
+    world : World, optional
+        What it walks on; the flat floor without.
     **view
         ``azimuth``, ``elevation`` [deg], ``distance`` [m] as in :meth:`Camera.picture`.
 
@@ -141,7 +149,7 @@ def pose_pictures(robot_file: RobotFile | Path | str | None, base_positions_in_w
     list of ndarray (height, width, 3) of uint8
         Empty where pictures cannot be drawn; the reason is logged.
     """
-    with Camera(robot_file, width, height) as camera:
+    with Camera(robot_file, width, height, world) as camera:
         pictures = [camera.picture(place, quaternion, joints, **view)
                     for place, quaternion, joints in zip(
                         np.asarray(base_positions_in_world), np.asarray(base_quaternions),

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
+from dmp_cpg_ros.core.world import World
 from dmp_cpg_ros.robot.mujoco_import import mujoco
+from dmp_cpg_ros.robot.worlds import add_world, set_friction
 
 LONGEST_PHYSICS_STEP = 0.001  # [s] the joint drive runs at 1 kHz or faster
 
@@ -18,7 +20,7 @@ _GRADIENT = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
 _CHECKER = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
 
 
-def load_model(path: Path, base: str) -> mujoco.MjModel:
+def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjModel:
     """Compile a model for use as a robot.
 
     A floor is added when the world body has neither plane nor height field, a light that follows
@@ -31,6 +33,8 @@ def load_model(path: Path, base: str) -> mujoco.MjModel:
         MJCF file.
     base : str
         Body that the light follows.
+    world : World, optional
+        What it walks on; without, the model's own floor.
 
     Raises
     ------
@@ -45,6 +49,8 @@ def load_model(path: Path, base: str) -> mujoco.MjModel:
         spec = mujoco.MjSpec.from_file(str(path))
         if not any(geom.type in _GROUND for geom in spec.worldbody.geoms):
             _add_floor(spec)
+        if world is not None:
+            add_world(spec, world)
         if not spec.lights and (body := spec.body(base)) is not None:
             _add_light(body)
         if not any(texture.type == _SKY for texture in spec.textures):
@@ -53,6 +59,8 @@ def load_model(path: Path, base: str) -> mujoco.MjModel:
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise ParameterError(f"model '{path}' cannot be compiled: {error}") from error
+    if world is not None:
+        set_friction(model, world)
     model.opt.timestep = min(model.opt.timestep, LONGEST_PHYSICS_STEP)
     return model
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import JointTargets, RobotState
+from dmp_cpg_ros.core.world import World, height_over_ground
 from dmp_cpg_ros.robot.contact_reader import ContactReader
 from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.joint_actuators import JointActuators
@@ -27,6 +28,8 @@ Vector = NDArray[np.float64]
 
 FALLEN_HEIGHT_SHARE = 0.5  # of the stance height
 FALLEN_TILT = np.deg2rad(60.0)
+LYING_HEIGHT_SHARE = 0.7  # on rough ground a belly that brushes an edge above this has not fallen
+LYING_TILT = np.deg2rad(40.0)
 INITIAL_PENETRATION = 1e-5  # [m] without any there would be no contact at the first stamp
 
 
@@ -48,6 +51,8 @@ class MujocoRobot:
         The joints start at the home pose plus a uniform draw from ± this [rad].
     initial_height : float, optional
         Height of the base at the start [m]; by default its feet touch the ground.
+    world : World, optional
+        What it walks on; by default the flat floor.
 
     Raises
     ------
@@ -57,10 +62,11 @@ class MujocoRobot:
 
     def __init__(self, robot_file: RobotFile | Path | str | None = None, tick_ns: int = 4_000_000,
                  seed: int = 0, initial_spread: float = 0.0,
-                 initial_height: float | None = None) -> None:
+                 initial_height: float | None = None, world: World | None = None) -> None:
         if not isinstance(robot_file, RobotFile):
             robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
-        self.model = model = load_model(robot_file.model, robot_file.base)
+        self.world = world = world or World()
+        self.model = model = load_model(robot_file.model, robot_file.base, world)
         self.description: RobotDescription = read_description(model, robot_file)
         self.tick_ns = tick_ns
         self._step_ns = round(model.opt.timestep * 1e9)
@@ -76,6 +82,7 @@ class MujocoRobot:
         self._drive = JointDrive(self.description, self._steps, model.opt.timestep)
         self._contacts = ContactReader(model, self._ids)
         self._home = home_joint_position(self.description)
+        self._hips_in_base = np.array([leg.hip_in_base for leg in self.description.legs])
         if not (np.isfinite(initial_spread) and initial_spread >= 0.0):
             raise ParameterError(f'initial_spread = {initial_spread!r} must be at least 0 rad')
         self._seed, self._spread = seed, initial_spread
@@ -161,23 +168,33 @@ class MujocoRobot:
 
     @property
     def fallen(self) -> bool:
-        """Whether the base is below half its height, tilted by over 60°, or on the ground."""
-        data, b = self.data, self._base_qpos
-        x, y = data.qpos[b + 4], data.qpos[b + 5]
-        upright = 1.0 - 2.0 * (x * x + y * y)  # cosine between the base's z and the world's
-        return bool(data.qpos[b + 2] < FALLEN_HEIGHT_SHARE * self.description.stance_height
-                    or upright < np.cos(FALLEN_TILT) or self._contacts.base_touches(data))
+        """Whether the base is below half its height over the ground, tilted by over 60°, or lies
+        on the ground.
+        """
+        R_world_base = _rotation(self.data.qpos[self._base_qpos + 3:self._base_qpos + 7])
+        height = self.height_over_ground / self.description.stance_height
+        upright = float(R_world_base[2, 2])  # cosine between the base's z and the world's
+        lies = self._contacts.base_touches(self.data) and (
+            self.world.is_flat or height < LYING_HEIGHT_SHARE or upright < np.cos(LYING_TILT))
+        return bool(height < FALLEN_HEIGHT_SHARE or upright < np.cos(FALLEN_TILT) or lies)
+
+    @property
+    def height_over_ground(self) -> float:
+        """Height of the base over the ground below its hips [m]."""
+        b = self._base_qpos
+        place = self.data.qpos[b:b + 3]
+        if self.world.is_flat:
+            return float(place[2])
+        hips = place + self._hips_in_base @ _rotation(self.data.qpos[b + 3:b + 7]).T
+        return float(height_over_ground(self.world, place, hips))
 
     def close(self) -> None:
         """Nothing to release; here because a robot has it."""
 
     def _state(self) -> RobotState:
         data, b, d = self.data, self._base_qpos, self._base_dof
-        w, x, y, z = data.qpos[b + 3:b + 7].tolist()
-        R_world_base = np.array((
-            (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-            (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-            (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))))
+        quaternion = data.qpos[b + 3:b + 7]
+        R_world_base = _rotation(quaternion)
         specific_force = self._acceleration_in_world - self.model.opt.gravity
         return RobotState(
             time_ns=self._tick * self.tick_ns,
@@ -185,8 +202,17 @@ class MujocoRobot:
             joint_velocity=data.qvel[self._dof],
             joint_effort=self._effort.copy(),
             base_position_in_world=data.qpos[b:b + 3].copy(),
-            base_quaternion=np.array((x, y, z, w)),
+            base_quaternion=np.roll(quaternion, -1),
             base_velocity_in_base=data.qvel[d:d + 3] @ R_world_base,
             base_rate_in_base=data.qvel[d + 3:d + 6].copy(),
             acceleration_in_base=specific_force @ R_world_base,
             foot_force=self._contacts.foot_force(data))
+
+
+def _rotation(quaternion: Vector) -> Vector:
+    """Rotation matrix (3, 3) of a quaternion w, x, y, z."""
+    w, x, y, z = quaternion.tolist()
+    return np.array((
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))))

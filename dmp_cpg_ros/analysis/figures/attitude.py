@@ -10,12 +10,13 @@ from matplotlib.lines import Line2D
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
+from dmp_cpg_ros.analysis.ground import height_over_ground
 from dmp_cpg_ros.analysis.motion import integral, roll_pitch_yaw
 from dmp_cpg_ros.analysis.recording import Recording
 
 CAPTION = (
-    'Roll and pitch, height and yaw of the base. The dashed lines are what is asked for: the '
-    'standing height, and the integral of the reference turn rate.'
+    'Roll and pitch, height over the ground and yaw of the base. The dashed lines are what is '
+    'asked for: the standing height, and the integral of the reference turn rate.'
 )
 
 ROLL, PITCH, HEIGHT, YAW = '#56B4E9', '#E69F00', '#6A51A3', '#6A51A3'
@@ -37,7 +38,7 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     tilt_panel.plot(odometry.time, pitch, color=PITCH, linewidth=0.9)
     tilt_panel.set_ylabel('tilt [°]')
     height_panel.plot(
-        odometry.time, 100.0 * odometry.position_in_world[:, 2], color=HEIGHT, linewidth=0.9
+        odometry.time, 100.0 * height_over_ground(odometry, context), color=HEIGHT, linewidth=0.9
     )
     height_panel.set_ylabel('height [cm]')
     if context.robot is not None:

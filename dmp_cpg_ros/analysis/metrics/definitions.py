@@ -7,7 +7,8 @@ from __future__ import annotations
 DEFINITIONS: dict[str, tuple[str, str]] = {
     'robot.fell': (
         '',
-        'base below half the standing height, or tilted by more than 60°, at any time',
+        'base below half the standing height over the ground, or tilted by more than 60°, at any '
+        'time',
     ),
     'robot.distance_m': (
         'm',

@@ -11,6 +11,7 @@ import numpy as np
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import MOVING, gait_period, steady_segments
 from dmp_cpg_ros.analysis.foot_motion import foot_slip
+from dmp_cpg_ros.analysis.ground import height_over_ground
 from dmp_cpg_ros.analysis.motion import held, integral, roll_pitch_yaw, smoothed, tilt
 from dmp_cpg_ros.analysis.recording import Recording
 
@@ -61,7 +62,7 @@ def fell(recording: Recording, context: RunContext) -> bool | None:
     odometry = recording.odometry
     if not odometry.time.size:
         return None
-    height = odometry.position_in_world[:, 2]
+    height = height_over_ground(odometry, context)
     standing = height[0] if context.robot is None else context.robot.stance_height
     too_low = height < FALLEN_HEIGHT_SHARE * standing
     return bool(np.any(too_low | (tilt(odometry.quaternion) > FALLEN_TILT)))

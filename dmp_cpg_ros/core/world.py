@@ -1,0 +1,281 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Worlds to walk in, as data: what stands on the floor and how high the ground is anywhere.
+
+The robot starts at the origin, facing along x, on a patch that is flat up to x = ``PATCH``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import cos, radians, sin, tan
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+
+Array = NDArray[np.float64]
+
+PATCH = 0.7
+"""The ground is flat from behind the robot to here, about 1 m around its feet [m]."""
+
+LENGTH = 8.0
+"""Length of a slope and of a field of blocks along x [m]."""
+
+HALF_WIDTH = 3.0
+"""What stands on the floor reaches so far to either side of the x axis [m]."""
+
+LEVEL = 4.0
+"""Length of the level ground at the top of a slope [m]."""
+
+THICKNESS = 1.0
+"""Thickness of slabs, most of it inside the floor [m]."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box of the terrain.
+
+    Attributes
+    ----------
+    centre : tuple of float
+        In the world [m].
+    half_size : tuple of float
+        [m]
+    pitch : float
+        Rotation about +y [rad]; a positive one lowers the end towards +x.
+    """
+
+    centre: tuple[float, float, float]
+    half_size: tuple[float, float, float]
+    pitch: float = 0.0
+
+
+@dataclass(frozen=True)
+class World(Parameters):
+    """A flat floor; the base of all worlds."""
+
+    friction: float = parameter(
+        0.0, "sliding friction of all contacts; 0: the model's own", minimum=0.0, maximum=2.0
+    )
+
+    KIND: ClassVar[str] = 'flat'
+
+    @property
+    def floor(self) -> float:
+        """Height of the floor on which everything stands [m]."""
+        return 0.0
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether nothing stands on the floor."""
+        return not self.boxes()
+
+    def boxes(self) -> tuple[Box, ...]:
+        """What stands on the floor."""
+        return ()
+
+    def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Height of the ground.
+
+        Parameters
+        ----------
+        x, y : array_like (...)
+            Places in the world [m].
+
+        Returns
+        -------
+        ndarray (...)
+            [m]
+        """
+        return np.zeros(np.broadcast(x, y).shape)
+
+
+@dataclass(frozen=True)
+class LowFriction(World):
+    """A flat, slippery floor."""
+
+    friction: float = parameter(
+        0.3, 'sliding friction of all contacts', minimum=0.02, maximum=2.0
+    )
+
+    KIND: ClassVar[str] = 'low_friction'
+
+
+@dataclass(frozen=True)
+class Slope(World):
+    """A slope, and level ground at both of its ends."""
+
+    degrees: float = parameter(
+        10.0, 'angle of the slope; negative: downhill', unit='deg', minimum=-40.0, maximum=40.0
+    )
+
+    KIND: ClassVar[str] = 'slope'
+
+    @property
+    def floor(self) -> float:
+        """Height of the floor: the foot of the slope."""
+        return min(0.0, self._rise)
+
+    @property
+    def _rise(self) -> float:
+        return LENGTH * tan(radians(self.degrees))
+
+    def boxes(self) -> tuple[Box, ...]:
+        """The ramp and the level ground at its top."""
+        if self.degrees == 0.0:
+            return ()
+        angle, half = radians(self.degrees), 0.5 * THICKNESS
+        ramp = Box(
+            (
+                PATCH + 0.5 * LENGTH + half * sin(angle),
+                0.0,
+                0.5 * self._rise - half * cos(angle),
+            ),
+            (0.5 * LENGTH / cos(angle), HALF_WIDTH, half),
+            -angle,
+        )
+        start = PATCH - LEVEL if self.degrees < 0.0 else PATCH + LENGTH
+        top = max(0.0, self._rise)
+        level = _slab(
+            start, start + LEVEL, (-HALF_WIDTH, HALF_WIDTH), top, top - abs(self._rise)
+        )
+        return ramp, level
+
+    def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Height of the ground; see :meth:`World.height_at`."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        along = np.clip(x - PATCH, 0.0, LENGTH) / LENGTH * self._rise
+        upper = x <= PATCH if self.degrees < 0.0 else x >= PATCH + LENGTH
+        end = x < PATCH - LEVEL if self.degrees < 0.0 else x > PATCH + LENGTH + LEVEL
+        outside = (np.abs(y) > HALF_WIDTH) | (upper & end)
+        return np.where(outside, self.floor, along)
+
+
+@dataclass(frozen=True)
+class Blocks(World):
+    """A field of square blocks of random heights."""
+
+    height: float = parameter(
+        0.05, 'height of the highest blocks or of a step', unit='m', minimum=0.0, maximum=1.0
+    )
+    size: float = parameter(0.2, 'side of a block', unit='m', minimum=0.05, maximum=2.0)
+    seed: int = parameter(0, "seed of the blocks' heights", minimum=0)
+
+    KIND: ClassVar[str] = 'blocks'
+
+    def heights(self) -> Array:
+        """Heights of the blocks, uniform in [0, ``height``], ndarray (along x, along y) [m]."""
+        return _block_heights(self.size, self.seed) * self.height
+
+    def boxes(self) -> tuple[Box, ...]:
+        """All blocks."""
+        if self.height == 0.0:
+            return ()
+        heights = self.heights()
+        left = -0.5 * heights.shape[1] * self.size
+        return tuple(
+            _slab(
+                PATCH + i * self.size,
+                PATCH + (i + 1) * self.size,
+                (left + j * self.size, left + (j + 1) * self.size),
+                float(heights[i, j]),
+                -0.1,
+            )
+            for i, j in np.ndindex(heights.shape)
+        )
+
+    def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Height of the ground; see :meth:`World.height_at`."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        heights = self.heights()
+        i = np.floor((x - PATCH) / self.size).astype(int)
+        j = np.floor(y / self.size + 0.5 * heights.shape[1]).astype(int)
+        inside = (i >= 0) & (i < heights.shape[0]) & (j >= 0) & (j < heights.shape[1])
+        return np.where(inside, heights[np.where(inside, i, 0), np.where(inside, j, 0)], 0.0)
+
+
+@dataclass(frozen=True)
+class Steps(World):
+    """Steps up, a platform, and as many steps down."""
+
+    height: float = parameter(
+        0.05, 'height of the highest blocks or of a step', unit='m', minimum=0.0, maximum=1.0
+    )
+    depth: float = parameter(0.35, 'depth of a step', unit='m', minimum=0.05, maximum=4.0)
+    count: int = parameter(1, 'number of steps up, and down', minimum=1, maximum=50)
+    platform: float = parameter(
+        2.0, 'length of the platform between up and down', unit='m', minimum=0.1, maximum=20.0
+    )
+
+    KIND: ClassVar[str] = 'steps'
+
+    def _ends(self) -> list[tuple[float, float]]:
+        """Where each layer begins and ends along x [m], the lowest first."""
+        whole = 2.0 * (self.count - 1) * self.depth + self.platform
+        return [
+            (PATCH + i * self.depth, PATCH + whole - i * self.depth) for i in range(self.count)
+        ]
+
+    def boxes(self) -> tuple[Box, ...]:
+        """One slab per step, the highest in the middle."""
+        if self.height == 0.0:
+            return ()
+        across = (-HALF_WIDTH, HALF_WIDTH)
+        return tuple(
+            _slab(*ends, across, (i + 1) * self.height, i * self.height - 0.1)
+            for i, ends in enumerate(self._ends())
+        )
+
+    def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Height of the ground; see :meth:`World.height_at`."""
+        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+        layers = np.sum([(x >= start) & (x < end) for start, end in self._ends()], axis=0)
+        return np.where(np.abs(y) <= HALF_WIDTH, layers * self.height, 0.0)
+
+
+def height_over_ground(
+    world: World, base_position_in_world: ArrayLike, hips_in_world: ArrayLike
+) -> Array:
+    """Height of the base over the ground below its hips.
+
+    Parameters
+    ----------
+    world : World
+        The world.
+    base_position_in_world : array_like (..., 3)
+        [m]
+    hips_in_world : array_like (..., 4, 3)
+        [m]
+
+    Returns
+    -------
+    ndarray (...)
+        [m]
+    """
+    base, hips = np.asarray(base_position_in_world), np.asarray(hips_in_world)
+    ground = world.height_at(hips[..., 0], hips[..., 1]).mean(axis=-1)
+    height: Array = base[..., 2] - ground
+    return height
+
+
+@lru_cache(maxsize=16)
+def _block_heights(size: float, seed: int) -> Array:
+    """Heights of a field of blocks as shares of the highest."""
+    shape = (round(LENGTH / size), 2 * round(HALF_WIDTH / size))
+    heights: Array = np.random.default_rng(seed).uniform(0.0, 1.0, shape)
+    heights.flags.writeable = False
+    return heights
+
+
+def _slab(
+    start: float, end: float, across: tuple[float, float], top: float, bottom: float
+) -> Box:
+    """An upright box from ``start`` to ``end`` along x."""
+    return Box(
+        (0.5 * (start + end), 0.5 * (across[0] + across[1]), 0.5 * (top + bottom)),
+        (0.5 * (end - start), 0.5 * (across[1] - across[0]), 0.5 * (top - bottom)),
+    )
