@@ -17,9 +17,9 @@ import numpy as np
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.stop_outcome import WALKING_ERROR, StopOutcome, body_at_rest
 from dmp_cpg_ros.commands.loop_recording import recording_of
+from dmp_cpg_ros.commands.loop_run import LoopRun
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.stop_baselines import FreezingLoop
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -136,32 +136,8 @@ def _outcome(trial: _Trial, case: StopCase, time_bound: TimeBound | None) -> Sto
                    walked_on=abs(resumed - case.speed) <= WALKING_ERROR * case.speed)
 
 
-class _Trial:
-    """Robot and loop, and the states since the last request."""
-
-    def __init__(self, robot: MujocoRobot, loop: FreezingLoop) -> None:
-        self.robot, self.loop = robot, loop
-        self.state: RobotState = robot.reset()
-        self.states: list[RobotState] = []
-        self.tick_s = robot.tick_ns * 1e-9
-
-    def fell(self) -> bool:
-        """Whether the robot lies on the ground."""
-        return self.robot.fallen
-
-    def walk(self, duration: float) -> None:
-        """Tick for a time [s], or until the robot falls."""
-        for _ in range(round(duration / self.tick_s)):
-            if self.fell():
-                return
-            self.state = self.robot.step(self.loop.tick(self.state).targets)
-            self.states.append(self.state)
-
-    def walk_until(self, time: float) -> None:
-        """Tick until a time from the start [s]; keep no states."""
-        done = self.state.time_ns // self.robot.tick_ns
-        self.walk((round(time / self.tick_s) - done) * self.tick_s)
-        self.states.clear()
+class _Trial(LoopRun[FreezingLoop]):
+    """A run that can be stopped in each of the ways."""
 
     def stop(self, case: StopCase, time_bound: TimeBound | None) -> tuple[float, float, float]:
         """Request a stop and hold; return the predicted, bounded and measured time to rest [s]."""

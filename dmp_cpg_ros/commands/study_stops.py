@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from functools import lru_cache, partial
 from itertools import groupby, product
@@ -22,6 +22,7 @@ from pathlib import Path
 
 from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, summary
 from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.commands.markdown_table import markdown_table
 from dmp_cpg_ros.commands.stop_trial import METHODS, StopCase, run_trials, with_cadence
 from dmp_cpg_ros.core.certificate import certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
@@ -134,9 +135,7 @@ def table(results: Results) -> str:
         outcomes = [outcome for case, outcome in results if case.method == method]
         if outcomes:
             rows.append(('all', '', '', '', method, *_cells(summary(outcomes))))
-    widths = [max(len(row[i]) for row in (COLUMNS, *rows)) for i in range(len(COLUMNS))]
-    rule = tuple('-' * width for width in widths)
-    return '\n'.join(_line(row, widths) for row in (COLUMNS, rule, *rows))
+    return markdown_table(COLUMNS, rows)
 
 
 def _key(case: StopCase) -> tuple[str, float, str, float, str]:
@@ -165,10 +164,6 @@ def _cells(of: StopSummary) -> tuple[str, ...]:
 
 def _share(part: int, whole: int) -> str:
     return f'{100.0 * part / whole:.0f} %'
-
-
-def _line(row: Iterable[str], widths: Sequence[int]) -> str:
-    return f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |"
 
 
 def _parser() -> argparse.ArgumentParser:
