@@ -37,6 +37,7 @@ duration: 6.0
 events:
   - {at: 0.2, inhibit: false}
   - {at: 0.2, command: {v_x: 0.5, gamma: 0.1}}
+  - {at: 1.5, push: {impulse: [1, 4, 0], duration: 0.15}}
   - {at: 2.0, inhibit: true}
   - {at: 4.4, inhibit: false}
 """
@@ -87,7 +88,7 @@ def plain_run(scenario_file: Path) -> tuple[list[RobotState], list[Any]]:
         states.append(robot.step(ticks[-1].targets))
         return states[-1]
 
-    play(scenario, suite.tick_ns, step, loop.takers)
+    play(scenario, suite.tick_ns, step, {**loop.takers, **robot.takers})
     return states, ticks
 
 

@@ -27,7 +27,7 @@ def test_the_torque_reading_ambles_and_stops() -> None:
     def step() -> None:
         states.append(robot.step(loop.tick(states[-1]).targets))
 
-    play(scenario, suite.tick_ns, step, loop.takers)
+    play(scenario, suite.tick_ns, step, {**loop.takers, **robot.takers})
     assert not robot.fallen
     speed = np.array([state.base_velocity_in_base[0] for state in states])
     walking = speed[round(3e9 / suite.tick_ns) : round(8e9 / suite.tick_ns)]

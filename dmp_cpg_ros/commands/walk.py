@@ -43,6 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.rate is not None:
             overrides['control_rate'] = options.rate
         suite = load_suite(options.parameters, overrides)
+        if suite.robot.physics != 'mujoco' and any(e.kind == 'push' for e in scenario.events):
+            raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')
         certificate = _certificate(suite)
         if not certificate.holds and not overrides.get('allow_uncertified', False):
             raise ParameterError(

@@ -4,7 +4,8 @@
 
 A new kind is one entry in :data:`EVENT_KINDS` here and one in the tables of those who act on it:
 :class:`~dmp_cpg_ros.nodes.scenario_player.ScenarioPlayer` for the nodes, and
-:meth:`~dmp_cpg_ros.core.walking_loop.WalkingLoop.takers` for the plain loop.
+:meth:`~dmp_cpg_ros.core.walking_loop.WalkingLoop.takers` for the plain loop (pushes go to
+:attr:`~dmp_cpg_ros.robot.mujoco_robot.MujocoRobot.takers`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.push import read_push
 
 Command = tuple[float, float, float]
 Read = Callable[[Any, str], tuple[Any, str]]
@@ -102,7 +104,12 @@ def _gait(value: Any, where: str) -> tuple[str, str]:
     return value, f'gait {value}'
 
 
-EVENT_KINDS: dict[str, Read] = {'command': _command, 'inhibit': _inhibit, 'gait': _gait}
+EVENT_KINDS: dict[str, Read] = {
+    'command': _command,
+    'inhibit': _inhibit,
+    'gait': _gait,
+    'push': read_push,
+}
 """Kind of event to the function that reads its value, ``(value, where) -> (value, label)``; it
 raises DataError.
 """

@@ -11,14 +11,21 @@ in :mod:`~dmp_cpg_ros.nodes.robot_state_messages`, stop and start in
 from __future__ import annotations
 
 import numpy as np
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.posture import PostureFeedback
+from dmp_cpg_ros.core.push import FRAMES, PushForce
 from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
-from dmp_cpg_ros.nodes.message_values import Array, checked_numbers, finite_list, set_stamp
+from dmp_cpg_ros.nodes.message_values import (
+    Array,
+    checked_numbers,
+    finite_list,
+    header_ns,
+    set_stamp,
+)
 from dmp_cpg_ros.nodes.robot_state_messages import BASE_FRAME
 
 CANONICAL_NAMES = tuple(f'{leg}_x{i}' for leg in LEGS for i in (1, 2))
@@ -32,6 +39,17 @@ def read_twist(message: Twist) -> tuple[float, float, float]:
     v_x, v_y, gamma = linear.x, linear.y, angular.z
     checked_numbers((v_x, v_y, gamma, linear.z, angular.x, angular.y), 'velocity')
     return v_x, v_y, gamma
+
+
+def read_push_force(message: WrenchStamped) -> PushForce:
+    """Force of a push with its time and frame; raises DataError."""
+    force, torque = message.wrench.force, message.wrench.torque
+    numbers = checked_numbers((force.x, force.y, force.z), 'force of the push')
+    if (torque.x, torque.y, torque.z) != (0.0, 0.0, 0.0):
+        raise DataError('push: only a force can act, the torque must be zero')
+    return PushForce(
+        header_ns(message), (numbers[0], numbers[1], numbers[2]),
+        message.header.frame_id or FRAMES[0])
 
 
 class ReferenceWriter:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -134,6 +134,10 @@ TOPICS: tuple[Interface, ...] = (
               (_LEG,), (_ROBOT,)),
     Interface('joint_states', JointState, 'measured joints; the tick of the suite',
               (_ROBOT,), (_REFERENCE, _LEG, _POSTURE), sometimes=(_LEG,)),
+    Interface('push', WrenchStamped,
+              'force on the base from its stamp on, for 0.1 s unless the next one comes before; '
+              'frame base_footprint (along the heading) or odom',
+              ('user',), (_ROBOT,)),
     Interface('imu', Imu, 'inertial measurement in base_link', (_ROBOT,), ()),
     Interface('odom', Odometry, 'pose and twist of base_link in odom', (_ROBOT,), (_POSTURE,)),
     Interface('foot_contacts', JointState, 'effort = normal force of each foot', (_ROBOT,), ()),
@@ -156,8 +160,9 @@ SERVICES: tuple[Interface, ...] = (
     Interface('~/ready', Trigger,
               'whether the node is active and connected with its neighbours',
               SUITE, ('user',), service=True),
-    Interface('~/commands_taken', Trigger, 'how many messages on cmd_vel the node has taken',
-              (_REFERENCE, _INHIBITION), ('user',), service=True),
+    Interface('~/commands_taken', Trigger,
+              'how many messages on cmd_vel or push the node has taken',
+              (_REFERENCE, _INHIBITION, _ROBOT), ('user',), service=True),
     Interface('~/recorded', Trigger, 'how many messages of each topic are in the bag, as JSON',
               (_RECORDER,), ('user',), service=True),
 )

@@ -27,7 +27,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     chosen_world,
 )
 from dmp_cpg_ros.core.world_choice import WorldParameters
-from dmp_cpg_ros.nodes.conversions import JointTargetsReader
+from dmp_cpg_ros.nodes.conversions import JointTargetsReader, read_push_force
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.interfaces import Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
@@ -80,6 +80,7 @@ class MujocoRobotNode(ManagedNode):
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._state_publishers = [self.publisher(name) for name in STATE_TOPICS]
         self.listen('joint_targets', self._on_targets)
+        self.listen('push', self._on_push, command=True)
         if self._options.gated:
             self._held = self.publisher(f'{self.KIND}/holding_at')
             self.listen(f'{self.KIND}/advance_until', self._on_advance)
@@ -192,6 +193,14 @@ class MujocoRobotNode(ManagedNode):
         ):
             self._step()
             self._hold()
+
+    def _on_push(self, message: Any) -> None:
+        force = read_push_force(message)
+        take = getattr(self._robot, 'take_push', None)
+        if take is None:
+            raise DataError(f'physics: {self._options.physics} knows no forces; '
+                            'physics: mujoco does')
+        take(force)
 
     # Lock-step -----------------------------------------------------------------------------------
 

@@ -8,17 +8,19 @@ from collections.abc import Callable
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, WrenchStamped
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import SetBool, Trigger
+from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.push import Push
 from dmp_cpg_ros.core.scenario import Scenario
 from dmp_cpg_ros.core.scenario_events import Command
+from dmp_cpg_ros.nodes.acknowledged_topic import AcknowledgedTopic
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
@@ -29,6 +31,9 @@ FAR_NS = 2**31 * 10**9 - 1
 
 GAIT_OWNER = 'canonical_oscillators'
 """The node whose parameter ``gait`` changes the gait."""
+
+LEAD_NS = 40_000_000
+"""In real time a push is stamped so much later than the clock that its message is in time [ns]."""
 
 
 class PlayerError(DmpCpgError):
@@ -74,19 +79,17 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._holding_ns, self._inhibition_ns = -1, -1
         self.time_ns = 0
         self.finished = Future()
-        command, gate = interface('cmd_vel'), interface(f'{GATE_OWNER}/advance_until')
-        self._command = self.create_publisher(Twist, command.name, command.publisher_qos)
+        gate = interface(f'{GATE_OWNER}/advance_until')
+        self._commands = AcknowledgedTopic(self, 'cmd_vel')
+        self._pushes = AcknowledgedTopic(self, 'push')
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
         self._inhibit = self.create_client(SetBool, interface('inhibit').name)
         self._gait = self.create_client(SetParameters, f'{GAIT_OWNER}/set_parameters')
-        self._takers = [
-            self.create_client(Trigger, f'{node}/commands_taken') for node in command.subscribers
-        ]
-        self._sent = 0
         self._deliver: dict[str, Callable[[Any], None]] = {
             'command': self._send,
             'inhibit': self._call_inhibit,
             'gait': self._set_gait,
+            'push': self._push,
         }
         for name, callback in (
             (f'{GATE_OWNER}/holding_at', self._on_holding),
@@ -99,12 +102,12 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     def connected(self) -> bool:
         """Whether the gate, the readers of commands and the service are there."""
-        readers = len(interface('cmd_vel').subscribers)
-        clients = (self._inhibit, self._gait, *self._takers)
+        services = (self._inhibit, self._gait)
         return (
             self._gate.get_subscription_count() > 0
-            and all(client.service_is_ready() for client in clients)
-            and self._command.get_subscription_count() >= readers
+            and all(client.service_is_ready() for client in services)
+            and self._commands.connected()
+            and self._pushes.connected()
         )
 
     def begin(self) -> None:
@@ -173,24 +176,27 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
     def _send(self, command: Command) -> None:
         message = Twist()
         message.linear.x, message.linear.y, message.angular.z = command
-        self._command.publish(message)
-        self._sent += 1
+        self._commands.send(message)
+        self._finish(self._commands)
+
+    def _push(self, push: Push) -> None:
+        """Send the push's forces at once; the robot applies each at its stamp."""
+        start_ns = self.time_ns if self._lock_step else self.time_ns + LEAD_NS
+        for force in push.forces(start_ns, self._tick_ns):
+            message = WrenchStamped()
+            set_stamp(message.header.stamp, force.time_ns)
+            message.header.frame_id = force.frame
+            vector = message.wrench.force
+            vector.x, vector.y, vector.z = force.force
+            self._pushes.send(message)
+        self._finish(self._pushes)
+
+    def _finish(self, topic: AcknowledgedTopic) -> None:
+        """Go on: in lock-step when all readers have what was sent."""
         if self._lock_step:
-            self._await_takers(list(self._takers))
+            topic.when_taken(self._delivered)
         else:
             self._delivered()
-
-    def _await_takers(self, takers: list[Any]) -> None:
-        """Ask each reader of cmd_vel whether it has the command, until all have."""
-        if not takers:
-            self._delivered()
-            return
-
-        def answered(future: Future) -> None:
-            taken = int(future.result().message)
-            self._await_takers(takers[1:] if taken >= self._sent else takers)
-
-        takers[0].call_async(Trigger.Request()).add_done_callback(answered)
 
     def _delivered(self) -> None:
         self._busy = False

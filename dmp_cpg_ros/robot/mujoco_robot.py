@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.push import HOLD_NS, Push, PushForce, PushQueue
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import JointTargets, RobotState
 from dmp_cpg_ros.core.world import World, height_over_ground
@@ -90,6 +92,7 @@ class MujocoRobot:
         self.data = mujoco.MjData(model)
         self._tick = 0
         self._push: tuple[Vector, int] = (np.zeros(3), 0)
+        self._pushes = PushQueue()
         self.reset()
 
     def reset(self) -> RobotState:
@@ -97,7 +100,7 @@ class MujocoRobot:
         data, model = self.data, self.model
         mujoco.mj_resetData(model, data)
         self._drive.reset()
-        self._tick, self._push = 0, (np.zeros(3), 0)
+        self._tick, self._push, self._pushes = 0, (np.zeros(3), 0), PushQueue()
         spread = np.random.default_rng(self._seed).uniform(-1.0, 1.0, 12) * self._spread
         height = self._initial_height
         if height is None:
@@ -125,6 +128,7 @@ class MujocoRobot:
             If the simulation leaves the finite numbers.
         """
         self._drive.accept(targets)
+        self._begin_push()
         model, data, drive = self.model, self.data, self._drive
         qpos, qvel, step = data.qpos, data.qvel, mujoco.mj_step
         d = self._base_dof
@@ -156,6 +160,30 @@ class MujocoRobot:
             raise ParameterError(
                 f'a push must be three finite numbers [N], not {force_in_world!r}')
         self._push = (force, steps_per_tick(duration_ns, self._step_ns))
+
+    def take_push(self, force: PushForce) -> None:
+        """Let a force act from its time on, for ``HOLD_NS`` or until the next one."""
+        self._pushes.add(force)
+
+    @property
+    def takers(self) -> dict[str, Callable[[Push], None]]:
+        """What takes the events of a scenario that are for the robot, by kind, for
+        :func:`~dmp_cpg_ros.core.scenario.play`.
+        """
+        def push(value: Push) -> None:
+            for force in value.forces(self._tick * self.tick_ns, self.tick_ns):
+                self.take_push(force)
+
+        return {'push': push}
+
+    def _begin_push(self) -> None:
+        """Start the force whose time has come at the beginning of this tick."""
+        force = self._pushes.due(self._tick * self.tick_ns)
+        if force is not None:
+            b = self._base_qpos
+            quaternion = np.roll(self.data.qpos[b + 3:b + 7], -1)
+            steps = -(-HOLD_NS // self._step_ns)
+            self.apply_push(force.in_world(quaternion), steps * self._step_ns)
 
     def _push_on(self) -> None:
         force, left = self._push
