@@ -67,13 +67,14 @@ ifeq ($(DISPLAY)$(WAYLAND_DISPLAY),)
 endif
 
 STUDY_ARGS ?=
+BENCHMARK_ARGS ?=
 
-.PHONY: help demo test study-stops doc-images bench lint install clean
+.PHONY: help demo test study-stops benchmark-walking doc-images bench lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
 	@echo 'make TARGET, with Python 3.10-3.13, its venv module and make; ROS 2 Jazzy is used if sourced'
-	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 13
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 19
 
 demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ (WALK_ARGS=...)
 	$(BIN)/walk $(WALK_ARGS)
@@ -83,6 +84,9 @@ test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
 
 study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, walk, trot (STUDY_ARGS=...)
 	$(BIN)/study_stops $(STUDY_ARGS)
+
+benchmark-walking: $(INSTALLED) ## measure speeds, pushes, rough ground, gait changes (BENCHMARK_ARGS=...)
+	$(BIN)/benchmark_walking $(BENCHMARK_ARGS)
 
 doc-images: $(INSTALLED) ## make the pictures of the README
 	rm -rf build/doc_images

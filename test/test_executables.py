@@ -36,7 +36,7 @@ NODES = (
     'mujoco_robot',
     'bag_recorder',
 )
-COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'study_stops')
+COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'study_stops', 'benchmark_walking')
 
 NAMES = {
     'joint_states': JOINT_NAMES,

@@ -1,0 +1,171 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The tables of the walking benchmark: which cases they take, and what they say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import isnan, pi
+from multiprocessing.pool import Pool
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.commands.markdown_table import markdown_table
+from dmp_cpg_ros.commands.walking_trials import (
+    CrossingCase,
+    PushCase,
+    SteadyOutcome,
+    Velocity,
+    cross,
+    relative_error,
+    steady,
+    survived_pushes,
+)
+
+DIRECTIONS = tuple(i * pi / 4.0 for i in range(8))
+"""Directions of the pushes, from ahead to the left [rad]."""
+
+DIRECTION_WORDS = ('ahead', 'ahead left', 'left', 'back left', 'back', 'back right', 'right',
+                   'ahead right')
+
+PUSHED = (('amble', 0.5), ('trot', 0.5), ('trot', 1.0))
+"""Gaits and speeds that are pushed."""
+
+ROUGH: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = (
+    ('blocks', (('height', 0.05),)),
+    ('slope', (('degrees', 15.0),)),
+    ('slope', (('degrees', -15.0),)),
+    ('steps', (('height', 0.08),)),
+    ('low_friction', (('friction', 0.3),)),
+)
+"""Grounds that are crossed."""
+
+ROUGH_GAITS = ('amble', 'trot')
+
+
+@dataclass(frozen=True)
+class SpeedCase:
+    """A velocity to hold.
+
+    Attributes
+    ----------
+    gait : str
+        Name of the gait.
+    velocity : tuple of float
+        v_x, v_y [m/s], γ [rad/s].
+    robot : str or None
+        Robot file; None is the suite's own.
+    """
+
+    gait: str
+    velocity: Velocity
+    robot: str | None = None
+
+
+@dataclass(frozen=True)
+class PushOutcome:
+    """Largest speed change survived in each of ``DIRECTIONS`` [m/s]."""
+
+    speed_change: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table and what it was made of."""
+
+    title: str
+    text: str
+    results: Sequence[tuple[Any, Any]]
+
+
+def speed_cases() -> list[SpeedCase]:
+    """Velocities of the table ``speeds``."""
+    ladders = {
+        'amble': (0.1, 0.2, 0.5, 0.8, 1.0, 1.25, 1.5),
+        'walk': (0.1, 0.2, 0.5, 0.8),
+        'trot': (0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0),
+        'pace': (0.2, 0.5, 0.8),
+        'bound': (0.2, 0.5, 0.8),
+        'pronk': (0.2, 0.5, 0.8),
+    }
+    others: tuple[tuple[str, Velocity], ...] = (
+        ('amble', (-0.3, 0.0, 0.0)), ('trot', (-0.5, 0.0, 0.0)), ('amble', (0.0, 0.3, 0.0)),
+        ('trot', (0.0, 0.5, 0.0)), ('amble', (0.0, 0.0, 1.0)), ('trot', (0.0, 0.0, 1.0)),
+        ('trot', (0.0, 0.0, 2.0)), ('amble', (0.5, 0.0, 0.5)), ('trot', (1.0, 0.0, 1.0)),
+    )
+    straight = [SpeedCase(gait, (v, 0.0, 0.0)) for gait, vs in ladders.items() for v in vs]
+    return straight + [SpeedCase(gait, velocity) for gait, velocity in others]
+
+
+def speeds(pool: Pool, seeds: int, phases: int) -> Table:
+    """Steady velocities in all gaits."""
+    cases = speed_cases()
+    outcomes = pool.map(_steady, cases, chunksize=1)
+    columns = ('gait', 'asked m/s, rad/s', 'reached', 'error %', 'yaw drift deg/10 m',
+               'cost of transport')
+    rows = [(case.gait, _velocity(case.velocity), *steady_cells(case.velocity, outcome))
+            for case, outcome in zip(cases, outcomes, strict=True)]
+    return Table('Speeds', markdown_table(columns, rows), list(zip(cases, outcomes, strict=True)))
+
+
+def steady_cells(velocity: Velocity, outcome: SteadyOutcome) -> tuple[str, ...]:
+    """Cells of one held velocity: reached, error, yaw drift, cost of transport."""
+    if outcome.fell:
+        return 'fell', '-', '-', '-'
+    return (_velocity(outcome.velocity, 3),
+            _number(100.0 * relative_error(outcome, velocity), 1), _number(outcome.yaw_drift, 2),
+            _number(outcome.cost_of_transport, 2))
+
+
+def pushes(pool: Pool, seeds: int, phases: int) -> Table:
+    """Largest pushes survived, the least and the median over the phases."""
+    cases = [PushCase(gait, speed, i / phases, DIRECTIONS)
+             for (gait, speed), i in product(PUSHED, range(phases))]
+    outcomes = [PushOutcome(changes) for changes in pool.map(survived_pushes, cases, chunksize=1)]
+    rows = []
+    for gait, speed in PUSHED:
+        of = np.array([outcome.speed_change for case, outcome in zip(cases, outcomes, strict=True)
+                       if (case.gait, case.speed) == (gait, speed)])
+        cells = [f'{low:.1f} / {middle:.1f}' for low, middle in
+                 zip(of.min(axis=0), np.median(of, axis=0), strict=True)]
+        rows.append((f'{gait} {speed:g} m/s', *cells))
+    title = (f'Pushes: speed change in m/s that is survived at every one of {phases} phases / at '
+             'half of them; times the mass it is the impulse in N s')
+    return Table(title, markdown_table(('walking', *DIRECTION_WORDS), rows),
+                 list(zip(cases, outcomes, strict=True)))
+
+
+def rough(pool: Pool, seeds: int, phases: int) -> Table:
+    """Share of the seeds that cross each ground."""
+    cases = [CrossingCase(gait, kind, numbers, seed)
+             for (kind, numbers), gait, seed in product(ROUGH, ROUGH_GAITS, range(seeds))]
+    outcomes = pool.map(cross, cases, chunksize=2)
+    results = list(zip(cases, outcomes, strict=True))
+    rows = []
+    for (kind, numbers), gait in product(ROUGH, ROUGH_GAITS):
+        of = [outcome for case, outcome in results
+              if (case.kind, case.numbers, case.gait) == (kind, numbers, gait)]
+        crossed = [outcome for outcome in of if outcome.crossed]
+        words = ', '.join(f'{name} {value:g}' for name, value in numbers)
+        time = f'{np.median([o.time for o in crossed]):.1f}' if crossed else '-'
+        rows.append((kind, words, gait, str(len(of)),
+                     f'{100.0 * len(crossed) / len(of):.0f} %',
+                     str(sum(outcome.fell for outcome in of)), time))
+    columns = ('ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s')
+    return Table('Rough ground, blind, at 0.5 m/s within a tenth', markdown_table(columns, rows),
+                 results)
+
+
+def _steady(case: SpeedCase) -> SteadyOutcome:
+    return steady(case.gait, case.velocity, case.robot)
+
+
+def _velocity(velocity: Velocity, digits: int = 2) -> str:
+    return ', '.join(f'{value:.{digits}f}' for value in velocity)
+
+
+def _number(value: float, digits: int) -> str:
+    return '-' if isnan(value) else f'{value:.{digits}f}'

@@ -1,0 +1,76 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The walking benchmark: that its trials measure what they say."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from math import isnan, nan, pi
+
+import numpy as np
+import pytest
+
+from dmp_cpg_ros.commands.markdown_table import markdown_table
+
+pytest.importorskip('mujoco')
+from dmp_cpg_ros.commands import benchmark_tables
+from dmp_cpg_ros.commands.benchmark_walking import main
+from dmp_cpg_ros.commands.walking_trials import (
+    CrossingCase,
+    SteadyOutcome,
+    Walk,
+    cross,
+    relative_error,
+    survives,
+)
+
+
+def test_the_error_is_along_the_command() -> None:
+    reached = SteadyOutcome(False, (0.4, 0.3, 0.0))
+    assert relative_error(reached, (0.5, 0.0, 0.0)) == pytest.approx(0.2)
+    assert relative_error(reached, (0.0, 0.3, 0.0)) == pytest.approx(0.0)
+    assert relative_error(SteadyOutcome(False, (0.0, 0.0, 0.9)), (0.0, 0.0, 1.0)) == (
+        pytest.approx(0.1))
+    assert isnan(relative_error(SteadyOutcome(True), (1.0, 0.0, 0.0)))
+    assert benchmark_tables.steady_cells((1.0, 0.0, 0.0), SteadyOutcome(True))[0] == 'fell'
+    assert benchmark_tables.steady_cells(
+        (0.5, 0.0, 0.0), SteadyOutcome(False, (0.45, 0.0, 0.0), nan, nan))[1] == '10.0'
+
+
+def test_a_copy_of_a_walk_goes_on_as_the_walk_does() -> None:
+    run = Walk('trot')
+    assert run.reach((0.3, 0.0, 0.0))
+    other = deepcopy(run)
+    assert run.walk(0.4) and other.walk(0.4)
+    np.testing.assert_array_equal(run.state.joint_position, other.state.joint_position)
+    np.testing.assert_array_equal(
+        run.state.base_position_in_world, other.state.base_position_in_world)
+
+
+def test_a_push_is_felt_and_a_blow_is_fatal() -> None:
+    run = Walk('trot')
+    assert run.reach((0.3, 0.0, 0.0))
+    assert survives(run, 0.5 * pi, 0.3)
+    assert not survives(run, 0.5 * pi, 8.0)
+
+
+def test_a_crossing_ends_at_the_finish_or_on_the_ground() -> None:
+    flat = cross(CrossingCase('trot', 'flat', (), 0, speed=0.8))
+    assert flat.crossed and not flat.fell
+    assert flat.time == pytest.approx(5.0 / 0.8, rel=0.2)
+    wall = cross(CrossingCase('trot', 'steps', (('height', 0.5),), 0, speed=0.8))
+    assert not wall.crossed and wall.distance < 2.0
+
+
+def test_tables_are_even() -> None:
+    lines = markdown_table(('a', 'bb'), (('1', '2'), ('333', '4'))).splitlines()
+    assert len({len(line) for line in lines}) == 1 and len(lines) == 4
+
+
+@pytest.mark.parametrize('arguments', [['--seeds', '0'], ['--tables', 'jumps']])
+def test_bad_arguments_end_with_status_2(
+        arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+    assert 'usage: benchmark_walking' in capsys.readouterr().err
