@@ -33,6 +33,7 @@ EXECUTABLES = {
     'certify': 'dmp_cpg_ros.commands.certify:main',
     'analyze': 'dmp_cpg_ros.commands.analyze:main',
     'learn': 'dmp_cpg_ros.commands.learn:main',
+    'inspect_robot': 'dmp_cpg_ros.commands.inspect_robot:main',
     'study_stops': 'dmp_cpg_ros.commands.study_stops:main',
     'benchmark_walking': 'dmp_cpg_ros.commands.benchmark_walking:main',
 }

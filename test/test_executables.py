@@ -36,7 +36,15 @@ NODES = (
     'mujoco_robot',
     'bag_recorder',
 )
-COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'study_stops', 'benchmark_walking')
+COMMANDS = (
+    'walk',
+    'certify',
+    'analyze',
+    'learn',
+    'inspect_robot',
+    'study_stops',
+    'benchmark_walking',
+)
 
 NAMES = {
     'joint_states': JOINT_NAMES,

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -16,9 +17,12 @@ from dmp_cpg_ros.core.world import World
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import find_ids, read_description
 from dmp_cpg_ros.robot.mujoco_import import has_screen, mujoco
+from dmp_cpg_ros.robot.port import RobotError
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
 
 Picture = NDArray[np.uint8]
+
+Mark = Callable[[mujoco.MjData, mujoco.MjvScene], None]
 
 AZIMUTH, ELEVATION = 140.0, -16.0  # [deg] onto the robot's right side and face
 DISTANCE_OVER_HEIGHT = 3.6  # distance of the camera over the robot's stance height
@@ -41,6 +45,8 @@ class Camera:
 
     Attributes
     ----------
+    model : mujoco.MjModel
+        What it draws.
     reason : str or None
         Why there are no pictures; None when there are.
 
@@ -55,12 +61,12 @@ class Camera:
         if not isinstance(robot_file, RobotFile):
             robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
         self._world = world or World()
-        self._model = load_model(robot_file.model, robot_file.base, self._world)
-        self._ids = find_ids(self._model, robot_file)
-        height_of_base = read_description(self._model, robot_file).stance_height
+        self.model = load_model(robot_file.model, robot_file.base, self._world)
+        self._ids = find_ids(self.model, robot_file)
+        height_of_base = read_description(self.model, robot_file).stance_height
         self._distance = DISTANCE_OVER_HEIGHT * height_of_base
-        self._data = mujoco.MjData(self._model)
-        self._renderer, self.reason = _renderer(self._model, width, height)
+        self._data = mujoco.MjData(self.model)
+        self._renderer, self.reason = _renderer(self.model, width, height)
 
     def picture(self, base_position_in_world: ArrayLike, base_quaternion: ArrayLike,
                 joint_position: ArrayLike, azimuth: float = AZIMUTH, elevation: float = ELEVATION,
@@ -87,7 +93,29 @@ class Camera:
         """
         if self._renderer is None:
             return None
-        model, data = self._model, self._data
+        return self.drawn(base_position_in_world, base_quaternion, joint_position, azimuth,
+                          elevation, distance)
+
+    def drawn(self, base_position_in_world: ArrayLike, base_quaternion: ArrayLike,
+              joint_position: ArrayLike, azimuth: float = AZIMUTH, elevation: float = ELEVATION,
+              distance: float | None = None, mark: Mark | None = None) -> Picture:
+        """Draw one pose as :meth:`picture` does, or raise.
+
+        Parameters
+        ----------
+        base_position_in_world, base_quaternion, joint_position, azimuth, elevation, distance
+            See :meth:`picture`.
+        mark : callable (data, scene), optional
+            Adds shapes of its own to the scene.
+
+        Raises
+        ------
+        RobotError
+            With the reason, where pictures cannot be drawn.
+        """
+        if self._renderer is None:
+            raise RobotError(str(self.reason))
+        model, data = self.model, self._data
         start = int(model.jnt_qposadr[self._ids.free_joint])
         place = np.asarray(base_position_in_world, dtype=float)
         data.qpos[start:start + 3] = place
@@ -103,6 +131,8 @@ class Camera:
         view.azimuth, view.elevation = azimuth, elevation
         view.distance = self._distance if distance is None else distance
         self._renderer.update_scene(data, view)
+        if mark is not None:
+            mark(data, self._renderer.scene)
         return np.array(self._renderer.render(), dtype=np.uint8)
 
     def close(self) -> None:
