@@ -74,11 +74,6 @@ class StopCase:
     method: str = METHODS[0]
 
 
-def with_cadence(gait: Gait, factor: float) -> Gait:
-    """Return the gait at another cadence."""
-    return replace(gait, cadence=gait.cadence * factor)
-
-
 def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], gait: Gait,
                parameters: SuiteParameters, time_bound: TimeBound | None = None
                ) -> Iterator[StopOutcome]:

@@ -23,7 +23,7 @@ from pathlib import Path
 from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, summary
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands.markdown_table import markdown_table
-from dmp_cpg_ros.commands.stop_trial import METHODS, StopCase, run_trials, with_cadence
+from dmp_cpg_ros.commands.stop_trial import METHODS, StopCase, run_trials
 from dmp_cpg_ros.core.certificate import certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait_network import GaitNetwork
@@ -96,7 +96,7 @@ def _bound_of(file: str | None, leg: str, gait: str, cadence: float) -> float:
     suite = suite_of(file, leg)
     scale = body_scale(_robot_of(suite.robot_file, suite.tick_ns).description)
     p = suite.parameters
-    network = GaitNetwork(p.canonical, with_cadence(load_gait(gait), cadence), scale)
+    network = GaitNetwork(p.canonical, load_gait(gait).scaled(cadence), scale)
     return certify(network, p.inhibition, p.reference, p.leg, p.posture,
                    suite.tick_ns * 1e-9).time_to_rest
 
@@ -106,7 +106,7 @@ def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     case = cases[0]
     suite = suite_of(file, case.leg)
     robot = _robot_of(suite.robot_file, suite.tick_ns)
-    gait = with_cadence(load_gait(case.gait), case.cadence)
+    gait = load_gait(case.gait).scaled(case.cadence)
     bound = _bound_of(file, case.leg, case.gait, case.cadence)
     return list(run_trials(robot, cases, gait, suite.parameters, lambda loop: bound))
 

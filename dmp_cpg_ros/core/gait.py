@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -120,6 +121,24 @@ class Gait:
             return cls(name, np.array([float(lag[leg]) for leg in LEGS]), *tables)
         except (TypeError, ValueError) as error:
             raise ParameterError(f"gait '{name}': {error}") from error
+
+    def scaled(self, cadence_scale: float) -> Gait:
+        """Return this gait with all cadences multiplied; itself for a factor of 1.
+
+        Parameters
+        ----------
+        cadence_scale : float
+            Positive factor.
+        """
+        if cadence_scale == 1.0:
+            return self
+        scaled = copy(self)
+        cadence = self.cadence * cadence_scale
+        object.__setattr__(scaled, 'cadence', cadence)
+        object.__setattr__(
+            scaled, '_tables', (self._tables[0], cadence.tolist(), self._tables[2])
+        )
+        return scaled
 
     @property
     def phases(self) -> Array:

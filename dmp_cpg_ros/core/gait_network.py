@@ -6,6 +6,7 @@ made with.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from math import ceil
 
@@ -44,6 +45,9 @@ class CanonicalParameters(Parameters):
         'who is coupled with whom',
         choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'),
     )
+    cadence_scale: float = parameter(
+        1.0, "factor on the gait's cadence at every speed", minimum=0.25, maximum=4.0
+    )
 
 
 class GaitNetwork:
@@ -54,14 +58,20 @@ class GaitNetwork:
     parameters : CanonicalParameters
         Oscillators and coupling.
     gait : Gait
-        Phase offsets and cadence.
+        Phase offsets and cadence, before ``cadence_scale``.
     scale : BodyScale
         The robot's lengths.
+
+    Attributes
+    ----------
+    gait : Gait
+        With the cadence that acts: everything that asks a gait for ω must ask this one.
     """
 
     def __init__(self, parameters: CanonicalParameters, gait: Gait, scale: BodyScale) -> None:
         """Build the coupled system; inhibition pulls each leg to its place when fl has phase 0."""
-        self.parameters, self.gait, self.scale = parameters, gait, scale
+        self.parameters, self.scale = parameters, scale
+        self.gait = gait.scaled(parameters.cadence_scale)
         graph = graph_from_edges(
             len(LEGS),
             topology(parameters.coupling_graph, len(LEGS)),
@@ -73,6 +83,14 @@ class GaitNetwork:
             AndronovHopf(parameters.rho, parameters.radius),
             state_at(gait.phases, parameters.radius),
         )
+
+    def with_cadence_of(self, gait: Gait) -> GaitNetwork:
+        """Return this network at the cadence of another gait with the same phases."""
+        if gait is self.gait:
+            return self
+        other = copy(self)
+        other.gait = gait
+        return other
 
     def omega(self, r: Array) -> float:
         """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""

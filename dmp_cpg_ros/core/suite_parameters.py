@@ -163,14 +163,39 @@ them.
 """
 
 NODE_PARAMETERS: dict[str, tuple[type[Parameters], ...]] = {
-    'reference_filter': (ReferenceParameters, CommandParameters),
+    'reference_filter': (*CERTIFIED, CommandParameters, CertificateParameters),
     'canonical_oscillators': (*CERTIFIED, CertificateParameters),
     'leg_transformation': (LegChoice, LegParameters, GaitParameters, RobotFileParameters),
-    'inhibition': (*CERTIFIED, CommandParameters),
+    'inhibition': (*CERTIFIED, CommandParameters, CertificateParameters),
     'posture_control': (PostureParameters, GaitParameters, RobotFileParameters),
     'mujoco_robot': (RobotParameters, WorldParameters, TickParameters, RobotFileParameters),
 }
 """Parameter sets of every kind of node that has a part of the core in it."""
+
+CHANGEABLE: dict[str, tuple[str, ...]] = {
+    'reference_filter': (
+        'alpha_r',
+        'max_speed',
+        'max_lateral_speed',
+        'max_turn_rate',
+        'cmd_vel_timeout',
+    ),
+    'canonical_oscillators': ('rho', 'coupling_gain', 'coupling_graph', 'cadence_scale'),
+    'inhibition': (
+        'inhibition_gain',
+        'region_radius',
+        'inhibited_legs',
+        'capture_speed',
+        'auto_inhibit',
+        'auto_delay',
+    ),
+}
+"""Parameters of the certified nodes that may change while they run, by the node that owns them;
+other nodes that declare them follow their owner.
+"""
+
+OWNER = {name: node for node, names in CHANGEABLE.items() for name in names}
+"""Which node owns a parameter that may change."""
 
 
 def chosen_world(world: WorldParameters, robot: RobotParameters) -> World:

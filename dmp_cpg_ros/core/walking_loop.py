@@ -7,13 +7,14 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.gait_network import GaitNetwork
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
@@ -23,6 +24,7 @@ from dmp_cpg_ros.core.posture import PostureController, PostureFeedback
 from dmp_cpg_ros.core.reference import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.running_network import RunningNetwork
 from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation import TransformationState
@@ -77,11 +79,13 @@ class WalkingLoop:
     ) -> None:
         """Build the parts at rest (or free, with ``start_inhibited`` false)."""
         self.parameters = p = parameters or SuiteParameters()
-        self.network = GaitNetwork(p.canonical, gait, body_scale(description))
+        self._gait = gait
+        self._running = RunningNetwork(p.canonical, gait, body_scale(description))
+        self.network = self._running.network
         self.gate, self.reference = CommandGate(p.reference), ReferenceSystem(p.reference)
         self.supervisor = GaitSupervisor(p.inhibition, self.network, p.leg.activity_rate)
-        self.posture = PostureController(description, gait, p.posture)
-        self.legs = [LegPrimitive(leg, description, gait, p.leg) for leg in LEGS]
+        self.posture = PostureController(description, self.network.gait, p.posture)
+        self.legs = [LegPrimitive(leg, description, self.network.gait, p.leg) for leg in LEGS]
         self.stop = self.supervisor.initial_state()
         self.inhibition = self.supervisor.inhibition(self.stop)
         self.r = np.zeros(3)
@@ -112,12 +116,44 @@ class WalkingLoop:
             self._dt,
         )
 
+    def change(self, values: Mapping[str, Any]) -> str:
+        """Change parameters as the nodes' services do; they act from the next tick on.
+
+        Parameters
+        ----------
+        values : mapping of str to value
+            Names of :data:`~dmp_cpg_ros.core.suite_parameters.OWNER`.
+
+        Returns
+        -------
+        str
+            Why the change is refused; empty when it is accepted.
+
+        Raises
+        ------
+        ParameterError
+            If a value is impossible.
+        """
+        present = Running(self.parameters, self._gait, self.network.scale, self._dt)
+        proposed = present.changed(values)
+        verdict = CertificateGate().judge(present, present.certificate(), proposed)
+        if verdict.accepted:
+            self.parameters = p = proposed.parameters
+            self._running.change(p.canonical)
+            self.gate.parameters = self.reference.parameters = p.reference
+            self.supervisor.parameters = p.inhibition
+        return verdict.reason
+
     @property
     def takers(self) -> dict[str, Callable[[Any], Any]]:
         """What takes the events of a scenario, by kind, for
         :func:`~dmp_cpg_ros.core.scenario.play`.
         """
-        return {'command': lambda command: self.command(*command), 'inhibit': self.request}
+        return {
+            'command': lambda command: self.command(*command),
+            'inhibit': self.request,
+            'set': self.change,
+        }
 
     def tick(self, state: RobotState) -> Tick:
         """Run all parts on the robot's state of one tick.
@@ -133,6 +169,7 @@ class WalkingLoop:
         """
         dt = 0.0 if self._time_ns is None else (state.time_ns - self._time_ns) * 1e-9
         self._time_ns, self._dt = state.time_ns, dt or self._dt
+        self._follow(self._running.advance(dt))
         command = self.gate.at(state.time_ns)
         inhibition = self.inhibition
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
@@ -159,6 +196,13 @@ class WalkingLoop:
                 )
             ),
         )
+
+    def _follow(self, network: GaitNetwork) -> None:
+        """Let all parts use the network that acts, and its gait."""
+        self.network = self.supervisor.network = network
+        self.posture.gait = network.gait
+        for leg in self.legs:
+            leg.gait = network.gait
 
     def _leg(
         self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float

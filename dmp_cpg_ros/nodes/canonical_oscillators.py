@@ -13,20 +13,22 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait_network import CanonicalParameters
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
 from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.running_network import RunningNetwork
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CertificateParameters
 from dmp_cpg_ros.core.walking_loop import initial_canonical_state
+from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, read_reference
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import certificate_of, certificate_words, network_of
+from dmp_cpg_ros.nodes.gait_setup import certificate_words, gait_of
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionMessage, read_inhibition_state
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 
-class CanonicalOscillators(ManagedNode):
+class CanonicalOscillators(CertifiedNode):
     """Advances the four coupled oscillators with the robot's clock."""
 
     KIND = 'canonical_oscillators'
@@ -35,11 +37,14 @@ class CanonicalOscillators(ManagedNode):
     def configure(self) -> None:
         """Build the network at its initial state and its topics."""
         inhibition = self.parameters_of(InhibitionParameters)
-        self._network = network_of(self)
-        self._certificate = certificate_of(self, self._network)
-        if not self._certificate.holds:
-            self._without_certificate(self._certificate.explained())
-        self._x, self._last_ns = initial_canonical_state(self._network, inhibition), -1
+        self.prepare_certificate()
+        if not self.certificate.holds:
+            self._without_certificate(self.certificate.explained())
+        self._running_network = RunningNetwork(
+            self.parameters_of(CanonicalParameters), gait_of(self), self._scale
+        )
+        network = self._running_network.network
+        self._x, self._last_ns = initial_canonical_state(network, inhibition), -1
         self._inhibition = initial_inhibition(inhibition)
         self._writer, self._publisher = CanonicalStateWriter(), self.publisher('canonical_state')
         self._ticks = self.match(
@@ -63,16 +68,27 @@ class CanonicalOscillators(ManagedNode):
             ),
         )
 
+    def on_parameters(self) -> None:
+        """Take over what may change while walking."""
+        self._running_network.change(self.parameters_of(CanonicalParameters))
+
+    def others_changed(self) -> None:
+        """Watch the certificate of all that runs: two nodes may have accepted changes at the same
+        moment that do not go together.
+        """
+        self.certificate_changed()
+
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the oscillators to the stamp of the reference."""
         dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
         self._last_ns = stamp_ns
         self._inhibition = values['inhibition_state'] or self._inhibition
-        r = values['reference']
+        r, network = values['reference'], self._running_network.advance(dt)
         if dt > 0.0:
-            self._x = self._network.step(self._x, r, self._inhibition, dt)
-        x_dot = self._network.rate(self._x, r, self._inhibition)
-        self._publisher.publish(self._writer.fill(stamp_ns, self._x, x_dot))
+            self._x = network.step(self._x, r, self._inhibition, dt)
+        x_dot = network.rate(self._x, r, self._inhibition)
+        word = self._running_network.word
+        self._publisher.publish(self._writer.fill(stamp_ns, self._x, x_dot, word))
 
     def _without_certificate(self, reason: str) -> None:
         """Refuse to walk without a certificate, or say loudly that nothing is guaranteed."""
@@ -82,13 +98,16 @@ class CanonicalOscillators(ManagedNode):
                 '(allow_uncertified:=true walks all the same; '
                 'certify --suggest proposes gains that hold)'
             )
-        self.warn('certificate', f'walking WITHOUT a certificate: {reason}', error=True)
+        self.certificate_changed()
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Phase error of the legs [rad]."""
         return {
-            'phase_error_rad': float(np.abs(self._network.phase_errors(self._x)).max()),
-            'certificate': certificate_words(self._certificate),
+            'phase_error_rad': float(
+                np.abs(self._running_network.network.phase_errors(self._x)).max()
+            ),
+            'gait': self._running_network.word,
+            'certificate': certificate_words(self.certificate),
         }
 
 

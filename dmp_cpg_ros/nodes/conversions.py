@@ -81,8 +81,11 @@ class CanonicalStateWriter:
         """Build the message."""
         self._writer = JointStateWriter(CANONICAL_NAMES, ('position', 'velocity'))
 
-    def fill(self, time_ns: int, x: Array, x_dot: Array) -> JointState:
-        """Refill with states and rates [1/s], ndarrays (4, 2); raises DataError."""
+    def fill(self, time_ns: int, x: Array, x_dot: Array, gait: str = '') -> JointState:
+        """Refill with states and rates [1/s], ndarrays (4, 2), and the word of the gait in which
+        their phases are to be read; raises DataError.
+        """
+        self._writer.message.header.frame_id = gait
         return self._writer.fill(time_ns, x, x_dot)
 
 

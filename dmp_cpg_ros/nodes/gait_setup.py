@@ -7,18 +7,15 @@ parameters.
 from __future__ import annotations
 
 from dmp_cpg_ros.configuration import find_config
-from dmp_cpg_ros.core.certificate import Certificate, certify
+from dmp_cpg_ros.core.certificate import Certificate
+from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters, body_scale
-from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.gait_word import read_gait_word
 from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.suite_parameters import GaitParameters, RobotFileParameters, TickParameters
+from dmp_cpg_ros.core.suite_parameters import GaitParameters, RobotFileParameters
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.robot.model_reader import load_description
-from dmp_cpg_ros.suite import load_gait
+from dmp_cpg_ros.suite import load_gait, load_gaits
 
 
 def description_of(node: ManagedNode) -> RobotDescription:
@@ -32,24 +29,41 @@ def gait_of(node: ManagedNode) -> Gait:
     return load_gait(parameters.gait, parameters.gaits_file)
 
 
-def network_of(node: ManagedNode) -> GaitNetwork:
-    """Coupled oscillators of a node's gait, robot and canonical parameters."""
-    return GaitNetwork(
-        node.parameters_of(CanonicalParameters), gait_of(node), body_scale(description_of(node))
-    )
+def gaits_of(node: ManagedNode) -> dict[str, Gait]:
+    """All gaits of the file that a node's parameters name."""
+    return load_gaits(node.parameters_of(GaitParameters).gaits_file)
 
 
-def certificate_of(node: ManagedNode, network: GaitNetwork) -> Certificate:
-    """Certificate of a node's parameters; the node declares the sets in ``CERTIFIED``."""
-    of = node.parameters_of
-    return certify(
-        network,
-        of(InhibitionParameters),
-        of(ReferenceParameters),
-        of(LegParameters),
-        of(PostureParameters),
-        of(TickParameters).tick_ns * 1e-9,
-    )
+class GaitReader:
+    """Gaits by the words that travel with the phases.
+
+    Parameters
+    ----------
+    node : ManagedNode
+        Its gait holds where a message says nothing.
+    """
+
+    def __init__(self, node: ManagedNode) -> None:
+        """Read all gaits, so that none is read in mid-tick."""
+        self._gaits = gaits_of(node)
+        self.gait = self._gaits[''] = gait_of(node)
+        self._word = ''
+
+    def read(self, word: str) -> Gait:
+        """Gait of a word; the same object while the word stays.
+
+        Raises
+        ------
+        DataError
+            If there is no such gait, or its factor on the cadence is impossible.
+        """
+        if word != self._word:
+            name, cadence_scale = read_gait_word(word)
+            if name not in self._gaits:
+                valid = ', '.join(filter(None, self._gaits))
+                raise DataError(f"there is no gait '{name}'; valid are {valid}")
+            self.gait, self._word = self._gaits[name].scaled(cadence_scale), word
+        return self.gait
 
 
 def certificate_words(certificate: Certificate) -> str:

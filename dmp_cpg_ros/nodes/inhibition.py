@@ -18,24 +18,23 @@ from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, Referen
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters, TickParameters
+from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference, read_twist
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import certificate_of, certificate_words, network_of
+from dmp_cpg_ros.nodes.gait_setup import GaitReader, certificate_words
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 
-class InhibitionNode(ManagedNode):
+class InhibitionNode(CertifiedNode):
     """Stops and starts the gait on request, says when it will be at rest, and watches that it
     is.
     """
 
     KIND = 'inhibition'
     PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
-    CHANGEABLE = ('auto_inhibit', 'auto_delay', 'capture_speed', 'inhibited_legs')
 
     def configure(self) -> None:
         """Build the supervisor and its topics and service."""
@@ -43,8 +42,9 @@ class InhibitionNode(ManagedNode):
             self.parameters_of(InhibitionParameters),
             self.parameters_of(ReferenceParameters),
         )
-        network = network_of(self)
-        self._certificate = certificate_of(self, network)
+        self.prepare_certificate()
+        gaits = GaitReader(self)
+        network = self.new_network()
         self._supervisor = GaitSupervisor(
             parameters, network, self.parameters_of(LegParameters).activity_rate
         )
@@ -64,7 +64,9 @@ class InhibitionNode(ManagedNode):
         self.listen(
             'canonical_state',
             lambda message: self._ticks.add(
-                'canonical_state', header_ns(message), canonical.read(message)
+                'canonical_state',
+                header_ns(message),
+                (*canonical.read(message), gaits.read(message.header.frame_id)),
             ),
         )
         self.listen(
@@ -93,10 +95,16 @@ class InhibitionNode(ManagedNode):
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
         self._supervisor.parameters = self.parameters_of(InhibitionParameters)
+        self._gate.parameters = self.parameters_of(ReferenceParameters)
+        self._reference.parameters = self.parameters_of(ReferenceParameters)
+        acting = self._supervisor.network.gait
+        self._supervisor.network = self.new_network().with_cadence_of(acting)
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the state of the stop to the stamp of the canonical state."""
-        (self._x, x_dot), self._r = values['canonical_state'], values['reference']
+        self._x, x_dot, gait = values['canonical_state']
+        self._r = values['reference']
+        self._supervisor.network = self._supervisor.network.with_cadence_of(gait)
         before, published = self._state, self._acting
         self._state = self._supervisor.step(
             before, stamp_ns, self._x, x_dot, self._r, self._gate.at(stamp_ns)
@@ -146,7 +154,7 @@ class InhibitionNode(ManagedNode):
         self._predict(self._acting)
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
         response.message = (
-            f'{verb} {when}, at most {self._bound:.3f} s; {certificate_words(self._certificate)}'
+            f'{verb} {when}, at most {self._bound:.3f} s; {certificate_words(self.certificate)}'
         )
         return response
 
@@ -163,7 +171,7 @@ class InhibitionNode(ManagedNode):
             self._gate.at(self._state.time_ns),
             tick_s,
         )
-        certificate = self._certificate
+        certificate = self.certificate
         self._bound = (
             certificate.time_to_rest if self._state.requested else certificate.time_to_walking
         )
@@ -184,7 +192,7 @@ class InhibitionNode(ManagedNode):
             predicted_s=self._predicted,
             bound_s=self._bound,
             measured_s=state.measured_s,
-            grade=certificate_words(self._certificate),
+            grade=certificate_words(self.certificate),
         )
         self._publisher.publish(self._writer.fill(state.time_ns, state.word, values))
 

@@ -20,7 +20,7 @@ from dmp_cpg_ros.nodes.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import description_of, gait_of
+from dmp_cpg_ros.nodes.gait_setup import GaitReader, description_of
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
@@ -49,7 +49,8 @@ class LegTransformation(ManagedNode):
         self._joints = slice(
             len(JOINTS_OF_LEG) * self._place, len(JOINTS_OF_LEG) * (self._place + 1)
         )
-        self._primitive = LegPrimitive(leg, description_of(self), gait_of(self), parameters)
+        gaits = GaitReader(self)
+        self._primitive = LegPrimitive(leg, description_of(self), gaits.gait, parameters)
         self._state, self._last_ns = self._primitive.initial_state(), -1
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
         inputs = ['canonical_state', 'reference', 'posture_feedback']
@@ -57,7 +58,9 @@ class LegTransformation(ManagedNode):
         self.listen(
             'canonical_state',
             lambda message: self._ticks.add(
-                'canonical_state', header_ns(message), canonical.read(message)
+                'canonical_state',
+                header_ns(message),
+                (*canonical.read(message), gaits.read(message.header.frame_id)),
             ),
         )
         self.listen(
@@ -89,7 +92,7 @@ class LegTransformation(ManagedNode):
         """Advance the leg to the stamp of the canonical state."""
         dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
         self._last_ns = stamp_ns
-        x, x_dot = values['canonical_state']
+        x, x_dot, self._primitive.gait = values['canonical_state']
         feedback, joints = values['posture_feedback'], self._joints
         self._state, goal, goal_velocity = self._primitive.step(
             self._state,

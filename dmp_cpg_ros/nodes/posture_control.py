@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.leg_primitive import LegParameters
 from dmp_cpg_ros.core.posture import PostureController, PostureParameters
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
@@ -19,7 +20,7 @@ from dmp_cpg_ros.nodes.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import description_of, gait_of
+from dmp_cpg_ros.nodes.gait_setup import GaitReader, description_of
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader, read_odom, robot_state
@@ -31,12 +32,15 @@ class PostureControl(ManagedNode):
 
     KIND = 'posture_control'
     PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
-    CHANGEABLE = tuple(PostureParameters.__dataclass_fields__)
+    # The rate of the swings' activity is the legs' too, and the certificate's.
+    CHANGEABLE = tuple(name for name in PostureParameters.__dataclass_fields__
+                       if name not in LegParameters.__dataclass_fields__)
 
     def configure(self) -> None:
         """Build the controller and its topics."""
+        gaits = GaitReader(self)
         self._controller = PostureController(
-            description_of(self), gait_of(self), self.parameters_of(PostureParameters)
+            description_of(self), gaits.gait, self.parameters_of(PostureParameters)
         )
         self._memory, self._last_ns = self._controller.initial_state(), -1
         self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
@@ -50,7 +54,10 @@ class PostureControl(ManagedNode):
             'joint_states': joints.read,
             'odom': read_odom,
             'reference': read_reference,
-            'canonical_state': canonical.read,
+            'canonical_state': lambda message: (
+                *canonical.read(message),
+                gaits.read(message.header.frame_id),
+            ),
         }
         for name, read in readers.items():
             self.listen(name, self._taking(name, read))
@@ -67,7 +74,7 @@ class PostureControl(ManagedNode):
         dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
         self._last_ns = stamp_ns
         state = robot_state(stamp_ns, values['joint_states'], values['odom'], np.zeros(len(LEGS)))
-        x, x_dot = values['canonical_state']
+        x, x_dot, self._controller.gait = values['canonical_state']
         self._memory, feedback = self._controller.step(
             self._memory, state, x, x_dot, values['reference'], dt
         )

@@ -12,26 +12,26 @@ import numpy as np
 
 from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters
+from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import ReferenceWriter, read_twist
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 
-class ReferenceFilter(ManagedNode):
+class ReferenceFilter(CertifiedNode):
     """Filters the commanded velocity; brings it to zero when cmd_vel falls silent or a stop is
     requested.
     """
 
     KIND = 'reference_filter'
     PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
-    CHANGEABLE = ('alpha_r', 'max_speed', 'max_lateral_speed', 'max_turn_rate', 'cmd_vel_timeout')
 
     def configure(self) -> None:
         """Build the filter and its topics."""
+        self.prepare_certificate()
         self._gate = CommandGate(self.parameters_of(ReferenceParameters))
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
         self._r, self._last_ns, self._requested = np.zeros(3), -1, False

@@ -1,0 +1,192 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Changes at run time: what is refused and why, the nearest value, and what goes on unchanged."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_state
+
+from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
+from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.gait_network import CanonicalParameters
+from dmp_cpg_ros.core.gait_word import gait_word, read_gait_word
+from dmp_cpg_ros.core.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.leg_primitive import body_scale
+from dmp_cpg_ros.core.running_network import CADENCE_RATE, RunningNetwork
+from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER, SuiteParameters
+from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
+
+RUNNING = Running(SuiteParameters(), GAITS['amble'], body_scale(quadruped()), TICK)
+WEAK = RUNNING.changed({'coupling_gain': 30.0})
+"""All-to-all couplings that are strong enough, and would not be on a path."""
+
+SLOW = RUNNING.changed({'max_speed': 0.2, 'max_lateral_speed': 0.0, 'max_turn_rate': 0.0,
+                        'inhibition_gain': 160.0})
+"""An inhibition that is strong enough at the cadence of small speeds."""
+
+
+def judge(values: dict[str, object], running: Running = RUNNING):
+    return CertificateGate().judge(running, running.certificate(), running.changed(values))
+
+
+@pytest.mark.parametrize(('name', 'value', 'inequality'), [
+    ('inhibition_gain', 100.0, 'capture'),
+    ('cadence_scale', 4.0, 'capture'),
+    ('region_radius', 0.05, 'capture'),
+    ('max_speed', 2.0, 'capture'),
+    ('alpha_r', 0.05, 'time_to_rest'),
+    ('rho', 900.0, 'synchronisation'),
+    ('coupling_gain', 1.0, 'synchronisation'),
+    ('capture_speed', 0.0, 'time_to_rest'),
+])
+def test_a_refusal_names_inequality_sides_and_a_nearest_value_that_works(
+    name: str, value: float, inequality: str
+) -> None:
+    running = SLOW if name == 'max_speed' else RUNNING
+    present = running.values[name]
+    verdict = judge({name: value}, running)
+    assert not verdict.accepted
+    failing = running.changed({name: value}).certificate()[inequality]
+    assert not failing.holds
+    assert failing.explained() in verdict.reason
+    assert f'{failing.left:.4g}' in verdict.reason
+    assert f'{failing.right:.4g}' in verdict.reason
+    found = re.search(rf'nearest value that works: {name} = (\S+)$', verdict.reason)
+    assert found, verdict.reason
+    nearest = float(found[1])
+    assert min(present, value) <= nearest <= max(present, value)
+    assert judge({name: nearest}, running).accepted
+    further = float(np.clip(nearest + 0.005 * (value - present), min(present, value),
+                            max(present, value)))
+    assert not judge({name: further}, running).accepted
+
+
+def test_words_are_answered_with_the_words_that_work() -> None:
+    verdict = judge({'coupling_graph': 'path'}, WEAK)
+    assert not verdict.accepted
+    offered = re.search(r'coupling_graph = (.*)$', verdict.reason)[1].split(' or ')
+    for graph in ('all_to_all', 'ring', 'path', 'star', 'directed_ring'):
+        holds = WEAK.changed({'coupling_graph': graph}).certificate().holds
+        assert (graph in offered) == holds
+
+
+def test_several_changes_are_judged_together() -> None:
+    both = {'cadence_scale': 3.0, 'inhibition_gain': 1500.0}
+    assert not judge({'cadence_scale': 3.0}).accepted
+    assert judge(both).accepted
+    verdict = judge({'cadence_scale': 3.0, 'inhibition_gain': 410.0})
+    found = re.search(r'nearest values that work: cadence_scale = (\S+), inhibition_gain = (\S+)$',
+                      verdict.reason) or re.search(
+        r'nearest values that work: inhibition_gain = (\S+), cadence_scale = (\S+)$',
+        verdict.reason)
+    assert found, verdict.reason
+
+
+def test_without_a_certificate_only_what_makes_it_worse_is_refused() -> None:
+    running = RUNNING.changed({'inhibition_gain': 100.0})
+    assert judge({'inhibition_gain': 120.0}, running).accepted
+    assert judge({'inhibition_gain': 400.0}, running).accepted
+    worse = judge({'inhibition_gain': 80.0}, running)
+    assert not worse.accepted
+    assert 'not certified themselves' in worse.reason
+
+
+def test_an_impossible_value_is_a_parameter_error() -> None:
+    with pytest.raises(ParameterError, match='outside its range'):
+        RUNNING.changed({'cadence_scale': float('nan')})
+
+
+def test_every_changeable_parameter_has_one_owner() -> None:
+    names = [name for names in CHANGEABLE.values() for name in names]
+    assert len(names) == len(set(names)) == len(OWNER)
+    assert set(names) <= set(RUNNING.values)
+
+
+@pytest.mark.parametrize('scale', [1.0, 0.25, 1.1, 1.0 + 2**-52, 3.999999999999999])
+@pytest.mark.parametrize('name', ['trot', 'my gait', 'amble>trot 0.3500'])
+def test_the_word_of_a_gait_reads_back_exactly(name: str, scale: float) -> None:
+    assert read_gait_word(gait_word(name, scale)) == (name, scale)
+
+
+@pytest.mark.parametrize('word', ['trot *', 'trot *fast', 'trot *nan', 'trot *-1.0', 'trot *inf'])
+def test_a_bad_word_is_refused(word: str) -> None:
+    with pytest.raises(DataError, match='positive number'):
+        read_gait_word(word)
+
+
+@pytest.mark.parametrize('gait', sorted(GAITS))
+def test_a_scaled_gait_differs_in_its_cadence_only(gait: str) -> None:
+    plain, scale = GAITS[gait], RUNNING.scale
+    scaled = plain.scaled(1.3)
+    for speed in (0.0, 0.2, 0.8, 5.0):
+        assert scaled.omega(speed, scale) == pytest.approx(1.3 * plain.omega(speed, scale))
+        assert scaled.duty(speed, scale) == plain.duty(speed, scale)
+    np.testing.assert_array_equal(scaled.phases, plain.phases)
+    assert plain.scaled(1.0) is plain
+    assert network(gait, cadence_scale=1.3).omega(np.array([0.3, 0.0, 0.1])) == pytest.approx(
+        1.3 * network(gait).omega(np.array([0.3, 0.0, 0.1])))
+
+
+def test_the_cadence_moves_to_its_factor_at_its_rate() -> None:
+    running = RunningNetwork(CanonicalParameters(), GAITS['amble'], RUNNING.scale)
+    running.change(CanonicalParameters(cadence_scale=1.2))
+    seen, r = [], np.array([0.3, 0.0, 0.0])
+    plain = running.network.omega(r)
+    for _ in range(120):
+        acting = running.advance(TICK)
+        seen.append(running.cadence_scale)
+        assert acting.omega(r) == pytest.approx(plain * running.cadence_scale)
+        assert read_gait_word(running.word) == ('amble', running.cadence_scale)
+    assert np.all(np.diff([1.0, *seen]) <= CADENCE_RATE * TICK + 1e-12)
+    assert seen[-1] == 1.2 == seen[int(0.2 / CADENCE_RATE / TICK) + 1]
+    running.change(CanonicalParameters(cadence_scale=1.2, coupling_gain=50.0))
+    assert running.advance(TICK).parameters.coupling_gain == 50.0
+    assert running.cadence_scale == 1.2
+
+
+def walk(loop: WalkingLoop, ticks: int, start: int = 0) -> list[Tick]:
+    state = standing_state(quadruped())
+    found = []
+    for k in range(start, start + ticks):
+        loop.command(0.4)
+        found.append(loop.tick(standing_state(quadruped(), k * TICK_NS)))
+    assert state is not None
+    return found
+
+
+def new_loop() -> WalkingLoop:
+    return WalkingLoop(quadruped(), GAITS['amble'], SuiteParameters(
+        inhibition=InhibitionParameters(start_inhibited=False)))
+
+
+def test_a_refused_change_changes_nothing() -> None:
+    plain, asked = new_loop(), new_loop()
+    walk(plain, 100)
+    walk(asked, 100)
+    for values in ({'inhibition_gain': 50.0}, {'cadence_scale': 4.0}, {'coupling_gain': 1.0}):
+        assert 'is not <' in asked.change(values)
+    for a, b in zip(walk(plain, 50, 100), walk(asked, 50, 100), strict=True):
+        np.testing.assert_array_equal(a.x, b.x)
+        np.testing.assert_array_equal(a.targets.position, b.targets.position)
+
+
+def test_an_accepted_change_does_not_jump() -> None:
+    loop, plain = new_loop(), new_loop()
+    before = walk(loop, 300)
+    usual = max(np.abs(np.diff([tick.targets.position for tick in before[100:]], axis=0)).max(),
+                1e-9)
+    assert loop.change({'cadence_scale': 1.3, 'rho': 5.0, 'coupling_gain': 60.0,
+                        'coupling_graph': 'ring', 'inhibition_gain': 700.0}) == ''
+    after = walk(loop, 400, 300)
+    steps = np.abs(np.diff([before[-1].targets.position,
+                            *(tick.targets.position for tick in after)], axis=0)).max()
+    assert steps < 2.0 * usual                      # the cadence alone makes them 1.3 times larger
+    walk(plain, 700)
+    rates = [np.median(np.linalg.norm(tick.x_dot, axis=1)) for tick in after[-50:]]
+    r = after[-1].r
+    assert np.median(rates) == pytest.approx(1.3 * plain.network.omega(r), rel=1e-3)
+    assert loop.network.parameters.coupling_graph == 'ring'
