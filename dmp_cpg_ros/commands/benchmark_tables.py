@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from itertools import product
 from math import isnan, pi
 from multiprocessing.pool import Pool
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.commands.benchmark_robots import ROBOTS, RobotCase, run_robot
 from dmp_cpg_ros.commands.markdown_table import markdown_table
 from dmp_cpg_ros.commands.walking_trials import (
     CrossingCase,
@@ -22,8 +24,11 @@ from dmp_cpg_ros.commands.walking_trials import (
     cross,
     relative_error,
     steady,
+    suite_of,
     survived_pushes,
 )
+from dmp_cpg_ros.core.errors import MissingFileError
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
 DIRECTIONS = tuple(i * pi / 4.0 for i in range(8))
 """Directions of the pushes, from ahead to the left [rad]."""
@@ -157,6 +162,32 @@ def rough(pool: Pool, seeds: int, phases: int) -> Table:
     columns = ('ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s')
     return Table('Rough ground, blind, at 0.5 m/s within a tenth', markdown_table(columns, rows),
                  results)
+
+
+def robots(pool: Pool, seeds: int, phases: int) -> Table:
+    """All robots that are there, with their files alone."""
+    cases = [RobotCase(file, phases) for file in ROBOTS if _is_there(file)]
+    outcomes = pool.map(run_robot, cases, chunksize=1)
+    rows = []
+    for case, of in zip(cases, outcomes, strict=True):
+        amble, trot = (steady_cells((v, 0.0, 0.0), outcome)
+                       for v, outcome in ((0.5, of.amble), (1.0, of.trot)))
+        rows.append((Path(case.file).stem, f'{of.mass:.1f}', amble[1], amble[3], trot[1], trot[3],
+                     _number(of.top_speed, 1), f'{of.stood}/{of.stops}',
+                     f'{of.walked_on}/{of.stops}', str(of.stop_falls), _number(of.pushed, 1)))
+    columns = ('robot', 'kg', 'amble 0.5 m/s: error %', 'CoT', 'trot 1 m/s: error %', 'CoT',
+               'top trot m/s', 'stood', 'walked on', 'fell', 'push sideways m/s')
+    return Table('Robots; CoT is positive joint work over m g d, the push is survived at every '
+                 'phase of the amble', markdown_table(columns, rows),
+                 list(zip(cases, outcomes, strict=True)))
+
+
+def _is_there(file: str) -> bool:
+    try:
+        MujocoRobot(suite_of(file, 'amble').robot_file)
+    except MissingFileError:
+        return False
+    return True
 
 
 def _steady(case: SpeedCase) -> SteadyOutcome:
