@@ -27,10 +27,10 @@ from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 METHODS = ('inhibition', 'freeze', 'finish_swing')
 """Ways to stop: sparse inhibition, and the two of core/stop_baselines.py."""
 
-WALKING_BEFORE, WALKING_AFTER = 4.0, 4.0
+WALKING_BEFORE, WALKING_AFTER = 4.0, 3.5
 """Time from the start to the first request, and from the resume to the end [s]."""
 
-SHORTEST_HOLD, LONGEST_HOLD, HOLD_AT_REST = 3.0, 12.0, 1.5
+SHORTEST_HOLD, LONGEST_HOLD, HOLD_AT_REST = 2.5, 12.0, 1.0
 """The hold takes this at least and at most, and this after the oscillators are at rest [s]."""
 
 SPEED_WINDOW = 2.0
@@ -77,7 +77,7 @@ class StopCase:
 def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], gait: Gait,
                parameters: SuiteParameters, time_bound: TimeBound | None = None
                ) -> Iterator[StopOutcome]:
-    """Walk once; at the phase of each case stop, hold, resume, walk on.
+    """Walk once; at the phase of each case stop and hold, and after an inhibition walk on.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], gait: Gait,
 
 
 def _outcome(trial: _Trial, case: StopCase, time_bound: TimeBound | None) -> StopOutcome:
-    """Stop, hold, resume and walk on, with a trial that walks at the phase of the case."""
+    """What becomes of a trial that walks at the phase of the case."""
     if trial.fell():
         return StopOutcome(fell=True)
     predicted, bound, measured = trial.stop(case, time_bound)
@@ -125,6 +125,8 @@ def _outcome(trial: _Trial, case: StopCase, time_bound: TimeBound | None) -> Sto
     context = RunContext(robot=trial.robot.description)
     at_rest = body_at_rest(
         recording_of(trial.states), trial.robot.description, context.contact_force)
+    if case.method != METHODS[0]:
+        return at_rest
     resumed = trial.resume(case)
     return replace(at_rest, fell=trial.fell(), predicted_s=predicted, bound_s=bound,
                    measured_s=measured, resumed_speed=resumed,
@@ -159,10 +161,7 @@ class _Trial(LoopRun[FreezingLoop]):
 
     def resume(self, case: StopCase) -> float:
         """Walk on; return the mean forward speed at the end [m/s]."""
-        if case.method == METHODS[0]:
-            self.loop.request(False)
-        else:
-            self.loop.resume()
+        self.loop.request(False)
         self.walk(WALKING_AFTER)
         count = round(SPEED_WINDOW / self.tick_s)
         return float(np.mean([state.base_velocity_in_base[0] for state in self.states[-count:]]))

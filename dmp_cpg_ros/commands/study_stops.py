@@ -129,12 +129,12 @@ def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
 
 def table(results: Results) -> str:
     """Markdown table: a row per gait, speed, cadence, leg and method, and one for each method."""
-    rows = [(*_labels(key), *_cells(summary([outcome for _, outcome in group])))
+    rows = [(*_labels(key), *_cells(summary([outcome for _, outcome in group]), key[-1]))
             for key, group in groupby(results, lambda result: _key(result[0]))]
     for method in METHODS:
         outcomes = [outcome for case, outcome in results if case.method == method]
         if outcomes:
-            rows.append(('all', '', '', '', method, *_cells(summary(outcomes))))
+            rows.append(('all', '', '', '', method, *_cells(summary(outcomes), method)))
     return markdown_table(COLUMNS, rows)
 
 
@@ -147,15 +147,16 @@ def _labels(key: tuple[str, float, str, float, str]) -> tuple[str, ...]:
     return gait, f'{speed:g}', leg, f'{cadence:g}', method
 
 
-def _cells(of: StopSummary) -> tuple[str, ...]:
+def _cells(of: StopSummary, method: str) -> tuple[str, ...]:
     def pair(values: tuple[float, float], scale: float, digits: int) -> str:
         if values[0] != values[0]:
             return '-'
         return ' / '.join(f'{scale * value:.{digits}f}' for value in values)
 
     exceeded = f'{of.bound_exceeded}/{of.bounded}' if of.bounded else '-'
+    walked_on = _share(of.walked_on, of.count) if method == METHODS[0] else '-'
     return (str(of.count), str(of.fell), _share(of.standing, of.count),
-            _share(of.walked_on, of.count), pair(of.prediction_error, 100.0, 1), exceeded,
+            walked_on, pair(of.prediction_error, 100.0, 1), exceeded,
             pair(of.bound_s, 1.0, 2), pair(of.measured_s, 1.0, 2),
             pair(of.body_rest_s, 1.0, 2), pair(of.slip_m, 1e3, 1),
             pair(of.displacement_m, 1.0, 2), pair(of.tilt, 180.0 / pi, 1),
