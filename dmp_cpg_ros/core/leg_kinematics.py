@@ -79,14 +79,24 @@ class LegKinematics:
         ndarray (3, 3)
             ∂ foot_in_base / ∂ q [m/rad].
         """
-        x, y, z, reach_x, reach_z, shank_x, shank_z, s0, c0 = self._chain(q)
+        return np.array(self._jacobian(self._chain(q)))
+
+    def foot_and_jacobian(
+        self, q: Array | Sequence[float]
+    ) -> tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]:
+        """:meth:`foot_in_base` and :meth:`jacobian_in_base` for the price of one, as tuples."""
+        chain = self._chain(q)
+        x, y, z, *_ = chain
+        foot = (self._hip[0] + x, self._hip[1] + y, self._hip[2] + z)
+        return foot, self._jacobian(chain)
+
+    def _jacobian(self, chain: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+        _, y, z, reach_x, reach_z, shank_x, shank_z, s0, c0 = chain
         sign_0, sign_1, sign_2 = self._s
-        return np.array(
-            (
-                (0.0, sign_1 * reach_z, sign_2 * shank_z),
-                (-sign_0 * z, sign_1 * s0 * reach_x, sign_2 * s0 * shank_x),
-                (sign_0 * y, -sign_1 * c0 * reach_x, -sign_2 * c0 * shank_x),
-            )
+        return (
+            (0.0, sign_1 * reach_z, sign_2 * shank_z),
+            (-sign_0 * z, sign_1 * s0 * reach_x, sign_2 * s0 * shank_x),
+            (sign_0 * y, -sign_1 * c0 * reach_x, -sign_2 * c0 * shank_x),
         )
 
     def inverse(self, foot_in_base: ArrayLike) -> Array:

@@ -39,6 +39,11 @@ class RobotState:
         Accelerometer reading (specific force) [m/s^2].
     foot_force : ndarray (4,)
         Normal contact force of each foot [N].
+    gyro_in_base : ndarray (3,), optional
+        Gyroscope reading [rad/s].
+
+    Joints, efforts, gyroscope, accelerometer and forces are measured; position, orientation and
+    velocities of the base are the truth in a simulator's state and an estimate in a controller's.
     """
 
     time_ns: int
@@ -51,6 +56,12 @@ class RobotState:
     base_rate_in_base: NDArray[np.float64]
     acceleration_in_base: NDArray[np.float64]
     foot_force: NDArray[np.float64]
+    gyro_in_base: NDArray[np.float64] | None = None
+
+    @property
+    def measured_rate_in_base(self) -> NDArray[np.float64]:
+        """Gyroscope's reading, (3,) [rad/s]; a perfect one's where none is given."""
+        return self.base_rate_in_base if self.gyro_in_base is None else self.gyro_in_base
 
 
 @dataclass(frozen=True)

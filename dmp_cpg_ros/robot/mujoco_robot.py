@@ -38,8 +38,9 @@ INITIAL_PENETRATION = 1e-5  # [m] without any there would be no contact at the f
 class MujocoRobot:
     """A quadruped in MuJoCo behind the port ``Robot``.
 
-    Two runs from ``reset`` with the same targets are identical bit for bit. Contact forces,
-    efforts and the accelerometer are those of the last physics step before the stamp.
+    Two runs from ``reset`` with the same targets are identical bit for bit. Contact forces and
+    efforts are those of the last physics step before the stamp; the accelerometer's reading is
+    its mean over the tick, as a sensor gives that samples faster and filters before it reports.
 
     Parameters
     ----------
@@ -114,7 +115,8 @@ class MujocoRobot:
         self._actuators.apply(data, self._effort)
         mujoco.mj_forward(model, data)
         d = self._base_dof
-        self._acceleration_in_world = data.qacc[d:d + 3].copy()
+        acceleration_in_world = data.qacc[d:d + 3] - model.opt.gravity
+        self._specific_force = acceleration_in_world @ data.xmat[self._ids.base].reshape(3, 3)
         return self._state()
 
     def step(self, targets: JointTargets) -> RobotState:
@@ -131,19 +133,22 @@ class MujocoRobot:
         self._begin_push()
         model, data, drive = self.model, self.data, self._drive
         qpos, qvel, step = data.qpos, data.qvel, mujoco.mj_step
-        d = self._base_dof
+        d, specific_force = self._base_dof, np.zeros(3)
+        R_world_base = data.xmat[self._ids.base].reshape(3, 3)  # a view, of the step's begin
         for i in range(self._steps):
             self._effort = drive.torque(i, qpos[self._qpos], qvel[self._dof])
             self._actuators.apply(data, self._effort)
             self._push_on()
             before = qvel[d:d + 3].copy()
             step(model, data)
+            change = (qvel[d:d + 3] - before) / model.opt.timestep
+            specific_force += (change - model.opt.gravity) @ R_world_base
         self._tick += 1
         if not (np.isfinite(qpos).all() and np.isfinite(qvel).all()):
             raise RobotError('the simulation became unstable in the tick that ends at '
                              f'{self._tick * self.tick_ns * 1e-9:.3f} s; lower the gains kp and '
                              'kd or the physics step')
-        self._acceleration_in_world = (qvel[d:d + 3] - before) / model.opt.timestep
+        self._specific_force = specific_force / self._steps
         return self._state()
 
     def apply_push(self, force_in_world: Vector, duration_ns: int) -> None:
@@ -223,7 +228,6 @@ class MujocoRobot:
         data, b, d = self.data, self._base_qpos, self._base_dof
         quaternion = data.qpos[b + 3:b + 7]
         R_world_base = _rotation(quaternion)
-        specific_force = self._acceleration_in_world - self.model.opt.gravity
         return RobotState(
             time_ns=self._tick * self.tick_ns,
             joint_position=data.qpos[self._qpos],
@@ -233,7 +237,7 @@ class MujocoRobot:
             base_quaternion=np.roll(quaternion, -1),
             base_velocity_in_base=data.qvel[d:d + 3] @ R_world_base,
             base_rate_in_base=data.qvel[d + 3:d + 6].copy(),
-            acceleration_in_base=specific_force @ R_world_base,
+            acceleration_in_base=self._specific_force.copy(),
             foot_force=self._contacts.foot_force(data))
 
 

@@ -1,0 +1,88 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Rotations as matrices and as quaternions x, y, z, w; plain floats where a tick needs them."""
+
+from __future__ import annotations
+
+from math import asin, atan2, cos, sin, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def skew(v: Array) -> Array:
+    """Matrix of the cross product, ``skew(v) @ u = v × u``: (..., 3) → (..., 3, 3)."""
+    matrix = np.zeros((*v.shape, 3))
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
+    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
+    return matrix
+
+
+def rotation_matrix(quaternion: Array) -> Array:
+    """Matrix (3, 3) of a unit quaternion (4,)."""
+    x, y, z, w = quaternion.tolist()
+    return np.array(
+        (
+            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+            (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+            (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        )
+    )
+
+
+def turned(quaternion: Array, rotation_vector: Array) -> Array:
+    """Turn a quaternion by a rotation vector in its own (the body's) frame: q ⊗ exp(φ/2).
+
+    Parameters
+    ----------
+    quaternion : ndarray (4,)
+        Of length 1.
+    rotation_vector : ndarray (3,)
+        φ, axis times angle [rad].
+
+    Returns
+    -------
+    ndarray (4,)
+        Of length 1.
+    """
+    x, y, z, w = quaternion.tolist()
+    a, b, c = rotation_vector.tolist()
+    angle = sqrt(a * a + b * b + c * c)
+    scale = sin(0.5 * angle) / angle if angle > 1e-9 else 0.5
+    a, b, c, d = a * scale, b * scale, c * scale, cos(0.5 * angle)
+    qx = w * a + x * d + y * c - z * b
+    qy = w * b - x * c + y * d + z * a
+    qz = w * c + x * b - y * a + z * d
+    qw = w * d - x * a - y * b - z * c
+    length = sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
+    return np.array((qx / length, qy / length, qz / length, qw / length))
+
+
+def roll_pitch_yaw(quaternion: Array) -> tuple[float, float, float]:
+    """Angles about x, y, z in the order yaw, pitch, roll [rad]."""
+    x, y, z, w = quaternion.tolist()
+    roll = atan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+    pitch = asin(min(max(2.0 * (w * y - x * z), -1.0), 1.0))
+    yaw = atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    return roll, pitch, yaw
+
+
+def levelled(upward_in_base: Array) -> Array:
+    """Quaternion of zero heading whose vertical is seen in the base as a given direction.
+
+    Parameters
+    ----------
+    upward_in_base : ndarray (3,)
+        Any length but 0: the reading of an accelerometer at rest.
+
+    Returns
+    -------
+    ndarray (4,)
+    """
+    x, y, z = upward_in_base.tolist()
+    roll, pitch = atan2(y, z), atan2(-x, sqrt(y * y + z * z))
+    sr, cr, sp, cp = sin(0.5 * roll), cos(0.5 * roll), sin(0.5 * pitch), cos(0.5 * pitch)
+    return np.array((sr * cp, cr * sp, -sr * sp, cr * cp))
