@@ -12,6 +12,7 @@ from typing import Any
 
 from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.core.estimation_parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.gait_network import CanonicalParameters
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
@@ -19,6 +20,7 @@ from dmp_cpg_ros.core.leg_primitive import LegParameters
 from dmp_cpg_ros.core.posture import PostureParameters
 from dmp_cpg_ros.core.reference import ReferenceParameters
 from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.sensor_parameters import SensorParameters
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
     GaitParameters,
@@ -47,6 +49,8 @@ class Suite:
         The gait that is named.
     robot : RobotParameters
         How the robot is run.
+    sensors : SensorParameters
+        Noise of its sensors.
     world : World
         What it walks on.
     tick_ns : int
@@ -60,6 +64,7 @@ class Suite:
     parameters: SuiteParameters
     gait: Gait
     robot: RobotParameters
+    sensors: SensorParameters
     world: World
     tick_ns: int
     robot_file: Path
@@ -134,12 +139,15 @@ def load_suite(
         sets['inhibition'][InhibitionParameters],
         sets['leg_transformation'][LegParameters],
         sets['posture_control'][PostureParameters],
+        sets['posture_control'][EstimationParameters],
+        sets['posture_control'][StateSourceParameters],
     )
     gait = canonical[GaitParameters]
     return Suite(
         parameters,
         load_gait(gait.gait, gait.gaits_file),
         robot[RobotParameters],
+        robot[SensorParameters],
         chosen_world(robot[WorldParameters], robot[RobotParameters]),
         robot[TickParameters].tick_ns,
         find_config(robot[RobotFileParameters].robot),

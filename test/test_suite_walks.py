@@ -79,7 +79,7 @@ def load_the_machine(until: Any) -> None:
 def plain_run(scenario_file: Path) -> tuple[list[RobotState], list[Any]]:
     """Run the scenario on the plain loop; states and ticks."""
     scenario, suite = load_scenario(scenario_file), load_suite()
-    robot = MujocoRobot(suite.robot_file, suite.tick_ns)
+    robot = MujocoRobot(suite.robot_file, suite.tick_ns, sensors=suite.sensors)
     loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
     states, ticks = [robot.reset()], []
 

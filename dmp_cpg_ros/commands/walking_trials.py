@@ -78,7 +78,7 @@ class Walk(LoopRun[WalkingLoop]):
                  seed: int = 0, file: str | None = None) -> None:
         suite = suite_of(robot, gait, file)
         body = MujocoRobot(suite.robot_file, suite.tick_ns, seed, 0.03 if seed else 0.0,
-                           world=world or suite.world)
+                           world=world or suite.world, sensors=suite.sensors)
         super().__init__(body, WalkingLoop(body.description, load_gait(gait), suite.parameters))
         self.asked: Velocity = (0.0, 0.0, 0.0)
         self.walk(STANDING)

@@ -57,8 +57,7 @@ class SensorReadings:
         fine = (np.abs(self.joint_position) <= FASTEST_JOINT) & (
             np.abs(self.joint_velocity) <= FASTEST_JOINT
         )
-        usable: NDArray[np.bool_] = fine.reshape(len(LEGS), 3).all(axis=1)
-        return usable
+        return np.asarray(fine.reshape(len(LEGS), 3).all(axis=1))
 
     @property
     def usable_contacts(self) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.estimation_parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.gait_network import CanonicalParameters
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters
@@ -18,6 +19,7 @@ from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.posture import PostureParameters
 from dmp_cpg_ros.core.reference import ReferenceParameters
 from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.sensor_parameters import SensorParameters
 from dmp_cpg_ros.core.world import World
 from dmp_cpg_ros.core.world_choice import WorldParameters
 
@@ -31,6 +33,8 @@ class SuiteParameters:
     inhibition: InhibitionParameters = field(default_factory=InhibitionParameters)
     leg: LegParameters = field(default_factory=LegParameters)
     posture: PostureParameters = field(default_factory=PostureParameters)
+    estimation: EstimationParameters = field(default_factory=EstimationParameters)
+    state_source: StateSourceParameters = field(default_factory=StateSourceParameters)
 
 
 @dataclass(frozen=True)
@@ -167,8 +171,21 @@ NODE_PARAMETERS: dict[str, tuple[type[Parameters], ...]] = {
     'canonical_oscillators': (*CERTIFIED, CertificateParameters),
     'leg_transformation': (LegChoice, LegParameters, GaitParameters, RobotFileParameters),
     'inhibition': (*CERTIFIED, CommandParameters, CertificateParameters),
-    'posture_control': (PostureParameters, GaitParameters, RobotFileParameters),
-    'mujoco_robot': (RobotParameters, WorldParameters, TickParameters, RobotFileParameters),
+    'posture_control': (
+        PostureParameters,
+        EstimationParameters,
+        StateSourceParameters,
+        GaitParameters,
+        RobotFileParameters,
+    ),
+    'mujoco_robot': (
+        RobotParameters,
+        SensorParameters,
+        WorldParameters,
+        StateSourceParameters,
+        TickParameters,
+        RobotFileParameters,
+    ),
 }
 """Parameter sets of every kind of node that has a part of the core in it."""
 

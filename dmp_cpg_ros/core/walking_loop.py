@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState, estimated_state
 from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
+from dmp_cpg_ros.core.estimation_parameters import ESTIMATE
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.gait_network import GaitNetwork
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
@@ -25,6 +27,7 @@ from dmp_cpg_ros.core.reference import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.running_network import RunningNetwork
+from dmp_cpg_ros.core.sensor_readings import readings_of
 from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation import TransformationState
@@ -91,6 +94,12 @@ class WalkingLoop:
         self.r = np.zeros(3)
         self.x = initial_canonical_state(self.network, p.inhibition)
         self.posture_state = self.posture.initial_state()
+        self.estimator = (
+            BodyEstimator(description, p.estimation)
+            if p.state_source.state_source == ESTIMATE
+            else None
+        )
+        self.estimator_state: EstimatorState | None = None
         self.leg_states: list[LegState] = [leg.initial_state() for leg in self.legs]
         self._time_ns: int | None = None
         self._dt = 0.004
@@ -179,7 +188,7 @@ class WalkingLoop:
         self.stop = self.supervisor.step(self.stop, state.time_ns, self.x, x_dot, self.r, command)
         self.inhibition = self.supervisor.inhibition(self.stop)
         self.posture_state, feedback = self.posture.step(
-            self.posture_state, state, self.x, x_dot, self.r, dt
+            self.posture_state, self._body(state), self.x, x_dot, self.r, dt
         )
         targets = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
         return Tick(
@@ -203,6 +212,14 @@ class WalkingLoop:
         self.posture.gait = network.gait
         for leg in self.legs:
             leg.gait = network.gait
+
+    def _body(self, state: RobotState) -> RobotState:
+        """State of the robot as the posture controller is to know it."""
+        if self.estimator is None:
+            return state
+        readings = readings_of(state)
+        self.estimator_state, estimate = self.estimator.step(self.estimator_state, readings)
+        return estimated_state(readings, estimate)
 
     def _leg(
         self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float

@@ -28,6 +28,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.estimation_parameters import ESTIMATE, GROUND_TRUTH
 
 PUBLISHER_DEPTH = 2000
 """Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the
@@ -138,9 +139,15 @@ TOPICS: tuple[Interface, ...] = (
               'force on the base from its stamp on, for 0.1 s unless the next one comes before; '
               'frame base_footprint (along the heading) or odom',
               ('user',), (_ROBOT,)),
-    Interface('imu', Imu, 'inertial measurement in base_link', (_ROBOT,), ()),
-    Interface('odom', Odometry, 'pose and twist of base_link in odom', (_ROBOT,), (_POSTURE,)),
-    Interface('foot_contacts', JointState, 'effort = normal force of each foot', (_ROBOT,), ()),
+    Interface('imu', Imu, 'turn rate and specific force in base_link; no orientation',
+              (_ROBOT,), (_POSTURE,), sometimes=(_POSTURE,)),
+    Interface('odom', Odometry, "true pose and twist of base_link in odom, the simulator's",
+              (_ROBOT,), (_POSTURE,), sometimes=(_POSTURE,)),
+    Interface('foot_contacts', JointState, 'effort = normal force of each foot',
+              (_ROBOT,), (_POSTURE,), sometimes=(_POSTURE,)),
+    Interface('estimated_odom', Odometry,
+              "estimated pose and twist of base_link, at the parameter's rate",
+              (_POSTURE,), (), sometimes=(_POSTURE,)),
     Interface('/clock', Clock, 'the clock of the robot', (_ROBOT,), ()),
     Interface('inhibition_state', DiagnosticArray,
               'stop and start: state word, gains, times',
@@ -167,6 +174,9 @@ SERVICES: tuple[Interface, ...] = (
               (_RECORDER,), ('user',), service=True),
 )
 """Services of the suite."""
+
+BODY_TOPICS = {ESTIMATE: ('imu', 'foot_contacts'), GROUND_TRUTH: ('odom',)}
+"""What the posture controller reads besides joints, by the parameter ``state_source``."""
 
 INTERFACES: dict[str, Interface] = {interface.name: interface for interface in TOPICS + SERVICES}
 

@@ -67,11 +67,16 @@ class JointStateReader:
         Names in our order.
     fields : sequence of str
         Which of ``position``, ``velocity``, ``effort`` are needed.
+    strict : bool
+        Whether numbers that are not finite are refused; else the caller judges them.
     """
 
-    def __init__(self, names: Sequence[str], fields: Sequence[str]) -> None:
+    def __init__(
+        self, names: Sequence[str], fields: Sequence[str], *, strict: bool = True
+    ) -> None:
         """Remember what is needed."""
         self._order, self._fields = NameOrder(names), tuple(fields)
+        self._strict = strict
 
     def read(self, message: JointState) -> list[Array]:
         """Arrays (n,) of the needed fields in our order; raises DataError."""
@@ -84,7 +89,7 @@ class JointStateReader:
                 raise DataError(f'{field} has {values.shape[0]} entries for {size} names')
             if index is not None:
                 values = values[index]
-            arrays.append(checked(values, field))
+            arrays.append(checked(values, field) if self._strict else values)
         return arrays
 
 

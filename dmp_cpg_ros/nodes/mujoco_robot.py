@@ -18,7 +18,9 @@ from rosgraph_msgs.msg import Clock as ClockMessage
 
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.estimation_parameters import StateSourceParameters
 from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.sensor_parameters import SensorParameters
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
     RobotFileParameters,
@@ -29,7 +31,7 @@ from dmp_cpg_ros.core.suite_parameters import (
 from dmp_cpg_ros.core.world_choice import WorldParameters
 from dmp_cpg_ros.nodes.conversions import JointTargetsReader, read_push_force
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.interfaces import Interface
+from dmp_cpg_ros.nodes.interfaces import BODY_TOPICS, Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
 from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
@@ -117,11 +119,14 @@ class MujocoRobotNode(ManagedNode):
             self._viewer.close()
 
     def readers(self, topic: Interface) -> tuple[str, ...]:
-        """Count the legs among the readers of joint_states where they measure."""
+        """Count those among the readers of a topic that read it with these parameters."""
         readers = super().readers(topic)
-        measuring = self.local is None and self._options.reading == 'torque'
-        if topic.name == 'joint_states' and measuring:
+        if self.local is not None:
+            return readers
+        if topic.name == 'joint_states' and self._options.reading == 'torque':
             readers = (*readers, 'leg_transformation')
+        if topic.name in BODY_TOPICS[self.parameters_of(StateSourceParameters).state_source]:
+            readers = (*readers, 'posture_control')
         return readers
 
     def diagnostic_values(self) -> Mapping[str, Any]:
@@ -279,7 +284,12 @@ class MujocoRobotNode(ManagedNode):
         if p.reading == 'torque':
             robot_file = robot_file.without_gains()
         return MujocoRobot(
-            robot_file, self._tick_ns, p.seed, p.initial_spread, world=world
+            robot_file,
+            self._tick_ns,
+            p.seed,
+            p.initial_spread,
+            world=world,
+            sensors=self.parameters_of(SensorParameters),
         )
 
 

@@ -12,6 +12,7 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 
+from dmp_cpg_ros.core.body_estimation import BodyEstimate
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
@@ -25,6 +26,9 @@ FOOT_NAMES = tuple(f'{leg}_foot' for leg in LEGS)
 class RobotStateWriter:
     """The five messages of a robot's state, refilled at every tick.
 
+    ``imu`` holds what a gyroscope and an accelerometer measure and no orientation: fusing them
+    is the reader's task, and yaw is nothing that such a sensor knows. ``odom`` is the truth.
+
     Attributes
     ----------
     clock, imu, odom, foot_contacts, joint_states : messages
@@ -35,6 +39,7 @@ class RobotStateWriter:
         """Build the messages."""
         self.clock, self.imu, self.odom = Clock(), Imu(), Odometry()
         self.imu.header.frame_id = BASE_FRAME
+        self.imu.orientation_covariance[0] = -1.0  # says that there is no orientation
         self.odom.header.frame_id, self.odom.child_frame_id = WORLD_FRAME, BASE_FRAME
         self._joints = JointStateWriter(JOINT_NAMES, FIELDS, BASE_FRAME)
         self._feet = JointStateWriter(FOOT_NAMES, ('effort',), BASE_FRAME)
@@ -50,10 +55,10 @@ class RobotStateWriter:
         set_stamp(self.odom.header.stamp, time_ns)
         rate = finite_list(state.base_rate_in_base, 'base_rate_in_base')
         quaternion = finite_list(state.base_quaternion, 'base_quaternion')
-        _set_vector(self.imu.angular_velocity, rate)
+        _set_vector(self.imu.angular_velocity,
+                    finite_list(state.measured_rate_in_base, 'measured_rate_in_base'))
         _set_vector(self.imu.linear_acceleration,
                     finite_list(state.acceleration_in_base, 'acceleration_in_base'))
-        _set_quaternion(self.imu.orientation, quaternion)
         _set_vector(self.odom.pose.pose.position,
                     finite_list(state.base_position_in_world, 'base_position_in_world'))
         _set_quaternion(self.odom.pose.pose.orientation, quaternion)
@@ -80,11 +85,17 @@ class JointsReader:
 
 
 class FootContactsReader:
-    """Reads ``foot_contacts``."""
+    """Reads ``foot_contacts``.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    strict : bool
+        Whether forces that are not finite are refused; else the caller judges them.
+    """
+
+    def __init__(self, *, strict: bool = True) -> None:
         """Prepare the order of the feet."""
-        self._reader = JointStateReader(FOOT_NAMES, ('effort',))
+        self._reader = JointStateReader(FOOT_NAMES, ('effort',), strict=strict)
 
     def read(self, message: JointState) -> Array:
         """Normal forces, ndarray (4,) [N]."""
@@ -119,20 +130,45 @@ def read_odom(message: Odometry) -> BaseMotion:
                       _vector(twist.angular, 'angular velocity'))
 
 
-def read_imu(message: Imu) -> tuple[Array, Array, Array]:
-    """Quaternion (4,), rate (3,) [rad/s] and specific force (3,) [m/s^2]; raises DataError."""
-    return (_quaternion(message.orientation),
-            _vector(message.angular_velocity, 'angular_velocity'),
-            _vector(message.linear_acceleration, 'linear_acceleration'))
+def read_imu(message: Imu) -> tuple[Array, Array]:
+    """Turn rate (3,) [rad/s] and specific force (3,) [m/s^2], as they are.
+
+    Numbers that are not finite pass: the estimator judges them together with silent sensors.
+    """
+    rate, force = message.angular_velocity, message.linear_acceleration
+    return np.array((rate.x, rate.y, rate.z)), np.array((force.x, force.y, force.z))
+
+
+class EstimatedOdometryWriter:
+    """Writes ``estimated_odom``."""
+
+    def __init__(self) -> None:
+        """Build the message."""
+        self.message = Odometry()
+        self.message.header.frame_id, self.message.child_frame_id = WORLD_FRAME, BASE_FRAME
+
+    def fill(self, estimate: BodyEstimate) -> Odometry:
+        """Refill with an estimate; of the covariances only the velocity's variances are known."""
+        message = self.message
+        set_stamp(message.header.stamp, estimate.time_ns)
+        pose, twist = message.pose.pose, message.twist.twist
+        _set_vector(pose.position, finite_list(estimate.position_in_world, 'position'))
+        _set_quaternion(pose.orientation, finite_list(estimate.quaternion, 'quaternion'))
+        _set_vector(twist.linear, finite_list(estimate.velocity_in_base, 'velocity'))
+        _set_vector(twist.angular, finite_list(estimate.rate_in_base, 'rate'))
+        message.twist.covariance[:15:7] = estimate.velocity_variance
+        return message
 
 
 def robot_state(time_ns: int, joints: tuple[Array, Array, Array], base: BaseMotion,
-                foot_force: Array, acceleration_in_base: Array | None = None) -> RobotState:
+                foot_force: Array, acceleration_in_base: Array | None = None,
+                gyro_in_base: Array | None = None) -> RobotState:
     """Put a state together from what its messages told; acceleration zero where not given."""
     return RobotState(
         time_ns, joints[0], joints[1], joints[2], base.position_in_world,
         base.quaternion, base.velocity_in_base, base.rate_in_base,
-        np.zeros(3) if acceleration_in_base is None else acceleration_in_base, foot_force)
+        np.zeros(3) if acceleration_in_base is None else acceleration_in_base, foot_force,
+        gyro_in_base)
 
 
 def _vector(vector: Any, what: str) -> Array:

@@ -14,6 +14,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.push import HOLD_NS, Push, PushForce, PushQueue
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import JointTargets, RobotState
+from dmp_cpg_ros.core.sensor_parameters import SensorParameters
 from dmp_cpg_ros.core.world import World, height_over_ground
 from dmp_cpg_ros.robot.contact_reader import ContactReader
 from dmp_cpg_ros.robot.home_pose import home_joint_position
@@ -24,6 +25,7 @@ from dmp_cpg_ros.robot.model_reader import find_ids, read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.port import RobotError, steps_per_tick
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
+from dmp_cpg_ros.robot.sensor_noise import SensorNoise
 from dmp_cpg_ros.robot.standing_torque import standing_torque
 
 Vector = NDArray[np.float64]
@@ -56,6 +58,8 @@ class MujocoRobot:
         Height of the base at the start [m]; by default its feet touch the ground.
     world : World, optional
         What it walks on; by default the flat floor.
+    sensors : SensorParameters, optional
+        Noise of the sensors, from the same seed; by default they are perfect.
 
     Raises
     ------
@@ -65,7 +69,8 @@ class MujocoRobot:
 
     def __init__(self, robot_file: RobotFile | Path | str | None = None, tick_ns: int = 4_000_000,
                  seed: int = 0, initial_spread: float = 0.0,
-                 initial_height: float | None = None, world: World | None = None) -> None:
+                 initial_height: float | None = None, world: World | None = None,
+                 sensors: SensorParameters | None = None) -> None:
         if not isinstance(robot_file, RobotFile):
             robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
         self.world = world = world or World()
@@ -90,6 +95,7 @@ class MujocoRobot:
             raise ParameterError(f'initial_spread = {initial_spread!r} must be at least 0 rad')
         self._seed, self._spread = seed, initial_spread
         self._initial_height = initial_height
+        self._sensors = None if sensors is None else SensorNoise(sensors, seed, tick_ns)
         self.data = mujoco.MjData(model)
         self._tick = 0
         self._push: tuple[Vector, int] = (np.zeros(3), 0)
@@ -102,6 +108,8 @@ class MujocoRobot:
         mujoco.mj_resetData(model, data)
         self._drive.reset()
         self._tick, self._push, self._pushes = 0, (np.zeros(3), 0), PushQueue()
+        if self._sensors is not None:
+            self._sensors.reset()
         spread = np.random.default_rng(self._seed).uniform(-1.0, 1.0, 12) * self._spread
         height = self._initial_height
         if height is None:
@@ -228,7 +236,7 @@ class MujocoRobot:
         data, b, d = self.data, self._base_qpos, self._base_dof
         quaternion = data.qpos[b + 3:b + 7]
         R_world_base = _rotation(quaternion)
-        return RobotState(
+        state = RobotState(
             time_ns=self._tick * self.tick_ns,
             joint_position=data.qpos[self._qpos],
             joint_velocity=data.qvel[self._dof],
@@ -239,6 +247,7 @@ class MujocoRobot:
             base_rate_in_base=data.qvel[d + 3:d + 6].copy(),
             acceleration_in_base=self._specific_force.copy(),
             foot_force=self._contacts.foot_force(data))
+        return state if self._sensors is None else self._sensors.measured(state)
 
 
 def _rotation(quaternion: Vector) -> Vector:

@@ -1,0 +1,56 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How good the simulated robot's sensors are.
+
+The defaults are those of the inertial sensor that Mini Cheetah carries (VectorNav VN-100, data
+sheet: 0.0035 °/s/√Hz and 0.14 mg/√Hz) with biases as they remain after calibration at the
+factory, and of 14-bit encoders behind a gear of 1:6 whose velocity is filtered.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+
+
+@dataclass(frozen=True)
+class SensorParameters(Parameters):
+    """Noise and biases of the simulated sensors; drawn from the robot's seed."""
+
+    sensor_noise: float = parameter(
+        1.0,
+        'factor of all noise and biases of the simulated sensors; 0: sensors are perfect',
+        minimum=0.0,
+        maximum=100.0,
+    )
+    gyro_noise_density: float = parameter(
+        6.1e-5, 'white noise of the gyroscope', unit='rad/s/sqrt(Hz)', minimum=0.0, maximum=1.0
+    )
+    gyro_bias: float = parameter(
+        1e-3,
+        "deviation of the gyroscope's constant bias",
+        unit='rad/s',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    accelerometer_noise_density: float = parameter(
+        1.4e-3,
+        'white noise of the accelerometer',
+        unit='m/s^2/sqrt(Hz)',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    accelerometer_bias: float = parameter(
+        0.02,
+        "deviation of the accelerometer's constant bias",
+        unit='m/s^2',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    encoder_noise: float = parameter(
+        1e-4, 'deviation of a measured joint angle', unit='rad', minimum=0.0, maximum=0.1
+    )
+    joint_velocity_noise: float = parameter(
+        0.02, 'deviation of a measured joint velocity', unit='rad/s', minimum=0.0, maximum=10.0
+    )
