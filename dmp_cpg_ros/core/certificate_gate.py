@@ -164,7 +164,7 @@ class CertificateGate:
             return self._holds(present.changed(between(share)))
 
         share = nearest_value(works, 0.0, 1.0)
-        values = ', '.join(f'{name} = {_rounded(between(share)[name], before):g}'
+        values = ', '.join(f'{name} = {shown(_rounded(between(share)[name], before))}'
                            for name, (before, _) in numbers.items())
         several = 's' if len(numbers) > 1 else ''
         return f'nearest value{several} that work{"" if several else "s"}: {values}'
@@ -173,7 +173,7 @@ class CertificateGate:
         """Other words that work in place of those that were asked for."""
         found = []
         for name, asked in words.items():
-            working = [_text(choice) for choice in _alternatives(proposed, name)
+            working = [shown(choice) for choice in _alternatives(proposed, name)
                        if choice != asked and self._holds(proposed.changed({name: choice}))]
             found.append(f'{name} = {" or ".join(working)}' if working else
                          f'no other {name} with the rest as it is')
@@ -224,5 +224,11 @@ def _rounded(value: float, towards: float) -> float:
     return max(math.floor(value / step) * step, towards)
 
 
-def _text(choice: Any) -> str:
-    return f'[{", ".join(choice)}]' if isinstance(choice, tuple) else str(choice)
+def shown(value: Any) -> str:
+    """Value as one types it for a parameter: lists in brackets, floats never as whole numbers."""
+    if isinstance(value, (tuple, list)):
+        return f'[{", ".join(map(str, value))}]'
+    if isinstance(value, float):
+        text = f'{value:g}'
+        return text if set(text) & set('.en') else f'{text}.0'
+    return str(value)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.parameter_change import read_change
 from dmp_cpg_ros.core.push import read_push
 
 Command = tuple[float, float, float]
@@ -109,6 +110,7 @@ EVENT_KINDS: dict[str, Read] = {
     'inhibit': _inhibit,
     'gait': _gait,
     'push': read_push,
+    'set': read_change,
 }
 """Kind of event to the function that reads its value, ``(value, where) -> (value, label)``; it
 raises DataError.

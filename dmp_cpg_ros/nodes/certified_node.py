@@ -15,7 +15,13 @@ from typing import Any
 from rclpy.parameter import Parameter
 
 from dmp_cpg_ros.core.certificate import Certificate
-from dmp_cpg_ros.core.certificate_gate import UNCERTIFIED, CertificateGate, Running, Verdict
+from dmp_cpg_ros.core.certificate_gate import (
+    UNCERTIFIED,
+    CertificateGate,
+    Running,
+    Verdict,
+    shown,
+)
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
@@ -124,13 +130,13 @@ class CertifiedNode(ManagedNode):
             if owner != self.KIND:
                 raise ParameterError(
                     f"'{name}' belongs to {owner}, which the other nodes follow; set it there: "
-                    f'ros2 param set /{owner} {name} {_shown(value)}')
+                    f'ros2 param set /{owner} {name} {shown(value)}')
         if not self.configured or UNCERTIFIED.issuperset(changed):
             return
         verdict = self._changes.judge(
             self._running(self._accepted), self.certificate, self._running(sets))
         if not verdict.accepted and not _allowed(sets):
-            asked = ', '.join(f'{name} = {_shown(value)}' for name, value in changed.items())
+            asked = ', '.join(f'{name} = {shown(value)}' for name, value in changed.items())
             raise ParameterError(
                 f'{asked} would lose the certificate: {verdict.reason} '
                 '(allow_uncertified:=true changes it all the same)')
@@ -181,8 +187,3 @@ class CertifiedNode(ManagedNode):
 def _allowed(sets: Sets) -> bool:
     permission: Any = sets[CertificateParameters]
     return bool(permission.allow_uncertified)
-
-
-def _shown(value: Any) -> str:
-    return f'[{", ".join(value)}]' if isinstance(value, tuple) else f'{value:g}' if isinstance(
-        value, float) else str(value)

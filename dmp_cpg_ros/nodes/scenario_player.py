@@ -24,6 +24,7 @@ from dmp_cpg_ros.nodes.acknowledged_topic import AcknowledgedTopic
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.parameter_setter import ParameterSetter
 
 FAR_NS = 2**31 * 10**9 - 1
 """A stamp later than every run [ns]."""
@@ -84,12 +85,14 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._pushes = AcknowledgedTopic(self, 'push')
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
         self._inhibit = self.create_client(SetBool, interface('inhibit').name)
+        self._setter = ParameterSetter(self)
         self._gait = self.create_client(SetParameters, f'{GAIT_OWNER}/set_parameters')
         self._deliver: dict[str, Callable[[Any], None]] = {
             'command': self._send,
             'inhibit': self._call_inhibit,
             'gait': self._set_gait,
             'push': self._push,
+            'set': self._set,
         }
         for name, callback in (
             (f'{GATE_OWNER}/holding_at', self._on_holding),
@@ -106,6 +109,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         return (
             self._gate.get_subscription_count() > 0
             and all(client.service_is_ready() for client in services)
+            and self._setter.connected()
             and self._commands.connected()
             and self._pushes.connected()
         )
@@ -232,6 +236,15 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._fail(f'gait: {results[0].reason if results else "no answer"}')
             return
         self._delivered()
+
+    def _set(self, values: dict[str, Any]) -> None:
+        """Ask the owner for a change; the robot walks on when it is refused."""
+
+        def done(refusal: str) -> None:
+            self._say(self.time_ns * 1e-9, f'  refused: {refusal}' if refusal else '  accepted')
+            self._delivered()
+
+        self._setter.set(values, done)
 
     # Real time -----------------------------------------------------------------------------------
 

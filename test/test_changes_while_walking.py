@@ -1,0 +1,175 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters changed at run time, through the nodes' own services in real processes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+import ros_processes
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+from rclpy.parameter import Parameter, parameter_value_to_python
+from ros_processes import Processes, Ros
+
+from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.commands.walk import load_scenario
+from dmp_cpg_ros.core.scenario import play
+from dmp_cpg_ros.core.walking_loop import WalkingLoop
+from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
+from dmp_cpg_ros.suite import load_suite
+
+processes, ros, ros_domain = (
+    ros_processes.processes, ros_processes.ros, ros_processes.ros_domain)
+
+OVERRIDES = {'physics': 'perfect_tracking', 'coupling_gain': 30.0}
+"""Couplings that are strong enough all-to-all, and would not be on a path."""
+
+REFUSED = """\
+  - {at: 1.1, set: {cadence_scale: 3.0}}
+  - {at: 1.2, set: {inhibition_gain: 100}}
+  - {at: 1.3, set: {coupling_graph: path}}
+  - {at: 1.3, set: {coupling_gain: 20.0, coupling_graph: path}}
+"""
+
+SCENARIO = """\
+name: changes
+duration: 4.0
+events:
+  - {{at: 0.1, inhibit: false}}
+  - {{at: 0.1, command: {{v_x: 0.4}}}}
+{refused}\
+  - {{at: 1.6, set: {{cadence_scale: 1.1, rho: 10, coupling_graph: ring}}}}
+  - {{at: 1.8, set: {{max_speed: 0.3, alpha_r: 4.0}}}}
+  - {{at: 2.0, set: {{inhibition_gain: 600, inhibited_legs: [rr]}}}}
+  - {{at: 2.4, inhibit: true}}
+"""
+
+
+def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
+    processes: Processes, tmp_path: Path
+) -> None:
+    asked, plain = tmp_path / 'asked.yaml', tmp_path / 'plain.yaml'
+    asked.write_text(SCENARIO.format(refused=REFUSED), encoding='utf-8')
+    plain.write_text(SCENARIO.format(refused=''), encoding='utf-8')
+    settings = [item for name, value in OVERRIDES.items()
+                for item in ('--set', f'{name}:={value}')]
+    process = processes.python('-m', 'dmp_cpg_ros.commands.walk', str(asked), '--lock-step',
+                               '--no-report', '--out', str(tmp_path / 'run'), *settings)
+    assert process.wait(240.0) == 0, process
+    said = process.output
+    refusals = re.findall(r'refused: (.*)', said)
+    assert len(refusals) == 4, said
+    assert said.count('accepted') == 3, said
+    for refusal, words in zip(refusals, [
+        (r'capture: N omega r/r0 made exact = \S+ 1/s is not < k_inh = 400 1/s',
+         r'nearest value that works: cadence_scale = [12]\.\d+'),
+        (r'capture: .* is not < k_inh = 100 1/s',
+         r'nearest value that works: inhibition_gain = \d+'),
+        (r'contraction: .* is not < connectivity of L_K \+ k_inh E = \S+ 1/s',
+         r'what works: coupling_graph = all_to_all or ring'),
+        ('contraction: ', 'coupling_graph'),
+    ], strict=True):
+        for pattern in words:
+            assert re.search(pattern, refusal), refusal
+
+    recording, ticks = load_recording(tmp_path / 'run' / 'bag'), plain_ticks(plain)
+    assert ticks[-1].supervisor.word == 'at_rest'
+    np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
+    np.testing.assert_array_equal(recording.canonical.x_dot, [tick.x_dot for tick in ticks])
+    for name in ('position', 'velocity', 'effort'):
+        np.testing.assert_array_equal(
+            getattr(recording.targets, name), [getattr(tick.targets, name) for tick in ticks])
+
+
+def plain_ticks(scenario_file: Path) -> list[Any]:
+    """The scenario on the plain loop."""
+    scenario, suite = load_scenario(scenario_file), load_suite(None, OVERRIDES)
+    robot = PerfectTrackingRobot(load_description(suite.robot_file), suite.tick_ns)
+    loop, ticks = WalkingLoop(robot.description, suite.gait, suite.parameters), []
+    state = robot.reset()
+
+    def step() -> None:
+        nonlocal state
+        ticks.append(loop.tick(state))
+        state = robot.step(ticks[-1].targets)
+
+    play(scenario, suite.tick_ns, step, loop.takers)
+    return ticks
+
+
+def set_parameters(ros: Ros, node: str, **values: Any) -> Any:
+    """``ros2 param set``: the result of the first parameter."""
+    request = SetParameters.Request(parameters=[
+        Parameter(name, value=value).to_parameter_msg() for name, value in values.items()])
+    return ros.call(SetParameters, f'{node}/set_parameters', request).results[0]
+
+
+def get_parameter(ros: Ros, node: str, name: str) -> Any:
+    answer = ros.call(GetParameters, f'{node}/get_parameters',
+                      GetParameters.Request(names=[name]))
+    return parameter_value_to_python(answer.values[0])
+
+
+def test_each_node_guards_its_own_parameters_and_follows_the_others(
+    processes: Processes, ros: Ros
+) -> None:
+    canonical = processes.node('canonical_oscillators')
+    inhibition = processes.node('inhibition')
+    owner, other = 'canonical_oscillators', 'inhibition'
+    for values, words in [
+        ({'cadence_scale': 3.0}, ('capture', 'is not <', 'k_inh = 400', 'cadence_scale = 2.')),
+        ({'cadence_scale': 9.0}, ('range',)),
+        ({'cadence_scale': 'fast'}, ('Wrong parameter type', 'DOUBLE')),
+        ({'coupling_graph': 'chain'}, ('all_to_all, ring',)),
+        ({'inhibition_gain': 500.0},
+         ('belongs to inhibition', 'param set /inhibition inhibition_gain 500.0')),
+        ({'control_rate': 100.0}, ('read-only',)),
+    ]:
+        result = set_parameters(ros, owner, **values)
+        assert not result.successful
+        for word in words:
+            assert word in result.reason, result.reason
+    assert get_parameter(ros, owner, 'cadence_scale') == 1.0
+
+    assert set_parameters(ros, other, inhibition_gain=1500.0).successful
+    ros.spin_until(lambda: get_parameter(ros, owner, 'inhibition_gain') == 1500.0)
+    assert set_parameters(ros, owner, cadence_scale=3.0).successful
+    ros.spin_until(lambda: get_parameter(ros, other, 'cadence_scale') == 3.0)
+    lowered = set_parameters(ros, other, inhibition_gain=400.0)
+    assert not lowered.successful
+    assert 'k_inh = 400' in lowered.reason
+
+    diagnostics: list[DiagnosticArray] = ros.collect(DiagnosticArray, '/diagnostics')
+    both = [Parameter('allow_uncertified', value=True), Parameter('inhibition_gain', value=400.0)]
+    answer = ros.call(
+        SetParametersAtomically, f'{other}/set_parameters_atomically',
+        SetParametersAtomically.Request(parameters=[entry.to_parameter_msg() for entry in both]))
+    assert answer.result.successful, answer.result.reason
+
+    def alarmed(node: str) -> bool:
+        return any(status.name == node and status.level == DiagnosticStatus.ERROR
+                   and 'WITHOUT a certificate' in status.message and 'capture' in status.message
+                   for message in diagnostics for status in message.status)
+
+    ros.spin_until(lambda: alarmed(other) and alarmed(owner))
+    for process in (canonical, inhibition):
+        process.interrupt()
+        assert process.wait() == 0, process
+        assert 'Traceback' not in process.output, process
+
+
+def test_before_it_is_configured_a_node_takes_what_is_in_range(
+    processes: Processes, ros: Ros
+) -> None:
+    processes.node('reference_filter', autostart=False)
+    assert set_parameters(ros, 'reference_filter', alpha_r=0.05).successful
+    assert not set_parameters(ros, 'reference_filter', alpha_r=-1.0).successful
