@@ -30,6 +30,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
     chosen_world,
 )
+from dmp_cpg_ros.core.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.world import World
 from dmp_cpg_ros.core.world_choice import WorldParameters
 
@@ -141,6 +142,7 @@ def load_suite(
         sets['posture_control'][PostureParameters],
         sets['posture_control'][EstimationParameters],
         sets['posture_control'][StateSourceParameters],
+        sets['inhibition'][VoteSourceParameters],
     )
     gait = canonical[GaitParameters]
     return Suite(

@@ -12,6 +12,7 @@ import pytest
 from dmp_cpg_ros.core.canonical import CanonicalSystem
 from dmp_cpg_ros.core.contraction.voting import (
     certified_threshold,
+    different_voters,
     majority_clamp,
     rest_threshold,
 )
@@ -24,15 +25,16 @@ from dmp_cpg_ros.core.phase import state_at
 OMEGA, REGION = 10.0, 0.3
 
 
-def network(name: str, gain: float) -> CanonicalSystem:
-    phases = np.array([0.0, np.pi, 1.5 * np.pi, 0.5 * np.pi])
-    return CanonicalSystem(graph_from_edges(4, topology(name, 4), gain, phases),
+def network(name: str, gain: float, size: int = 4) -> CanonicalSystem:
+    phases = (np.array([0.0, np.pi, 1.5 * np.pi, 0.5 * np.pi]) if size == 4
+              else -2.0 * np.pi * np.arange(size) / size)
+    return CanonicalSystem(graph_from_edges(size, topology(name, size), gain, phases),
                            AndronovHopf(8.0), state_at(phases))
 
 
 def stopped(system: CanonicalSystem, alpha: float, voters: tuple[int, ...]) -> bool:
     """Whether the vote stops the gait from its locked state; each vote acts in its own region."""
-    gains = np.zeros(4)
+    gains = np.zeros(system.graph.size)
     gains[list(voters)] = alpha
     vote = Inhibition(True, gains, REGION)
     x = state_at(1.0 + system.graph.phases)
@@ -51,6 +53,41 @@ def test_the_threshold_of_simulation_is_within_a_tenth_of_the_computed_one(
     computed = rest_threshold(system, OMEGA, voters, REGION)
     assert not stopped(system, 0.9 * computed, voters)
     assert stopped(system, 1.1 * computed, voters)
+
+
+@pytest.mark.parametrize('name', ['all_to_all', 'ring'])
+@pytest.mark.parametrize('voters', [(0,), (0, 1), (0, 2, 3, 5, 7), tuple(range(8))])
+def test_the_threshold_is_as_close_in_a_larger_network(
+        name: str, voters: tuple[int, ...]) -> None:
+    system = network(name, 100.0, 8)
+    computed = rest_threshold(system, OMEGA, voters, REGION)
+    assert not stopped(system, 0.9 * computed, voters)
+    assert stopped(system, 1.1 * computed, voters)
+
+
+@pytest.mark.parametrize(('name', 'gain'), [('all_to_all', 5.0), ('ring', 6.0)])
+@pytest.mark.parametrize('voters', [(0, 1, 2), (0, 2, 3), (0, 1, 2, 3)])
+def test_the_threshold_of_a_majority_is_as_close_with_couplings_too_weak_for_one(
+        name: str, gain: float, voters: tuple[int, ...]) -> None:
+    system = network(name, gain)
+    computed = rest_threshold(system, OMEGA, voters, REGION)
+    assert not stopped(system, 0.9 * computed, voters)
+    assert stopped(system, 1.1 * computed, voters)
+    assert not stopped(system, 1000.0, (0,))
+
+
+@pytest.mark.parametrize(('name', 'sizes'), [
+    ('all_to_all', [1, 1, 1, 1]), ('ring', [1, 2, 1, 1]), ('path', [2, 4, 2, 1])])
+def test_voters_that_a_symmetry_exchanges_count_once(name: str, sizes: list[int]) -> None:
+    system = network(name, 50.0)
+    assert [len(different_voters(system, count)) for count in (1, 2, 3, 4)] == sizes
+    assert different_voters(system, 0) == []
+    for count in (1, 2, 3):
+        chosen = different_voters(system, count)
+        of_chosen = {round(rest_threshold(system, OMEGA, v, REGION), 3) for v in chosen}
+        of_all = {round(rest_threshold(system, OMEGA, v, REGION), 3)
+                  for v in combinations(range(4), count)}
+        assert of_chosen == of_all
 
 
 @pytest.mark.parametrize('name', ['all_to_all', 'ring', 'star'])

@@ -15,7 +15,9 @@ from typing import Any
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.certificate import Certificate, certify
 from dmp_cpg_ros.core.certificate_inequality import Inequality
+from dmp_cpg_ros.core.certificate_range import operating_range
 from dmp_cpg_ros.core.certificate_suggest import Suggestion, suggest_gains
+from dmp_cpg_ros.core.certificate_votes import VotesNeeded, votes_needed
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait_network import GaitNetwork
 from dmp_cpg_ros.core.leg_primitive import body_scale
@@ -48,11 +50,14 @@ class Certified:
         Of its parameters.
     suggestion : Suggestion or None
         Gains that hold, when asked for and found.
+    votes : VotesNeeded
+        How many legs can stop the gait, whether they may vote or not.
     """
 
     suite: Suite
     certificate: Certificate
     suggestion: Suggestion | None
+    votes: VotesNeeded
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -106,7 +111,10 @@ def certify_file(file: str | None = None, gait: str | None = None, robot: str | 
     p = suite.parameters
     network = GaitNetwork(p.canonical, suite.gait, body_scale(load_description(suite.robot_file)))
     running = (network, p.inhibition, p.reference, p.leg, p.posture, suite.tick_ns * 1e-9)
-    return Certified(suite, certify(*running), suggest_gains(*running) if suggest else None)
+    votes = votes_needed(network, p.inhibition,
+                         operating_range(network, p.inhibition, p.reference))
+    suggestion = suggest_gains(*running) if suggest else None
+    return Certified(suite, certify(*running), suggestion, votes)
 
 
 def _report(certified: Certified, suggest: bool) -> list[str]:
@@ -119,6 +127,7 @@ def _report(certified: Certified, suggest: bool) -> list[str]:
             f'{leg} {math.degrees(ahead):.1f} deg at {radius:.3f}' for leg, ahead, radius
             in zip(LEGS, certificate.rest_phase, certificate.rest_radius, strict=True))
         lines += ['', f'at rest, phase ahead of its place and radius: {at_rest}']
+    lines += ['', *_votes(certified)]
     lines += ['', 'certificate: ' + (
         f'holds; contraction under inhibition is of {certificate.contraction_grade} grade; '
         f"sampled, not proved: {', '.join(certificate.sampled) or 'nothing'}"
@@ -139,6 +148,23 @@ def _table(inequalities: Sequence[Inequality]) -> list[str]:
              for row in rows]
     told = [f'    {entry.sentence}' for entry in inequalities]
     return [lines[0], *(line for pair in zip(lines[1:], told, strict=True) for line in pair)]
+
+
+def _votes(certified: Certified) -> list[str]:
+    """How many legs can stop the gait by their votes."""
+    votes, inhibition = certified.votes, certified.suite.parameters.inhibition
+    alone = ('certainly stops' if votes.certain == 1 else
+             'may stop' if votes.powerless == 0 else 'cannot stop')
+    needed = 'no number of legs is certain to be enough' if votes.certain is None else (
+        f'votes needed: {votes.certain} of {len(LEGS)}')
+    return [
+        f'voting is {"on" if inhibition.voting else "off"}; a full vote has the weight '
+        f'{votes.clamp.limit:.4g}, a gain of {votes.clamp.gain:.4g} 1/s: {needed}; '
+        f'{votes.powerless} or fewer cannot stop the gait, one leg alone {alone} it',
+        'gains of each from which 1, 2, ... votes certainly stop it: '
+        + ', '.join(f'{gain:.4g}' for gain in votes.enough)
+        + ' 1/s; below which they cannot: '
+        + ', '.join(f'{gain:.4g}' for gain in votes.too_weak) + ' 1/s']
 
 
 def _verdict(entry: Inequality) -> str:
@@ -162,12 +188,22 @@ def _as_mapping(certified: Certified, suggest: bool) -> dict[str, Any]:
     suite = certified.suite
     mapping: dict[str, Any] = {'file': str(suite.file), 'gait': suite.gait.name,
                                'tick_s': suite.tick_ns * 1e-9,
-                               **certified.certificate.as_mapping()}
+                               **certified.certificate.as_mapping(),
+                               'votes': _votes_mapping(certified.votes)}
     if suggest:
         found = certified.suggestion
         mapping['suggestion'] = None if found is None else {
             'coupling_gain': found.coupling_gain, 'inhibition_gain': found.inhibition_gain}
     return mapping
+
+
+def _votes_mapping(votes: VotesNeeded) -> dict[str, Any]:
+    def finite(gains: Sequence[float]) -> list[float | None]:
+        return [gain if math.isfinite(gain) else None for gain in gains]
+
+    return {'limit': votes.clamp.limit, 'gain': votes.clamp.gain, 'needed': votes.certain,
+            'powerless': votes.powerless, 'enough': finite(votes.enough),
+            'too_weak': finite(votes.too_weak)}
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -45,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         suite = load_suite(options.parameters, overrides)
         if suite.robot.physics != 'mujoco' and any(e.kind == 'push' for e in scenario.events):
             raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')
+        _check_votes(scenario, suite)
         certificate = _certificate(suite)
         if not certificate.holds and not overrides.get('allow_uncertified', False):
             raise ParameterError(
@@ -168,6 +169,13 @@ def _analyze(
     if results.report is not None:
         print(f'report: {os.path.relpath(results.report)}')
     return FAILED if results.metrics['robot']['fell'] else OK
+
+
+def _check_votes(scenario: Scenario, suite: Suite) -> None:
+    """Raise ParameterError when a scenario votes where nobody counts."""
+    votes = any(event.kind == 'votes' for event in scenario.events)
+    if votes and not suite.parameters.inhibition.voting:
+        raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
 
 
 def _certificate(suite: Suite) -> Certificate:

@@ -6,7 +6,8 @@ The certificate of a running suite: what its parameters guarantee, in inequaliti
 Computed from the parameters that the nodes run with, for the highest cadence that the reference's
 limits allow: (a) the legs synchronise, (b) inhibition makes the network contract, (c) capture
 holds, (d) the tick is short enough, (e) reference and joints contract, (f) at rest all feet are on
-the ground, (g) unequal leg frequencies are tolerated, (h) the time to rest is bounded.
+the ground, (g) unequal leg frequencies are tolerated, (h) the time to rest is bounded, (i) where
+legs can vote, a majority stops the gait and fewer do not.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from dmp_cpg_ros.core.certificate_range import operating_range
 from dmp_cpg_ros.core.certificate_rest import rest_inequalities
 from dmp_cpg_ros.core.certificate_step import step_inequalities
 from dmp_cpg_ros.core.certificate_time import time_to_rest, time_to_walking
+from dmp_cpg_ros.core.certificate_votes import vote_inequalities
 from dmp_cpg_ros.core.contraction.finding import PROVED, weakest
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait_network import GaitNetwork
@@ -44,7 +46,7 @@ class Certificate:
     Attributes
     ----------
     inequalities : tuple of Inequality
-        In the order (a) to (h).
+        In the order (a) to (i).
     contraction_grade : str
         ``global``: the inhibited network contracts from every state; ``regional``: on the set that
         capture leads into; ``none``.
@@ -165,6 +167,8 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     rows += rest_inequalities(network, leg, analysis.rest)
     rows += [entry for entry in network_rows if entry.name == 'frequency_mismatch']
     rows += _time_inequalities(stop, start)
+    rows += vote_inequalities(network, inhibition, span, reference.alpha_r, leg.activity_rate,
+                              tick_s)
     rest = analysis.rest
     return Certificate(
         tuple(rows), analysis.contraction.reach, span.omega[1], stop, start,

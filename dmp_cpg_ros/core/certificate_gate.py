@@ -21,10 +21,11 @@ from dmp_cpg_ros.core.certificate_suggest import nearest_value
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait_network import GaitNetwork
-from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
 
 UNCERTIFIED = frozenset(
-    ('auto_inhibit', 'auto_delay', 'start_inhibited', 'cmd_vel_timeout', 'allow_uncertified'))
+    ('auto_inhibit', 'auto_delay', 'start_inhibited', 'cmd_vel_timeout', 'allow_uncertified',
+     *UNCERTIFIED_VOTES, *VOTE_SOURCES))
 """Parameters of certified nodes that no inequality depends on."""
 
 _DIGITS = 4

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stopping and starting the gait: requests in, the next tick's inhibition and its state word out.
 
-- ``free``, ``walking``: uninhibited; walking once the legs are in their places and the reference
-  moves.
+- ``free``, ``walking``: uninhibited, or slowed by votes that do not stop it; walking once the legs
+  are in their places and the reference moves.
 - ``waiting``: a stop is requested; the reference slows, then inhibition is armed until x enters C.
 - ``captured``: inhibition holds an oscillator and the others follow.
 - ``at_rest``: oscillators, reference and swings have come to rest.
@@ -12,15 +12,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.ballot import NO_VOTES, Ballot
 from dmp_cpg_ros.core.gait_network import GaitNetwork
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.phase import phase_rate
+from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.swing_activity import activity_step
+from dmp_cpg_ros.core.voting_parameters import SUM
 
 Array = NDArray[np.float64]
 
@@ -54,9 +57,9 @@ class SupervisorState:
     word : str
         One of ``STATE_WORDS``.
     requested : bool
-        Whether a stop is requested.
+        Whether a stop is requested: asked for, or voted.
     automatic : bool
-        Whether the stop was requested by ``auto_inhibit`` (or by starting at rest) and not by a
+        Whether the stop was asked for by ``auto_inhibit`` (or by starting at rest) and not by a
         service call.
     request_ns : int
         Stamp at which the present stop or start was requested [ns].
@@ -68,6 +71,14 @@ class SupervisorState:
         Time from the request to rest or to phase lock [s]; NaN until then.
     idle_ns : int
         Stamp since which the command has been zero [ns]; −1 while it is not.
+    asked : bool
+        Whether the service or ``auto_inhibit`` asks for the stop.
+    voted : bool
+        Whether votes have overcome the threshold and hold the stop.
+    vote_gains : ndarray (4,)
+        Largest gains of the votes since then [1/s]: what holds the gait does not fade.
+    ballot : Ballot
+        Votes of this tick.
     """
 
     time_ns: int
@@ -79,6 +90,10 @@ class SupervisorState:
     activity: Array
     measured_s: float = float('nan')
     idle_ns: int = -1
+    asked: bool = False
+    voted: bool = False
+    vote_gains: Array = field(default_factory=lambda: np.zeros(len(LEGS)))
+    ballot: Ballot = NO_VOTES
 
 
 class GaitSupervisor:
@@ -112,11 +127,21 @@ class GaitSupervisor:
             stopped,
             np.zeros(4) if stopped else np.ones(4),
             measured_s=0.0,
+            asked=stopped,
         )
 
     def inhibition(self, state: SupervisorState) -> Inhibition:
-        """Inhibition that the canonical system applies at the tick after ``state``."""
-        gains = self.parameters.armed_gains if state.armed else np.zeros(len(state.activity))
+        """Inhibition that the canonical system applies at the tick after ``state``.
+
+        Votes that do not stop the gait act weakly while it walks. In a stop the larger acts on
+        each leg of what was asked for and what was voted, once the reference is slow.
+        """
+        gains = np.zeros(len(state.activity))
+        if not state.requested:
+            gains = state.ballot.gains
+        elif state.armed:
+            gains = self.parameters.armed_gains if state.asked else gains
+            gains = np.maximum(gains, state.vote_gains) if state.voted else gains
         return Inhibition(state.requested, gains, self.parameters.region_radius)
 
     def request(
@@ -124,19 +149,11 @@ class GaitSupervisor:
     ) -> SupervisorState:
         """Ask for a stop or a start; asking for what is already asked changes nothing but its
         origin.
+
+        A service call that asks for a start ends a stop by votes too, once nobody votes any more.
         """
-        if stop == state.requested:
-            return replace(state, automatic=automatic)
-        return replace(
-            state,
-            word='waiting' if stop else 'releasing',
-            requested=stop,
-            automatic=automatic,
-            request_ns=state.time_ns,
-            armed=False,
-            measured_s=float('nan'),
-            idle_ns=-1,
-        )
+        voted = state.voted and (stop or automatic or state.ballot.alive)
+        return self._turned(replace(state, asked=stop, automatic=automatic, voted=voted))
 
     def step(
         self,
@@ -146,6 +163,7 @@ class GaitSupervisor:
         x_dot: Array,
         r: Array,
         command: tuple[float, float, float],
+        ballot: Ballot | None = None,
     ) -> SupervisorState:
         """Advance by one tick.
 
@@ -161,6 +179,8 @@ class GaitSupervisor:
             Reference of this tick.
         command : tuple of float
             External command (v_x, v_y, γ) that acts at this tick.
+        ballot : Ballot, optional
+            Votes of this tick; those of the tick before without.
 
         Returns
         -------
@@ -171,7 +191,7 @@ class GaitSupervisor:
         rates = phase_rate(x, x_dot)
         activity = activity_step(state.activity, rates, omega, self.activity_rate, dt)
         state = replace(state, time_ns=time_ns, activity=activity)
-        state = self._automatic(state, command)
+        state = self._voted(self._automatic(state, command), ballot or state.ballot)
         speed = self.network.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
         if state.requested:
             return self._stopping(state, x, rates, speed)
@@ -187,15 +207,43 @@ class GaitSupervisor:
             return state
         if any(command):
             state = replace(state, idle_ns=-1)
-            return (
-                self.request(state, False, True) if state.requested and state.automatic else state
-            )
+            return self.request(state, False, True) if state.asked and state.automatic else state
         if state.idle_ns < 0:
             state = replace(state, idle_ns=state.time_ns)
         waited = (state.time_ns - state.idle_ns) * 1e-9
-        if not state.requested and waited >= self.parameters.auto_delay:
+        if not state.asked and waited >= self.parameters.auto_delay:
             return self.request(state, True, True)
         return state
+
+    def _voted(self, state: SupervisorState, ballot: Ballot) -> SupervisorState:
+        """Stop when votes overcome the threshold; keep what holds until it is released."""
+        if ballot is not state.ballot:
+            state = replace(state, ballot=ballot)
+        if ballot.stops and not state.voted:
+            return self._turned(replace(state, voted=True, vote_gains=ballot.gains))
+        if not state.voted:
+            return state
+        if not ballot.alive and self.parameters.vote_resume:
+            return self._turned(replace(state, voted=False))
+        if self.parameters.vote_rule == SUM and np.any(ballot.gains > state.vote_gains):
+            return replace(state, vote_gains=np.maximum(ballot.gains, state.vote_gains))
+        return state
+
+    @staticmethod
+    def _turned(state: SupervisorState) -> SupervisorState:
+        """Begin a stop or a start when what is wanted has changed."""
+        stop = state.asked or state.voted
+        if stop == state.requested:
+            return state
+        return replace(
+            state,
+            word='waiting' if stop else 'releasing',
+            requested=stop,
+            request_ns=state.time_ns,
+            armed=False,
+            measured_s=float('nan'),
+            idle_ns=-1,
+        )
 
     def _stopping(
         self, state: SupervisorState, x: Array, rates: Array, speed: float

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenarios: what is asked of the robot, and when on the robot's clock.
 
-A scenario is a list of events. A command event holds until the next one and is repeated like a
+A scenario is a list of events. A command or a vote holds until the next one and is repeated like a
 joystick does, so that a timeout of cmd_vel can be tried by ``command: silence``.
 """
 
@@ -18,6 +18,9 @@ from dmp_cpg_ros.core.world_choice import world_overrides
 
 COMMAND_PERIOD_NS = 100_000_000
 """Period at which a command is repeated [ns]."""
+
+LASTING_KINDS = ('command', 'votes')
+"""Kinds of events that hold until the next of their kind, and are repeated."""
 
 Takers = Mapping[str, Callable[[Any], Any]]
 """Kind of event to the function that takes its value."""
@@ -109,15 +112,12 @@ class Scenario:
     def timeline(self, tick_ns: int) -> tuple[Action, ...]:
         """All actions in order, each at the first tick that is not before its time."""
         actions = []
-        ends = [round(event.at * 1e9) for event in self.events if event.kind == 'command']
-        ends.append(round(self.duration_s * 1e9))
-        begun = 0
-        for event in self.events:
+        for place, event in enumerate(self.events):
             time_ns, times = round(event.at * 1e9), range(1)
-            if event.kind == 'command':
-                begun += 1
-                lasts = 0 if event.value is None else max(ends[begun] - time_ns, 1)
-                times = range(0, lasts, COMMAND_PERIOD_NS)
+            if event.kind in LASTING_KINDS:
+                following = [e.at for e in self.events[place + 1 :] if e.kind == event.kind]
+                end_ns = round((following or [self.duration_s])[0] * 1e9)
+                times = range(0, max(end_ns - time_ns, 1) if event.value else 0, COMMAND_PERIOD_NS)
             for later in times:
                 label = '' if later else event.label
                 at = _tick_after(time_ns + later, tick_ns)

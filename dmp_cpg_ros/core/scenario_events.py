@@ -17,6 +17,7 @@ from typing import Any
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.parameter_change import read_change
 from dmp_cpg_ros.core.push import read_push
+from dmp_cpg_ros.core.robot_state import LEGS
 
 Command = tuple[float, float, float]
 Read = Callable[[Any, str], tuple[Any, str]]
@@ -105,12 +106,26 @@ def _gait(value: Any, where: str) -> tuple[str, str]:
     return value, f'gait {value}'
 
 
+def _votes(value: Any, where: str) -> tuple[dict[str, float], str]:
+    """Read votes for a stop: weights by leg; none end what was voted before."""
+    known(value, LEGS, where)
+    try:
+        weights = {leg: float(weight) for leg, weight in value.items()}
+    except (TypeError, ValueError) as error:
+        raise DataError(f'{where}: votes {value} must hold numbers') from error
+    if not all(0.0 <= weight <= 100.0 for weight in weights.values()):
+        raise DataError(f'{where}: votes {value} must be finite, at least 0 and at most 100')
+    told = ', '.join(f'{leg} {weight:g}' for leg, weight in weights.items())
+    return weights, f'votes {told}' if told else 'no more votes'
+
+
 EVENT_KINDS: dict[str, Read] = {
     'command': _command,
     'inhibit': _inhibit,
     'gait': _gait,
     'push': read_push,
     'set': read_change,
+    'votes': _votes,
 }
 """Kind of event to the function that reads its value, ``(value, where) -> (value, label)``; it
 raises DataError.

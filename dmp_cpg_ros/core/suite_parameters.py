@@ -20,6 +20,7 @@ from dmp_cpg_ros.core.posture import PostureParameters
 from dmp_cpg_ros.core.reference import ReferenceParameters
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.sensor_parameters import SensorParameters
+from dmp_cpg_ros.core.voting_parameters import VoteSourceParameters, VotingSwitch
 from dmp_cpg_ros.core.world import World
 from dmp_cpg_ros.core.world_choice import WorldParameters
 
@@ -35,6 +36,7 @@ class SuiteParameters:
     posture: PostureParameters = field(default_factory=PostureParameters)
     estimation: EstimationParameters = field(default_factory=EstimationParameters)
     state_source: StateSourceParameters = field(default_factory=StateSourceParameters)
+    votes: VoteSourceParameters = field(default_factory=VoteSourceParameters)
 
 
 @dataclass(frozen=True)
@@ -170,7 +172,12 @@ NODE_PARAMETERS: dict[str, tuple[type[Parameters], ...]] = {
     'reference_filter': (*CERTIFIED, CommandParameters, CertificateParameters),
     'canonical_oscillators': (*CERTIFIED, CertificateParameters),
     'leg_transformation': (LegChoice, LegParameters, GaitParameters, RobotFileParameters),
-    'inhibition': (*CERTIFIED, CommandParameters, CertificateParameters),
+    'inhibition': (
+        *CERTIFIED,
+        CommandParameters,
+        CertificateParameters,
+        VoteSourceParameters,
+    ),
     'posture_control': (
         PostureParameters,
         EstimationParameters,
@@ -185,9 +192,22 @@ NODE_PARAMETERS: dict[str, tuple[type[Parameters], ...]] = {
         StateSourceParameters,
         TickParameters,
         RobotFileParameters,
+        VotingSwitch,
     ),
 }
 """Parameter sets of every kind of node that has a part of the core in it."""
+
+UNCERTIFIED_VOTES = ('vote_fade', 'vote_resume')
+"""Parameters of the counting of votes that no inequality depends on."""
+
+VOTE_SOURCES = (
+    'footing_weight',
+    'collision_weight',
+    'tilt_weight',
+    'tilt_limit',
+    'silence_weight',
+)
+"""Parameters that may change and that the inhibition alone has."""
 
 CHANGEABLE: dict[str, tuple[str, ...]] = {
     'reference_filter': (
@@ -205,6 +225,10 @@ CHANGEABLE: dict[str, tuple[str, ...]] = {
         'capture_speed',
         'auto_inhibit',
         'auto_delay',
+        'vote_rule',
+        'vote_majority',
+        'vote_limit',
+        *UNCERTIFIED_VOTES,
     ),
 }
 """Parameters of the certified nodes that may change while they run, by the node that owns them;

@@ -31,6 +31,8 @@ from dmp_cpg_ros.core.sensor_readings import readings_of
 from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation import TransformationState
+from dmp_cpg_ros.core.vote_counter import VoteCounter
+from dmp_cpg_ros.core.voting_sensors import vote_sensors
 
 Array = NDArray[np.float64]
 
@@ -87,6 +89,9 @@ class WalkingLoop:
         self.network = self._running.network
         self.gate, self.reference = CommandGate(p.reference), ReferenceSystem(p.reference)
         self.supervisor = GaitSupervisor(p.inhibition, self.network, p.leg.activity_rate)
+        self.votes = VoteCounter(
+            p.inhibition, p.votes, self.network, p.reference, description.mass
+        )
         self.posture = PostureController(description, self.network.gait, p.posture)
         self.legs = [LegPrimitive(leg, description, self.network.gait, p.leg) for leg in LEGS]
         self.stop = self.supervisor.initial_state()
@@ -151,7 +156,25 @@ class WalkingLoop:
             self._running.change(p.canonical)
             self.gate.parameters = self.reference.parameters = p.reference
             self.supervisor.parameters = p.inhibition
+            self.votes.follow(p.inhibition, self._running.network, p.reference, p.votes)
         return verdict.reason
+
+    def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
+        """Vote for a stop, as the topic ``votes`` does; counts from the next tick on.
+
+        Parameters
+        ----------
+        weights : mapping of str to float
+            Weight of each leg that is voted for.
+        voter : str
+            Who votes.
+
+        Raises
+        ------
+        DataError
+            If a name or a number cannot be used.
+        """
+        self.votes.box.accept(weights, voter)
 
     @property
     def takers(self) -> dict[str, Callable[[Any], Any]]:
@@ -162,6 +185,7 @@ class WalkingLoop:
             'command': lambda command: self.command(*command),
             'inhibit': self.request,
             'set': self.change,
+            'votes': lambda weights: self.vote(weights, 'scenario'),
         }
 
     def tick(self, state: RobotState) -> Tick:
@@ -185,7 +209,12 @@ class WalkingLoop:
         self.r = self.reference.step(self.r, r_ext, dt)
         self.x = self.network.step(self.x, self.r, inhibition, dt) if dt > 0.0 else self.x
         x_dot = self.network.rate(self.x, self.r, inhibition)
-        self.stop = self.supervisor.step(self.stop, state.time_ns, self.x, x_dot, self.r, command)
+        ballot = self.votes.count(
+            state.time_ns, vote_sensors(state), self.network, self.x, self.r, self.stop.word
+        )
+        self.stop = self.supervisor.step(
+            self.stop, state.time_ns, self.x, x_dot, self.r, command, ballot
+        )
         self.inhibition = self.supervisor.inhibition(self.stop)
         self.posture_state, feedback = self.posture.step(
             self.posture_state, self._body(state), self.x, x_dot, self.r, dt

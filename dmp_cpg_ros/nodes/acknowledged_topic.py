@@ -27,7 +27,7 @@ class AcknowledgedTopic:
 
     def __init__(self, node: Node, name: str) -> None:
         """Create the publisher, and a client for each reader."""
-        topic = interface(name)
+        topic, self._name = interface(name), name
         self._publisher = node.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._readers = len(topic.subscribers)
         self._clients = [
@@ -56,7 +56,13 @@ class AcknowledgedTopic:
             return
 
         def answered(future: Future) -> None:
-            taken = int(future.result().message)
+            taken = _count(future.result().message, self._name)
             self._ask(clients[1:] if taken >= self._sent else clients, then)
 
         clients[0].call_async(Trigger.Request()).add_done_callback(answered)
+
+
+def _count(answer: str, topic: str) -> int:
+    """Messages on one topic from an answer such as ``cmd_vel 12, votes 3``."""
+    counts = dict(entry.rsplit(' ', 1) for entry in answer.split(', '))
+    return int(counts[topic])

@@ -17,12 +17,18 @@ from dmp_cpg_ros.core.leg_primitive import LegParameters
 from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.stop_prediction import predict
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters, TickParameters
+from dmp_cpg_ros.core.suite_parameters import (
+    NODE_PARAMETERS,
+    VOTE_SOURCES,
+    CommandParameters,
+    TickParameters,
+)
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference, read_twist
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import GaitReader, certificate_words
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
+from dmp_cpg_ros.nodes.inhibition_votes import NodeVotes
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
@@ -35,6 +41,7 @@ class InhibitionNode(CertifiedNode):
 
     KIND = 'inhibition'
     PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    CHANGEABLE = (*CertifiedNode.CHANGEABLE, *VOTE_SOURCES)
 
     def configure(self) -> None:
         """Build the supervisor and its topics and service."""
@@ -57,9 +64,14 @@ class InhibitionNode(CertifiedNode):
         self._told: tuple[Any, ...] = ()
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = InhibitionStateWriter(), self.publisher('inhibition_state')
+        self._votes = NodeVotes(self, network)
         self._ticks = self.match(
-            ('canonical_state', 'reference'), 'canonical_state', lock_step=self._lock_step
+            ('canonical_state', 'reference', *self._votes.inputs),
+            'canonical_state',
+            optional=self._votes.inputs,
+            lock_step=self._lock_step,
         )
+        self._votes.listen(self._ticks)
         canonical = CanonicalStateReader()
         self.listen(
             'canonical_state',
@@ -98,20 +110,23 @@ class InhibitionNode(CertifiedNode):
         self._gate.parameters = self.parameters_of(ReferenceParameters)
         self._reference.parameters = self.parameters_of(ReferenceParameters)
         acting = self._supervisor.network.gait
-        self._supervisor.network = self.new_network().with_cadence_of(acting)
+        network = self.new_network()
+        self._supervisor.network = network.with_cadence_of(acting)
+        self._votes.follow(network)
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the state of the stop to the stamp of the canonical state."""
         self._x, x_dot, gait = values['canonical_state']
         self._r = values['reference']
         self._supervisor.network = self._supervisor.network.with_cadence_of(gait)
-        before, published = self._state, self._acting
+        before = self._state
+        ballot = self._votes.count(stamp_ns, values, self._supervisor.network, before.word)
         self._state = self._supervisor.step(
-            before, stamp_ns, self._x, x_dot, self._r, self._gate.at(stamp_ns)
+            before, stamp_ns, self._x, x_dot, self._r, self._gate.at(stamp_ns), ballot
         )
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
-            self._predict(published)
+            self._predict(self._acting)
         if self._lock_step or self._news() != self._told:
             self._publish()
 
@@ -126,7 +141,8 @@ class InhibitionNode(CertifiedNode):
     def _news(self) -> tuple[Any, ...]:
         """What is told when it changes."""
         now = self._state
-        return now.word, now.requested, now.armed, now.automatic, now.request_ns
+        votes = self._votes.news(now)
+        return now.word, now.requested, now.armed, now.automatic, now.request_ns, *votes
 
     def _answer_inhibit(self, request: Any, response: Any) -> Any:
         """Take a request; the answer says when it will be fulfilled. It acts from the next tick
@@ -147,7 +163,10 @@ class InhibitionNode(CertifiedNode):
             return response
         already = request.data == self._state.requested
         self._state = self._supervisor.request(self._state, request.data)
-        response.success = True
+        response.success = request.data == self._state.requested
+        if not response.success:
+            response.message = f'held by votes: {self._state.ballot.cause}; ask again without them'
+            return response
         if already:
             response.message = f'already {self._state.word}'
             return response
@@ -175,6 +194,8 @@ class InhibitionNode(CertifiedNode):
         self._bound = (
             certificate.time_to_rest if self._state.requested else certificate.time_to_walking
         )
+        if self._state.voted:
+            self._bound = self._votes.bound(self._supervisor, self._state)
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()
@@ -193,6 +214,7 @@ class InhibitionNode(CertifiedNode):
             bound_s=self._bound,
             measured_s=state.measured_s,
             grade=certificate_words(self.certificate),
+            **self._votes.told(state),
         )
         self._publisher.publish(self._writer.fill(state.time_ns, state.word, values))
 

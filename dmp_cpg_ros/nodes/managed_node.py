@@ -54,7 +54,7 @@ class ManagedNode(ParameterizedNode):
         self.health = NodeHealth(self.get_name())
         self._entities: list[Publisher | Subscription | Service] = []
         self._commands: list[Subscription] = []
-        self._commands_taken = 0
+        self._commands_taken: dict[str, int] = {}
         self._local_readers: list[Callable[[Any], None]] = []
         self._inputs: list[tuple[Interface, Subscription]] = []
         topic, ready = interface('/diagnostics'), interface('~/ready')
@@ -121,7 +121,7 @@ class ManagedNode(ParameterizedNode):
             self._local_readers.append(receive)
             return None
         subscription = self.create_subscription(
-            topic.type, topic.name, self._counted(receive) if command else receive,
+            topic.type, topic.name, self._counted(topic.name, receive) if command else receive,
             qos or topic.reader_qos, raw=raw)
         self._entities.append(subscription)
         self._inputs.append((topic, subscription))
@@ -235,15 +235,18 @@ class ManagedNode(ParameterizedNode):
                 f'{topic}: message dropped: {error} ({count} dropped so far)')
             self.report()
 
-    def _counted(self, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+    def _counted(self, topic: str, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        self._commands_taken.setdefault(topic, 0)
+
         def receive(message: Any) -> None:
             callback(message)
-            self._commands_taken += 1
+            self._commands_taken[topic] += 1
 
         return receive
 
     def _answer_commands_taken(self, request: Any, response: Any) -> Any:
-        response.success, response.message = True, str(self._commands_taken)
+        counts = (f'{topic} {count}' for topic, count in self._commands_taken.items())
+        response.success, response.message = True, ', '.join(counts)
         return response
 
     def _answer_ready(self, request: Any, response: Any) -> Any:

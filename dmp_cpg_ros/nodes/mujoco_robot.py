@@ -28,6 +28,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
     chosen_world,
 )
+from dmp_cpg_ros.core.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.world_choice import WorldParameters
 from dmp_cpg_ros.nodes.conversions import JointTargetsReader, read_push_force
 from dmp_cpg_ros.nodes.executors import run_node
@@ -54,6 +55,9 @@ MAKE_UP_NS = 100_000_000
 
 CLOCK_EVERY = 4
 """In real time ``/clock`` ticks with every so many states: the suite itself goes by stamps."""
+
+VOTING_TOPICS = ('imu', 'foot_contacts')
+"""What the inhibition reads when sensors can vote."""
 
 STATE_TOPICS = ('/clock', 'imu', 'odom', 'foot_contacts', 'joint_states')
 """What the robot publishes at every tick, the tick itself last."""
@@ -127,6 +131,8 @@ class MujocoRobotNode(ManagedNode):
             readers = (*readers, 'leg_transformation')
         if topic.name in BODY_TOPICS[self.parameters_of(StateSourceParameters).state_source]:
             readers = (*readers, 'posture_control')
+        if topic.name in VOTING_TOPICS and self.parameters_of(VotingSwitch).voting:
+            readers = (*readers, 'inhibition')
         return readers
 
     def diagnostic_values(self) -> Mapping[str, Any]:

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.core.errors import DmpCpgError
@@ -83,6 +84,10 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         gate = interface(f'{GATE_OWNER}/advance_until')
         self._commands = AcknowledgedTopic(self, 'cmd_vel')
         self._pushes = AcknowledgedTopic(self, 'push')
+        self._topics = [self._commands, self._pushes]
+        if any(action.kind == 'votes' for action in self._actions):
+            self._votes = AcknowledgedTopic(self, 'votes')
+            self._topics.append(self._votes)
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
         self._inhibit = self.create_client(SetBool, interface('inhibit').name)
         self._setter = ParameterSetter(self)
@@ -93,6 +98,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             'gait': self._set_gait,
             'push': self._push,
             'set': self._set,
+            'votes': self._vote,
         }
         for name, callback in (
             (f'{GATE_OWNER}/holding_at', self._on_holding),
@@ -110,8 +116,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._gate.get_subscription_count() > 0
             and all(client.service_is_ready() for client in services)
             and self._setter.connected()
-            and self._commands.connected()
-            and self._pushes.connected()
+            and all(topic.connected() for topic in self._topics)
         )
 
     def begin(self) -> None:
@@ -194,6 +199,12 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             vector.x, vector.y, vector.z = force.force
             self._pushes.send(message)
         self._finish(self._pushes)
+
+    def _vote(self, weights: dict[str, float]) -> None:
+        message = JointState(name=list(weights), effort=list(weights.values()))
+        message.header.frame_id = 'scenario'
+        self._votes.send(message)
+        self._finish(self._votes)
 
     def _finish(self, topic: AcknowledgedTopic) -> None:
         """Go on: in lock-step when all readers have what was sent."""

@@ -10,9 +10,9 @@ not. The nodes must be in their places when they vote, so that they enter their 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.errors import ParameterError
 
 Array = NDArray[np.float64]
+
+MOST_PERMUTED = 5
+"""Nodes of which all permutations are tried in search of symmetries."""
 
 _PRECISION = 1e-4
 
@@ -100,20 +103,23 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
     return _threshold(certified, _scale(system, omega, region_radius))
 
 
-def majority_clamp(system: CanonicalSystem, omega: float | Array, region_radius: float,
-                   majority: int) -> MajorityClamp:
+def majority_clamp(system: CanonicalSystem, omega: float, region_radius: float,
+                   majority: int, slowest_omega: float | None = None) -> MajorityClamp:
     """Clamp for which ``majority`` votes are enough, whoever casts them, and one less is not.
 
     Parameters
     ----------
     system : CanonicalSystem
         Coupled oscillators.
-    omega : float or ndarray (N,)
-        Angular frequencies [rad/s].
+    omega : float
+        Largest angular frequency [rad/s]: at it a majority is enough.
     region_radius : float
         r0 of the regions C_i.
     majority : int
         Number of votes, 1 to N.
+    slowest_omega : float, optional
+        Smallest angular frequency [rad/s]: down to it a smaller vote is not enough; ``omega``
+        without.
 
     Returns
     -------
@@ -129,14 +135,55 @@ def majority_clamp(system: CanonicalSystem, omega: float | Array, region_radius:
         raise ParameterError(f'majority = {majority} must lie between 1 and {size}, the number of '
                              'oscillators')
     lowest = max(certified_threshold(system, omega, voters, region_radius)
-                 for voters in _subsets(size, majority))
-    highest = min((rest_threshold(system, omega, voters, region_radius)
-                   for voters in _subsets(size, majority - 1)), default=np.inf)
+                 for voters in different_voters(system, majority))
+    slowest = omega if slowest_omega is None else slowest_omega
+    highest = min((rest_threshold(system, slowest, voters, region_radius)
+                   for voters in different_voters(system, majority - 1)), default=np.inf)
     return MajorityClamp(lowest, highest, majority)
 
 
-def _subsets(size: int, count: int) -> Iterable[tuple[int, ...]]:
-    return combinations(range(size), count) if count > 0 else ()
+def different_voters(system: CanonicalSystem, count: int) -> list[tuple[int, ...]]:
+    """Sets of voters that the network can tell apart, of every size one for each orbit.
+
+    Two sets behave alike when a symmetry of the network, seen in locked coordinates, takes one
+    into the other. Symmetries are looked for among all permutations of up to
+    ``MOST_PERMUTED`` nodes; beyond, every set is listed.
+
+    Parameters
+    ----------
+    system : CanonicalSystem
+        Coupled oscillators with the targets of all nodes in their places.
+    count : int
+        Number of voters.
+
+    Returns
+    -------
+    list of tuple of int
+        Empty for no voters.
+    """
+    size = system.graph.size
+    sets = list(combinations(range(size), count)) if count > 0 else []
+    if size > MOST_PERMUTED:
+        return sets
+    symmetries = _symmetries(system)
+    chosen: list[tuple[int, ...]] = []
+    seen: set[tuple[int, ...]] = set()
+    for voters in sets:
+        if voters not in seen:
+            chosen.append(voters)
+            seen.update(tuple(sorted(turn[i] for i in voters)) for turn in symmetries)
+    return chosen
+
+
+def _symmetries(system: CanonicalSystem) -> list[tuple[int, ...]]:
+    """Permutations of the nodes that leave couplings and oscillators as they are."""
+    size = system.graph.size
+    L = system.graph.block_laplacian().reshape(size, 2, size, 2)
+    kinds = np.stack([system.rho, system.radius], axis=1)
+    scale = 1e-9 * (1.0 + float(np.abs(L).max()))
+    return [turn for turn in permutations(range(size))
+            if np.array_equal(kinds[list(turn)], kinds)
+            and np.abs(L[list(turn)][:, :, list(turn)] - L).max() <= scale]
 
 
 def _votes(system: CanonicalSystem, voters: Sequence[int], alpha: float) -> Array:

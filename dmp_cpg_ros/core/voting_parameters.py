@@ -1,0 +1,134 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of stopping by vote: how votes are counted, and what makes the legs vote.
+
+A weight α_i is a fraction of ``inhibition_gain``: the vote of leg i acts on its own oscillator
+with the gain k_inh α_i.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+
+SUM, WINNER_TAKE_ALL = 'sum', 'winner_take_all'
+"""Rules by which votes become inhibition."""
+
+
+@dataclass(frozen=True)
+class VotingSwitch(Parameters):
+    """Whether there is voting; the robot must know who reads its sensors."""
+
+    voting: bool = parameter(
+        False, 'whether legs, sensors and other nodes can stop the gait by their votes'
+    )
+
+
+@dataclass(frozen=True)
+class VotingParameters(VotingSwitch):
+    """How votes are counted; the certificate depends on these."""
+
+    vote_rule: str = parameter(
+        SUM,
+        'whether every vote acts on its own oscillator, or the largest alone',
+        choices=(SUM, WINNER_TAKE_ALL),
+    )
+    vote_majority: int = parameter(
+        3,
+        'number of legs whose votes stop the gait, while one leg less does not',
+        minimum=1,
+        maximum=4,
+    )
+    vote_limit: float = parameter(
+        0.0,
+        'largest weight of one leg, as a fraction of inhibition_gain; 0: computed such that '
+        'vote_majority legs are needed',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    vote_fade: float = parameter(
+        1.0,
+        'time in which a vote that is not renewed fades to nothing',
+        unit='s',
+        minimum=0.01,
+        maximum=60.0,
+    )
+    vote_resume: bool = parameter(
+        False,
+        'whether a stop by votes ends by itself when the votes have faded; else the service '
+        'resumes',
+    )
+
+
+@dataclass(frozen=True)
+class VoteSourceParameters(Parameters):
+    """What makes the legs vote; a weight of zero silences a source."""
+
+    footing_weight: float = parameter(
+        1.0, 'weight of a leg that has lost its footing in stance', minimum=0.0, maximum=10.0
+    )
+    footing_load: float = parameter(
+        0.02,
+        'load below which a standing foot has no footing, as a fraction of the weight',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    footing_share: float = parameter(
+        0.5,
+        'share of a stance without footing after which the leg votes',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    collision_weight: float = parameter(
+        1.0, 'weight of a leg that hits something in its swing', minimum=0.0, maximum=10.0
+    )
+    collision_load: float = parameter(
+        0.3,
+        'load above which a swinging foot has hit something, as a fraction of the weight',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    collision_time: float = parameter(
+        0.03,
+        'time of such a load after which the leg votes',
+        unit='s',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    judged_share: float = parameter(
+        0.7,
+        'central share of stance and swing in which contact is judged',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    judged_after: float = parameter(
+        1.0,
+        'time of walking after which contact is judged',
+        unit='s',
+        minimum=0.0,
+        maximum=60.0,
+    )
+    tilt_weight: float = parameter(
+        1.0, 'weight with which every leg votes when the body tilts', minimum=0.0, maximum=10.0
+    )
+    tilt_limit: float = parameter(
+        0.6,
+        'angle between the vertical and the upright of the body beyond which all legs vote',
+        unit='rad',
+        minimum=0.01,
+        maximum=3.1,
+    )
+    silence_weight: float = parameter(
+        1.0,
+        'weight of a leg without contact sensor, and of every leg without imu',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    silence_time: float = parameter(
+        0.5,
+        'time without a good value after which a sensor counts as dead',
+        unit='s',
+        minimum=0.02,
+        maximum=60.0,
+    )

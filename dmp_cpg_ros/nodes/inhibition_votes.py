@@ -1,0 +1,131 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The votes of the inhibition node: what it listens to for them, and what it says about them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.core.ballot import Ballot
+from dmp_cpg_ros.core.certificate_range import operating_range
+from dmp_cpg_ros.core.certificate_votes import vote_bound
+from dmp_cpg_ros.core.gait_network import GaitNetwork
+from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.suite_parameters import TickParameters
+from dmp_cpg_ros.core.vote_counter import VoteCounter
+from dmp_cpg_ros.core.voting_parameters import VoteSourceParameters
+from dmp_cpg_ros.core.voting_sensors import VoteSensors
+from dmp_cpg_ros.nodes.gait_setup import description_of
+from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.message_values import header_ns
+from dmp_cpg_ros.nodes.robot_state_messages import FootContactsReader, read_imu
+from dmp_cpg_ros.nodes.tick_inputs import TickInputs
+from dmp_cpg_ros.nodes.vote_messages import read_votes
+
+CONTACTS, IMU = 'foot_contacts', 'imu'
+
+
+class NodeVotes:
+    """Votes in the inhibition node; without ``voting`` it listens to nothing.
+
+    Parameters
+    ----------
+    node : ManagedNode
+        The node.
+    network : GaitNetwork
+        Its oscillators.
+
+    Attributes
+    ----------
+    inputs : tuple of str
+        Sensors that belong to a tick; in real time it does not wait for them.
+    """
+
+    def __init__(self, node: ManagedNode, network: GaitNetwork) -> None:
+        """Compute the clamp."""
+        of = node.parameters_of
+        self.counter = VoteCounter(of(InhibitionParameters), of(VoteSourceParameters), network,
+                                   of(ReferenceParameters), description_of(node).mass)
+        self.inputs: tuple[str, ...] = (CONTACTS, IMU) if self.counter.voting else ()
+        self._node, self._contacts = node, FootContactsReader(strict=False)
+
+    def listen(self, ticks: TickInputs) -> None:
+        """Listen to the sensors of the ticks, and to votes from outside."""
+        if not self.inputs:
+            return
+        box, node = self.counter.box, self._node
+
+        def contacts(message: Any) -> None:
+            stamp_ns = header_ns(message)
+            ticks.add(CONTACTS, stamp_ns, (stamp_ns, self._contacts.read(message)))
+
+        def imu(message: Any) -> None:
+            stamp_ns = header_ns(message)
+            ticks.add(IMU, stamp_ns, (stamp_ns, *read_imu(message)))
+
+        node.listen(CONTACTS, contacts)
+        node.listen(IMU, imu)
+        node.listen('votes', lambda message: box.accept(*read_votes(message)), command=True)
+
+    def follow(self, network: GaitNetwork) -> None:
+        """Take over changed parameters."""
+        of = self._node.parameters_of
+        self.counter.follow(of(InhibitionParameters), network, of(ReferenceParameters),
+                            of(VoteSourceParameters))
+
+    def count(self, stamp_ns: int, values: dict[str, Any], network: GaitNetwork,
+              word: str) -> Ballot:
+        """Count the votes of a tick.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Stamp of the tick [ns].
+        values : dict
+            Inputs of the tick.
+        network : GaitNetwork
+            The oscillators that act.
+        word : str
+            State word after the tick before.
+
+        Returns
+        -------
+        Ballot
+        """
+        nothing = np.full(3, np.nan)
+        contact_ns, load = values.get(CONTACTS) or (stamp_ns, np.full(len(LEGS), np.nan))
+        imu_ns, rate, force = values.get(IMU) or (stamp_ns, nothing, nothing)
+        sensors = VoteSensors(contact_ns, imu_ns, load, rate, force)
+        x, r = values['canonical_state'][0], values['reference']
+        return self.counter.count(stamp_ns, sensors, network, x, r, word)
+
+    def news(self, state: SupervisorState) -> tuple[Any, ...]:
+        """What is told when it changes."""
+        return state.voted, state.ballot.causes, state.ballot.weights.tobytes()
+
+    def bound(self, supervisor: GaitSupervisor, state: SupervisorState) -> float:
+        """Bound on the time from now to rest under the votes [s]."""
+        of, p = self._node.parameters_of, supervisor.parameters
+        gains = supervisor.inhibition(replace(state, armed=True)).gains
+        return vote_bound(
+            supervisor.network, gains, p.region_radius,
+            operating_range(supervisor.network, p, of(ReferenceParameters)),
+            of(ReferenceParameters).alpha_r, supervisor.activity_rate,
+            of(TickParameters).tick_ns * 1e-9)
+
+    def told(self, state: SupervisorState) -> dict[str, Any]:
+        """Values of ``inhibition_state`` about the votes."""
+        if not self.inputs:
+            return {}
+        ballot = state.ballot
+        values: dict[str, Any] = {
+            f'vote_{leg}': weight
+            for leg, weight in zip(LEGS, ballot.weights.tolist(), strict=True)
+        }
+        return {**values, 'voted': state.voted, 'asked': state.asked, 'cause': ballot.cause}

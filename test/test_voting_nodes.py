@@ -1,0 +1,128 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Votes through real nodes: weak couplings, one vote goes unheard, three stop; and bad votes."""
+
+from __future__ import annotations
+
+import math
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+import ros_processes
+from ros_processes import Processes
+from sensor_msgs.msg import JointState
+
+from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.commands.walk import load_scenario, main
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.scenario import play
+from dmp_cpg_ros.core.vote_box import VoteBox
+from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
+from dmp_cpg_ros.nodes.vote_messages import read_votes
+from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
+from dmp_cpg_ros.suite import load_suite
+
+processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
+
+SCENARIO = """\
+name: votes
+duration: 6.6
+parameters:
+  {voting: true, coupling_gain: 5.0, inhibited_legs: [fl, fr, rl], physics: perfect_tracking}
+events:
+  - {at: 0.1, inhibit: false}
+  - {at: 0.1, command: {v_x: 0.3}}
+  - {at: 1.0, votes: {rr: 1.0}}
+  - {at: 2.6, votes: {fr: 1.0, rl: 1.0, rr: 1.0}}
+  - {at: 4.8, votes: {}}
+  - {at: 6.0, inhibit: false}
+"""
+"""Synchronised legs of which none alone can stop the others; three are certified to."""
+
+RUN_S = 240.0
+
+
+def plain_run(scenario_file: Path) -> list[Tick]:
+    """Run the scenario on the plain loop."""
+    scenario = load_scenario(scenario_file)
+    suite = load_suite(overrides=scenario.parameters)
+    robot = PerfectTrackingRobot(load_description(suite.robot_file), suite.tick_ns)
+    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
+    state, ticks = robot.reset(), []
+
+    def step() -> None:
+        nonlocal state
+        ticks.append(loop.tick(state))
+        state = robot.step(ticks[-1].targets)
+
+    play(scenario, suite.tick_ns, step, loop.takers)
+    return ticks
+
+
+def test_one_vote_does_not_stop_the_nodes_and_three_do(
+        processes: Processes, tmp_path: Path) -> None:
+    scenario, out = tmp_path / 'votes.yaml', tmp_path / 'run'
+    scenario.write_text(SCENARIO, encoding='utf-8')
+    process = processes.python('-m', 'dmp_cpg_ros.commands.walk', str(scenario), '--lock-step',
+                               '--no-report', '--out', str(out))
+    assert process.wait(RUN_S) == 0, process
+    recording, ticks = load_recording(out / 'bag'), plain_run(scenario)
+    np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
+    np.testing.assert_array_equal(
+        recording.targets.position, [tick.targets.position for tick in ticks])
+    told = recording.inhibition
+    one = [event for event in told if 1.1 < event.time < 2.6]
+    assert one and {event.message for event in one} <= {'walking', 'free'}
+    assert {event.values['cause'] for event in one} == {'rr scenario'}
+    assert {event.values['requested'] for event in one} == {'false'}
+    words = [word for word, _ in groupby(
+        event.message for event in told if 2.6 <= event.time < 6.0)]
+    assert words[-3:] == ['waiting', 'captured', 'at_rest']
+    rest = next(event for event in told if event.message == 'at_rest' and event.time > 2.6)
+    assert rest.values['cause'] == 'fr scenario, rl scenario, rr scenario'
+    assert (rest.values['voted'], rest.values['asked']) == ('true', 'false')
+    assert float(rest.values['vote_fl']) == 0.0 < float(rest.values['vote_rr'])
+    measured, predicted, bound = (
+        float(rest.values[f'{name}_s']) for name in ('measured', 'predicted', 'bound'))
+    assert measured == pytest.approx(predicted, abs=1e-6) and measured <= bound
+    assert told[-1].message in ('releasing', 'walking', 'free')
+
+
+def test_a_scenario_that_votes_needs_voting(tmp_path: Path,
+                                            capsys: pytest.CaptureFixture[str]) -> None:
+    scenario = tmp_path / 'votes.yaml'
+    scenario.write_text(SCENARIO.replace('voting: true, ', ''), encoding='utf-8')
+    assert main([str(scenario), '--out', str(tmp_path / 'run')]) == 2
+    assert 'needs voting:=true' in capsys.readouterr().err
+
+
+# Messages --------------------------------------------------------------------------------------
+
+
+def test_votes_are_read_by_name_from_effort_or_position() -> None:
+    message = JointState(name=['rr', 'fl'], effort=[0.5, 0.25])
+    message.header.frame_id = 'cliff detector'
+    assert read_votes(message) == ({'rr': 0.5, 'fl': 0.25}, 'cliff detector')
+    assert read_votes(JointState(name=['rr'], position=[0.5])) == ({'rr': 0.5}, '')
+
+
+@pytest.mark.parametrize(('message', 'text'), [
+    (JointState(name=['fl', 'fr'], effort=[1.0]), 'one weight'),
+    (JointState(name=['fl']), 'one weight'),
+    (JointState(name=['fl', 'fl'], effort=[1.0, 1.0]), 'none twice'),
+    (JointState(), 'one or more of the legs'),
+    (JointState(name=['fl_foot'], effort=[1.0]), 'one or more of the legs'),
+    (JointState(name=['fl'], effort=[math.nan]), 'finite'),
+    (JointState(name=['fl'], effort=[-1.0]), 'at least 0'),
+])
+def test_bad_votes_are_refused_and_leave_nothing(message: JointState, text: str) -> None:
+    box = VoteBox()
+    with pytest.raises(DataError, match=text):
+        box.accept(*read_votes(message))
+    assert box.take() == ()
