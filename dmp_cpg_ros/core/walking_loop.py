@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState, estimated_state
+from dmp_cpg_ros.core.body_estimate import estimated_state
+from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
 from dmp_cpg_ros.core.estimation_parameters import ESTIMATE
 from dmp_cpg_ros.core.gait import Gait
