@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from math import nan
 from typing import Any
 
 import numpy as np
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait_network import CanonicalParameters
+from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
+from dmp_cpg_ros.core.phase_lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.running_network import RunningNetwork
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CertificateParameters
@@ -46,6 +48,8 @@ class CanonicalOscillators(CertifiedNode):
         network = self._running_network.network
         self._x, self._last_ns = initial_canonical_state(network, inhibition), -1
         self._inhibition = initial_inhibition(inhibition)
+        self._watch = PhaseLockWatch()
+        self._lock: PhaseLock | None = None
         self._writer, self._publisher = CanonicalStateWriter(), self.publisher('canonical_state')
         self._ticks = self.match(
             ('reference',),
@@ -89,6 +93,19 @@ class CanonicalOscillators(CertifiedNode):
         x_dot = network.rate(self._x, r, self._inhibition)
         word = self._running_network.word
         self._publisher.publish(self._writer.fill(stamp_ns, self._x, x_dot, word))
+        self._watch_phases(network, r, dt)
+
+    def _watch_phases(self, network: GaitNetwork, r: Any, dt: float) -> None:
+        """Compare the phases with their bound; an alarm is published at once."""
+        acting = self._inhibition.gains.any() and self._inhibition.acting_gains(
+            self._x, network.system.target
+        ).any()
+        former = LOCKED if self._lock is None else self._lock.level
+        self._lock = self._watch.step(self._lock, network, r, self._x, not acting, dt)
+        if self._lock.level > former:
+            self.warn('phase_lock', self._lock.alarm, error=self._lock.level == LOST)
+        elif self._lock.level == LOCKED != former:
+            self.clear('phase_lock')
 
     def _without_certificate(self, reason: str) -> None:
         """Refuse to walk without a certificate, or say loudly that nothing is guaranteed."""
@@ -101,11 +118,10 @@ class CanonicalOscillators(CertifiedNode):
         self.certificate_changed()
 
     def diagnostic_values(self) -> Mapping[str, Any]:
-        """Phase error of the legs [rad]."""
+        """Phase error of the legs beside its bound [rad]."""
         return {
-            'phase_error_rad': float(
-                np.abs(self._running_network.network.phase_errors(self._x)).max()
-            ),
+            'phase_error_rad': nan if self._lock is None else self._lock.error,
+            'phase_error_bound_rad': nan if self._lock is None else self._lock.bound,
             'gait': self._running_network.word,
             'certificate': certificate_words(self.certificate),
         }

@@ -199,8 +199,11 @@ class ManagedNode(ParameterizedNode):
     def warn(self, key: str, message: str, *, error: bool = False) -> None:
         """Raise a warning that stays until :meth:`clear`; logged and reported when it is new."""
         if self.health.set_problem(key, message, error=error):
-            log = self.get_logger().error if error else self.get_logger().warning
-            log(message)
+            # rclpy wants one severity for every line that logs.
+            if error:
+                self.get_logger().error(message)
+            else:
+                self.get_logger().warning(message)
             self.report()
 
     def clear(self, key: str) -> None:

@@ -1,0 +1,162 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Are the running oscillators as close to their places as theory says they must be.
+
+In the places' own frames, z_i = R(−φ_i) x_i, the disagreement ε = (Σ ξ_i |z_i − z̄|²)^½ of a free
+network obeys ε̇ ≤ −λε + δr (Theorem 4 with the disturbance of Section 3.4): λ is the margin of the
+synchronisation condition, δ what the legs' frequencies may differ by and the rate at which a
+changing gait moves the places. From a start, or from release, ε stays under the solution of that
+inequality, and phases differ by what ε and the radius |z̄| allow. Beyond it something acts on the
+oscillators that is not in the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import asin, exp, inf, pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.certificate_network import EXPECTED_MISMATCH
+from dmp_cpg_ros.core.contraction.hopf_bounds import growth
+from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
+from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.phase import phase
+
+Array = NDArray[np.float64]
+
+LOCKED, DISTURBED, LOST = 0, 1, 2
+"""Within the bound; beyond it and coming back as it must; beyond it and not coming back."""
+
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class PhaseLock:
+    """What the watch found at one tick.
+
+    Attributes
+    ----------
+    error : float
+        Largest difference of two legs' phases from their places [rad].
+    bound : float
+        What it must not exceed [rad]; π where nothing is certified or inhibition acts.
+    level : int
+        ``LOCKED``, ``DISTURBED`` or ``LOST``.
+    envelope : float
+        Bound on ε from here on.
+    places : ndarray (4,)
+        Phases of the places [rad].
+    """
+
+    error: float
+    bound: float
+    level: int
+    envelope: float
+    places: Array
+
+    @property
+    def alarm(self) -> str:
+        """What there is to say, starting with ``alarm``; empty while all is well."""
+        if self.level == LOCKED:
+            return ''
+        back = ('; it comes back at the certified rate' if self.level == DISTURBED else
+                ' and does not come back at the certified rate')
+        return (f'alarm: phase-lock error {self.error:.3g} rad is beyond its bound '
+                f'{self.bound:.3g} rad{back}')
+
+
+class PhaseLockWatch:
+    """Watches a network from tick to tick; the findings stay with the caller."""
+
+    def __init__(self) -> None:
+        """Start with no network."""
+        self._parameters: CanonicalParameters | None = None
+        self._found: Synchronisation | None = None
+
+    def step(self, before: PhaseLock | None, network: GaitNetwork, r: Array, x: Array, free: bool,
+             dt: float) -> PhaseLock:
+        """Look at the state after a tick.
+
+        Parameters
+        ----------
+        before : PhaseLock or None
+            Finding of the tick before; None at a start.
+        network : GaitNetwork
+            The network that acted.
+        r : ndarray (3,)
+            Reference.
+        x : ndarray (4, 2)
+            Canonical states.
+        free : bool
+            Whether no inhibition acted.
+        dt : float
+            Time since the tick before [s].
+
+        Returns
+        -------
+        PhaseLock
+        """
+        found, places = self._synchronisation(network), network.gait.phases
+        z = np.hypot(x[:, 0], x[:, 1]) * np.exp(1j * (phase(x) - places))
+        weights = found.weights if found.synchronises else None
+        if weights is None:
+            return PhaseLock(_spread(z), pi, LOCKED, inf, places)
+        mean = complex(weights @ z)
+        epsilon = sqrt(float(weights @ np.abs(z - mean) ** 2))
+        error = _spread(z)
+        if before is None or not free:
+            return PhaseLock(error, pi, LOCKED, epsilon, places)
+        size = max(network.parameters.radius, float(np.abs(z).max()))
+        steady = EXPECTED_MISMATCH * network.omega(r) * size / found.rate
+        moved = np.abs(_centred(places - before.places)).max() * size
+        fade = exp(-found.rate * dt)
+        envelope = max(steady, before.envelope * fade + (1.0 - fade) * steady) + moved
+        if before.envelope == inf:
+            envelope = max(steady, epsilon)
+        bound = _phase_bound(max(envelope, steady), weights, abs(mean))
+        return _judged(before, PhaseLock(error, bound, LOCKED, envelope, places), epsilon,
+                       _phase_bound(steady, weights, abs(mean)))
+
+    def _synchronisation(self, network: GaitNetwork) -> Synchronisation:
+        """Theorem 4 for the network's parameters; places make no difference to it."""
+        p = network.parameters
+        if self._found is None or p != self._parameters:
+            self._parameters = p
+            self._found = synchronisation(network.system.graph,
+                                          float(growth(p.rho, p.radius)))
+        return self._found
+
+
+def _judged(before: PhaseLock, now: PhaseLock, epsilon: float, steady: float) -> PhaseLock:
+    """Decide the level: an alarm stays until the error is within the steady bound again."""
+    beyond = now.error > now.bound + _ROUNDING
+    if before.level == LOCKED:
+        if not beyond:
+            return now
+        return PhaseLock(now.error, now.bound, DISTURBED, epsilon, now.places)
+    if now.error <= steady:
+        return now
+    lost = before.level == LOST or beyond
+    return PhaseLock(now.error, steady, LOST if lost else DISTURBED, now.envelope, now.places)
+
+
+def _spread(z: NDArray[np.complex128]) -> float:
+    """Largest difference of two phases, on the circle."""
+    angle = np.angle(z[:, None] * np.conj(z[None, :]))
+    return float(np.abs(angle).max())
+
+
+def _centred(change: Array) -> Array:
+    """Changes of places without what they have in common, on the circle."""
+    turned = np.exp(1j * change)
+    return np.angle(turned * np.conj(turned.mean()))
+
+
+def _phase_bound(epsilon: float, weights: Array, mean_radius: float) -> float:
+    """Largest difference of two phases at a disagreement ε around a mean."""
+    smallest, second = np.sort(weights)[:2].tolist()
+    inner = mean_radius - epsilon * sqrt((1.0 - smallest) / smallest)
+    half = epsilon * sqrt(1.0 / smallest + 1.0 / second) / (2.0 * inner) if inner > 0.0 else 1.0
+    return 2.0 * asin(half) if half < 1.0 else pi
