@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
+from dmp_cpg_ros.core.body_mode import ModeParameters
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.estimation_parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.gait import Gait
@@ -143,6 +144,7 @@ def load_suite(
         sets['posture_control'][EstimationParameters],
         sets['posture_control'][StateSourceParameters],
         sets['inhibition'][VoteSourceParameters],
+        sets['posture_control'][ModeParameters],
     )
     gait = canonical[GaitParameters]
     return Suite(

@@ -57,6 +57,7 @@ class Collector:
         self._clock: tuple[list[int], list[int]] = ([], [])  # bag time, robot's clock [ns]
         self._ticks: tuple[list[int], list[int]] = ([], [])
         self._inhibition: list[StatusEvent] = []
+        self._modes: list[StatusEvent] = []
         self._statuses: dict[str, list[StatusEvent]] = {}
         self._last_target: dict[int, int] = {}  # stamp, bag time of the last leg [ns]
         self._handlers: dict[tuple[str, str], Handler] = {
@@ -73,6 +74,7 @@ class Collector:
             ('imu', 'sensor_msgs/msg/Imu'): self._take_imu,
             ('clock', 'rosgraph_msgs/msg/Clock'): self._take_clock,
             ('inhibition_state', 'diagnostic_msgs/msg/DiagnosticArray'): self._take_inhibition,
+            ('body_mode', 'diagnostic_msgs/msg/DiagnosticArray'): self._take_mode,
             ('diagnostics', 'diagnostic_msgs/msg/DiagnosticArray'): self._take_diagnostics,
         }
 
@@ -107,6 +109,7 @@ class Collector:
             feet=self._feet(),
             posture=self._posture(),
             inhibition=tuple(self._inhibition),
+            modes=tuple(self._modes),
             statuses={name: tuple(history) for name, history in self._statuses.items()},
             arrivals=self._arrivals(),
             counts=counts,
@@ -209,6 +212,11 @@ class Collector:
             last = self._inhibition[-1] if self._inhibition else None
             if last is None or (last.message, last.values) != (event.message, event.values):
                 self._inhibition.append(event)
+
+    def _take_mode(self, _: int, message: Any) -> None:
+        for event in events(message).values():
+            if not self._modes or self._modes[-1].message != event.message:
+                self._modes.append(event)
 
     def _take_diagnostics(self, _: int, message: Any) -> None:
         for name, event in events(message).items():

@@ -230,6 +230,8 @@ class Recording:
         Balance feedback.
     inhibition : tuple of StatusEvent
         ``inhibition_state`` where it changed.
+    modes : tuple of StatusEvent
+        ``body_mode`` where it changed.
     statuses : mapping of str to tuple of StatusEvent
         What every name on ``/diagnostics`` said, in order.
     arrivals : ArrivalSeries
@@ -248,6 +250,7 @@ class Recording:
     feet: FootForceSeries = field(default_factory=FootForceSeries)
     posture: PostureSeries = field(default_factory=PostureSeries)
     inhibition: tuple[StatusEvent, ...] = ()
+    modes: tuple[StatusEvent, ...] = ()
     statuses: Mapping[str, tuple[StatusEvent, ...]] = field(default_factory=dict)
     arrivals: ArrivalSeries = field(default_factory=ArrivalSeries)
     counts: Mapping[str, int] = field(default_factory=dict)

@@ -54,7 +54,8 @@ def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> Re
         targets=JointSeries(time, _column(targets, 'position'), _column(targets, 'velocity'),
                             _column(targets, 'effort')),
         canonical=CanonicalSeries(time, _column(ticks, 'x'), _column(ticks, 'x_dot')),
-        reference=VelocitySeries(time, _column(ticks, 'r')), inhibition=tuple(_events(ticks)))
+        reference=VelocitySeries(time, _column(ticks, 'r')), inhibition=tuple(_events(ticks)),
+        modes=tuple(_modes(ticks)))
 
 
 def _column(rows: Sequence[object], name: str) -> NDArray[np.float64]:
@@ -67,3 +68,11 @@ def _events(ticks: Sequence[Tick]) -> Iterable[StatusEvent]:
         if tick.supervisor.word != word:
             word = tick.supervisor.word
             yield StatusEvent(tick.time_ns * 1e-9, 0, word, {})
+
+
+def _modes(ticks: Sequence[Tick]) -> Iterable[StatusEvent]:
+    mode = ''
+    for tick in ticks:
+        if tick.mode.mode != mode:
+            mode = tick.mode.mode
+            yield StatusEvent(tick.time_ns * 1e-9, 0, mode, {'reason': tick.mode.reason})

@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 STATE_WORDS = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing')
 """What ``inhibition_state`` can say."""
 
+FALLEN_MODES = ('damped', 'recovering')
+"""Modes of the body after which only the service starts the gait again."""
+
 REST_ACTIVITY = 0.02
 """Swing activity below which a leg is at rest: its foot is below 2 % of its clearance."""
 
@@ -164,6 +167,7 @@ class GaitSupervisor:
         r: Array,
         command: tuple[float, float, float],
         ballot: Ballot | None = None,
+        body_mode: str = 'standing',
     ) -> SupervisorState:
         """Advance by one tick.
 
@@ -181,6 +185,8 @@ class GaitSupervisor:
             External command (v_x, v_y, γ) that acts at this tick.
         ballot : Ballot, optional
             Votes of this tick; those of the tick before without.
+        body_mode : str
+            What the body does; in every mode but ``standing`` the gait is stopped.
 
         Returns
         -------
@@ -191,7 +197,11 @@ class GaitSupervisor:
         rates = phase_rate(x, x_dot)
         activity = activity_step(state.activity, rates, omega, self.activity_rate, dt)
         state = replace(state, time_ns=time_ns, activity=activity)
-        state = self._voted(self._automatic(state, command), ballot or state.ballot)
+        if body_mode == 'standing':
+            state = self._automatic(state, command)
+        else:
+            state = self._barred(state, body_mode)
+        state = self._voted(state, ballot or state.ballot)
         speed = self.network.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
         if state.requested:
             return self._stopping(state, x, rates, speed)
@@ -244,6 +254,13 @@ class GaitSupervisor:
             measured_s=float('nan'),
             idle_ns=-1,
         )
+
+    def _barred(self, state: SupervisorState, body_mode: str) -> SupervisorState:
+        """Stop because the robot does not stand; after a fall no command starts it again."""
+        automatic = body_mode not in FALLEN_MODES
+        if not state.asked:
+            return self.request(state, True, automatic)
+        return replace(state, automatic=state.automatic and automatic, idle_ns=-1)
 
     def _stopping(
         self, state: SupervisorState, x: Array, rates: Array, speed: float

@@ -12,7 +12,7 @@ kept without a steady error.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import atan2, isnan
 
 import numpy as np
@@ -117,11 +117,17 @@ class PostureFeedback:
         Foot placement shifts [m].
     correction : ndarray (3,)
         What the legs add to the reference velocity of the stance feet: v_x, v_y [m/s], γ [rad/s].
+    mode : str
+        What the body does, see :mod:`~dmp_cpg_ros.core.body_command`.
+    measured : ndarray (12,)
+        Measured joint angles where the mode's primitives begin from them [rad]; else zeros.
     """
 
     torque: Array
     shift_in_base: Array
     correction: Array
+    mode: str = 'standing'
+    measured: Array = field(default_factory=lambda: np.zeros(12))
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,9 @@ class RobotDescription:
         Height of ``base_link`` over the ground when standing [m].
     kp, kd : ndarray (3,)
         Gains of the low-level joint drive, per joint of a leg [N m/rad], [N m s/rad].
+    belly_depth : float
+        How far the base's shape reaches below ``base_link`` [m]: the height of ``base_link`` when
+        the robot lies on its belly.
     """
 
     name: str
@@ -87,3 +90,4 @@ class RobotDescription:
     stance_height: float
     kp: NDArray[np.float64]
     kd: NDArray[np.float64]
+    belly_depth: float = 0.0

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dmp_cpg_ros.core.body_requests import REQUESTS
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.parameter_change import read_change
 from dmp_cpg_ros.core.push import read_push
@@ -119,6 +120,17 @@ def _votes(value: Any, where: str) -> tuple[dict[str, float], str]:
     return weights, f'votes {told}' if told else 'no more votes'
 
 
+def _request(what: str) -> Read:
+    """Reader of a request without a value: ``stand_up: true``."""
+
+    def read(value: Any, where: str) -> tuple[bool, str]:
+        if value is not True:
+            raise DataError(f'{where}: {what} must be true, not {value!r}')
+        return True, what.replace('_', ' ')
+
+    return read
+
+
 EVENT_KINDS: dict[str, Read] = {
     'command': _command,
     'inhibit': _inhibit,
@@ -126,6 +138,7 @@ EVENT_KINDS: dict[str, Read] = {
     'push': read_push,
     'set': read_change,
     'votes': _votes,
+    **{what: _request(what) for what in REQUESTS},
 }
 """Kind of event to the function that reads its value, ``(value, where) -> (value, label)``; it
 raises DataError.

@@ -62,7 +62,7 @@ class FreezingLoop(WalkingLoop):
         targets = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
         return Tick(state.time_ns, self.r, self.x, x_dot, self.stop, feedback, JointTargets(
             *(np.concatenate([getattr(target, name) for target in targets])
-              for name in ('position', 'velocity', 'effort'))))
+              for name in ('position', 'velocity', 'effort'))), self.mode)
 
     def _swinging(self) -> NDArray[np.bool_]:
         """Which legs are in the swing of their cycle, (4,)."""

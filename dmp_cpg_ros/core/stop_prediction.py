@@ -31,6 +31,7 @@ def predict(
     command: tuple[float, float, float],
     dt: float,
     horizon: float = 10.0,
+    body_mode: str = 'standing',
 ) -> float:
     """Time from now to rest (of a requested stop) or to phase lock (of a start).
 
@@ -52,6 +53,8 @@ def predict(
         Tick [s].
     horizon : float
         Longest time that is looked ahead [s].
+    body_mode : str
+        What the body does, assumed to stay; in every mode but ``standing`` no command starts it.
 
     Returns
     -------
@@ -65,7 +68,8 @@ def predict(
         r = reference.step(r, r_ext, dt)
         x = network.step(x, r, inhibition, dt)
         state = supervisor.step(
-            state, start_ns + k * tick_ns, x, network.rate(x, r, inhibition), r, command
+            state, start_ns + k * tick_ns, x, network.rate(x, r, inhibition), r, command,
+            body_mode=body_mode,
         )
         inhibition = supervisor.inhibition(state)
         if state.word in ('at_rest', 'walking', 'free'):

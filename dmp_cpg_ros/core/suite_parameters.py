@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from dmp_cpg_ros.core.body_mode import ModeParameters
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation_parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.gait_network import CanonicalParameters
@@ -37,6 +38,7 @@ class SuiteParameters:
     estimation: EstimationParameters = field(default_factory=EstimationParameters)
     state_source: StateSourceParameters = field(default_factory=StateSourceParameters)
     votes: VoteSourceParameters = field(default_factory=VoteSourceParameters)
+    mode: ModeParameters = field(default_factory=ModeParameters)
 
 
 @dataclass(frozen=True)
@@ -119,6 +121,11 @@ class RobotParameters(Parameters):
         'lock-step, to begin in real time',
     )
     seed: int = parameter(0, 'seed of the initial spread', minimum=0)
+    start_pose: str = parameter(
+        'standing',
+        'how the robot is found: standing, lying on its belly, or fallen somehow by the seed',
+        choices=('standing', 'lying', 'fallen'),
+    )
     initial_spread: float = parameter(
         0.0,
         'joints start at the home pose plus a uniform draw from plus or minus this',
@@ -180,6 +187,7 @@ NODE_PARAMETERS: dict[str, tuple[type[Parameters], ...]] = {
     ),
     'posture_control': (
         PostureParameters,
+        ModeParameters,
         EstimationParameters,
         StateSourceParameters,
         GaitParameters,

@@ -8,15 +8,19 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.body_estimate import estimated_state
-from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState
+from dmp_cpg_ros.core.body_command import BodyCommand
+from dmp_cpg_ros.core.body_control import BodyControl
+from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState, estimated_state
+from dmp_cpg_ros.core.body_mode import ModeState
+from dmp_cpg_ros.core.body_requests import REQUESTS
 from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
+from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation_parameters import ESTIMATE
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.gait_network import GaitNetwork
@@ -24,6 +28,7 @@ from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition import InhibitionParameters, initial_inhibition
 from dmp_cpg_ros.core.leg_primitive import LegPrimitive, LegState, body_scale
 from dmp_cpg_ros.core.posture import PostureController, PostureFeedback
+from dmp_cpg_ros.core.posture_motion import LegMotion, MotionState
 from dmp_cpg_ros.core.reference import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS, JointTargets, RobotState
@@ -56,6 +61,8 @@ class Tick:
         Torques and placement shifts.
     targets : JointTargets
         Of all twelve joints.
+    mode : ModeState
+        What the body does.
     """
 
     time_ns: int
@@ -65,6 +72,7 @@ class Tick:
     supervisor: SupervisorState
     feedback: PostureFeedback
     targets: JointTargets
+    mode: ModeState
 
 
 class WalkingLoop:
@@ -94,7 +102,12 @@ class WalkingLoop:
             p.inhibition, p.votes, self.network, p.reference, description.mass
         )
         self.posture = PostureController(description, self.network.gait, p.posture)
+        self.body = BodyControl(description, p.mode)
         self.legs = [LegPrimitive(leg, description, self.network.gait, p.leg) for leg in LEGS]
+        self.motions = [
+            LegMotion(slice(3 * i, 3 * i + 3), self.body.modes.movements, leg.transformation)
+            for i, leg in enumerate(self.legs)
+        ]
         self.stop = self.supervisor.initial_state()
         self.inhibition = self.supervisor.inhibition(self.stop)
         self.r = np.zeros(3)
@@ -106,7 +119,9 @@ class WalkingLoop:
             else None
         )
         self.estimator_state: EstimatorState | None = None
+        self.mode, self.barring = self.body.initial_state(), 'standing'
         self.leg_states: list[LegState] = [leg.initial_state() for leg in self.legs]
+        self.motion_states: list[MotionState | None] = [None] * len(LEGS)
         self._time_ns: int | None = None
         self._dt = 0.004
 
@@ -117,7 +132,12 @@ class WalkingLoop:
         self.gate.accept(v_x, v_y, gamma)
 
     def request(self, stop: bool) -> float:
-        """Request a stop or a start, as the service does; returns the predicted time to it [s]."""
+        """Request a stop or a start, as the service does; returns the predicted time to it [s].
+
+        Raises DataError for a start while the robot does not stand.
+        """
+        if not stop and self.barring != 'standing':
+            raise DataError(f'the gait cannot start: the robot is {self.barring}')
         self.stop = self.supervisor.request(self.stop, stop)
         command = self.gate.at(self.stop.time_ns)
         return predict(
@@ -177,6 +197,24 @@ class WalkingLoop:
         """
         self.votes.box.accept(weights, voter)
 
+    def request_mode(self, what: str) -> str:
+        """Ask for ``stand_up``, ``lie_down`` or ``recover``, as the services do.
+
+        Returns
+        -------
+        str
+            What will happen.
+
+        Raises
+        ------
+        DataError
+            If it is refused.
+        """
+        self.mode, answer = self.body.request(self.mode, what)
+        if not answer.accepted:
+            raise DataError(f'{what}: {answer.text}')
+        return answer.text
+
     @property
     def takers(self) -> dict[str, Callable[[Any], Any]]:
         """What takes the events of a scenario, by kind, for
@@ -187,7 +225,11 @@ class WalkingLoop:
             'inhibit': self.request,
             'set': self.change,
             'votes': lambda weights: self.vote(weights, 'scenario'),
+            **{what: self._asking(what) for what in REQUESTS},
         }
+
+    def _asking(self, what: str) -> Callable[[Any], Any]:
+        return lambda _: self.request_mode(what)
 
     def tick(self, state: RobotState) -> Tick:
         """Run all parts on the robot's state of one tick.
@@ -210,17 +252,22 @@ class WalkingLoop:
         self.r = self.reference.step(self.r, r_ext, dt)
         self.x = self.network.step(self.x, self.r, inhibition, dt) if dt > 0.0 else self.x
         x_dot = self.network.rate(self.x, self.r, inhibition)
+        feedback = self._balance(self._body(state), x_dot, dt)
+        self.barring = self.mode.mode
         ballot = self.votes.count(
             state.time_ns, vote_sensors(state), self.network, self.x, self.r, self.stop.word
         )
         self.stop = self.supervisor.step(
-            self.stop, state.time_ns, self.x, x_dot, self.r, command, ballot
+            self.stop, state.time_ns, self.x, x_dot, self.r, command, ballot, self.barring
         )
         self.inhibition = self.supervisor.inhibition(self.stop)
-        self.posture_state, feedback = self.posture.step(
-            self.posture_state, self._body(state), self.x, x_dot, self.r, dt
-        )
-        targets = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
+        body = BodyCommand.from_text(feedback.mode)
+        targets = [
+            self._leg(i, state, x_dot, feedback, dt)
+            if body.balanced
+            else self._moved_leg(i, state, body, feedback, dt)
+            for i in range(len(LEGS))
+        ]
         return Tick(
             state.time_ns,
             self.r,
@@ -234,6 +281,7 @@ class WalkingLoop:
                     for name in ('position', 'velocity', 'effort')
                 )
             ),
+            self.mode,
         )
 
     def _follow(self, network: GaitNetwork) -> None:
@@ -246,15 +294,30 @@ class WalkingLoop:
     def _body(self, state: RobotState) -> RobotState:
         """State of the robot as the posture controller is to know it."""
         if self.estimator is None:
-            return state
+            return replace(state, foot_force=np.zeros(len(LEGS)))  # as odom, which has none
         readings = readings_of(state)
         self.estimator_state, estimate = self.estimator.step(self.estimator_state, readings)
         return estimated_state(readings, estimate)
 
+    def _balance(self, state: RobotState, x_dot: Array, dt: float) -> PostureFeedback:
+        """Advance the body's mode, and balance where it stands."""
+        body = self.body
+        self.mode = body.step(
+            self.mode, state, self.x, x_dot, self.r, self.posture_state.activity
+        )
+        if not body.balances(self.mode):
+            self.posture_state = self.posture.initial_state()
+            return body.feedback(self.mode, state)
+        self.posture_state, feedback = self.posture.step(
+            self.posture_state, state, self.x, x_dot, self.r, dt
+        )
+        return body.labelled(self.mode, feedback)
+
     def _leg(
         self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float
     ) -> JointTargets:
-        leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
+        leg = self.legs[i]
+        self.motion_states[i] = None
         self.leg_states[i], goal, goal_velocity = leg.step(
             self.leg_states[i],
             self.x[i],
@@ -264,6 +327,23 @@ class WalkingLoop:
             feedback.correction,
             dt,
         )
+        return self._targets(i, state, goal, goal_velocity, feedback)
+
+    def _moved_leg(
+        self, i: int, state: RobotState, body: BodyCommand, feedback: PostureFeedback, dt: float
+    ) -> JointTargets:
+        """Targets of a leg while the gait's primitive does not move it."""
+        joints = slice(3 * i, 3 * i + 3)
+        self.motion_states[i], self.leg_states[i], goal, goal_velocity = self.motions[i].step(
+            self.motion_states[i], self.leg_states[i], body, feedback.measured[joints], dt
+        )
+        return self._targets(i, state, goal, goal_velocity, feedback)
+
+    def _targets(
+        self, i: int, state: RobotState, goal: Array, goal_velocity: Array,
+        feedback: PostureFeedback,
+    ) -> JointTargets:
+        leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
         measured = None
         if leg.parameters.reading == 'torque':
             measured = TransformationState(

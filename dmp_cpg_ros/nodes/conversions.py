@@ -134,12 +134,16 @@ class JointTargetsReader:
 
 
 class PostureFeedbackWriter:
-    """Writes ``posture_feedback``: torques, a shift in x and y per foot, a velocity correction."""
+    """Writes ``posture_feedback``: torques, a shift in x and y per foot, a velocity correction.
+
+    The body's mode is in ``frame_id``, and with it measured angles in the joints' positions.
+    """
 
     def __init__(self) -> None:
         """Build the message."""
         names = JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES
-        self._writer = JointStateWriter(names, FIELDS, BASE_FRAME)
+        self._writer = JointStateWriter(names, FIELDS)
+        self._message = self._writer.message
         self._position, self._velocity, self._effort = (np.zeros(len(names)) for _ in FIELDS)
 
     def fill(self, time_ns: int, feedback: PostureFeedback) -> JointState:
@@ -147,7 +151,9 @@ class PostureFeedbackWriter:
         shift = feedback.shift_in_base.reshape(-1)
         self._position[len(JOINT_NAMES):-len(CORRECTION_NAMES)] = shift
         self._velocity[-len(CORRECTION_NAMES):] = feedback.correction
+        self._position[:len(JOINT_NAMES)] = feedback.measured
         self._effort[:len(JOINT_NAMES)] = feedback.torque
+        self._message.header.frame_id = feedback.mode
         return self._writer.fill(time_ns, self._position, self._velocity, self._effort)
 
 
@@ -162,4 +168,5 @@ class PostureFeedbackReader:
         """Read the feedback; raises DataError."""
         position, velocity, effort = self._reader.read(message)
         shift = position[len(JOINT_NAMES):-len(CORRECTION_NAMES)].reshape(len(LEGS), 2)
-        return PostureFeedback(effort[:len(JOINT_NAMES)], shift, velocity[-len(CORRECTION_NAMES):])
+        return PostureFeedback(effort[:len(JOINT_NAMES)], shift, velocity[-len(CORRECTION_NAMES):],
+                               message.header.frame_id, position[:len(JOINT_NAMES)])

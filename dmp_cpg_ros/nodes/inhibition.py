@@ -23,6 +23,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     CommandParameters,
     TickParameters,
 )
+from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference, read_twist
 from dmp_cpg_ros.nodes.executors import run_node
@@ -65,11 +66,20 @@ class InhibitionNode(CertifiedNode):
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = InhibitionStateWriter(), self.publisher('inhibition_state')
         self._votes = NodeVotes(self, network)
+        self._body_mode = 'standing'
+        inputs = ('canonical_state', 'reference', *self._votes.inputs)
         self._ticks = self.match(
-            ('canonical_state', 'reference', *self._votes.inputs),
+            (*inputs, 'body_mode') if self._lock_step else inputs,
             'canonical_state',
+            delayed=() if self._lock_step else ('body_mode',),
             optional=self._votes.inputs,
             lock_step=self._lock_step,
+        )
+        self.listen(
+            'body_mode',
+            lambda message: self._ticks.add(
+                'body_mode', header_ns(message), read_body_mode(message)
+            ),
         )
         self._votes.listen(self._ticks)
         canonical = CanonicalStateReader()
@@ -120,9 +130,17 @@ class InhibitionNode(CertifiedNode):
         self._r = values['reference']
         self._supervisor.network = self._supervisor.network.with_cadence_of(gait)
         before = self._state
+        self._body_mode = values['body_mode'] or self._body_mode
         ballot = self._votes.count(stamp_ns, values, self._supervisor.network, before.word)
         self._state = self._supervisor.step(
-            before, stamp_ns, self._x, x_dot, self._r, self._gate.at(stamp_ns), ballot
+            before,
+            stamp_ns,
+            self._x,
+            x_dot,
+            self._r,
+            self._gate.at(stamp_ns),
+            ballot,
+            self._body_mode,
         )
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
@@ -161,6 +179,14 @@ class InhibitionNode(CertifiedNode):
                 'no canonical_state and reference yet; is canonical_oscillators running?'
             )
             return response
+        if not request.data and self._body_mode != 'standing':
+            response.success = False
+            response.message = (
+                f'the gait cannot start: the robot is {self._body_mode}, not standing; call '
+                f'{"recover" if self._body_mode == "damped" else "stand_up"}, or wait until it '
+                'stands'
+            )
+            return response
         already = request.data == self._state.requested
         self._state = self._supervisor.request(self._state, request.data)
         response.success = request.data == self._state.requested
@@ -189,6 +215,7 @@ class InhibitionNode(CertifiedNode):
             self._r,
             self._gate.at(self._state.time_ns),
             tick_s,
+            body_mode=self._body_mode,
         )
         certificate = self.certificate
         self._bound = (

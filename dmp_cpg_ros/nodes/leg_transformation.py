@@ -9,7 +9,10 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from dmp_cpg_ros.core.body_command import BodyCommand
 from dmp_cpg_ros.core.leg_primitive import LegParameters, LegPrimitive
+from dmp_cpg_ros.core.posture_motion import LegMotion, MotionState
+from dmp_cpg_ros.core.posture_movements import Movements
 from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, LegChoice
 from dmp_cpg_ros.core.transformation import TransformationState
@@ -22,7 +25,7 @@ from dmp_cpg_ros.nodes.conversions import (
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import GaitReader, description_of
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import header_ns
+from dmp_cpg_ros.nodes.message_values import Array, header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
@@ -49,8 +52,13 @@ class LegTransformation(ManagedNode):
         self._joints = slice(
             len(JOINTS_OF_LEG) * self._place, len(JOINTS_OF_LEG) * (self._place + 1)
         )
-        gaits = GaitReader(self)
-        self._primitive = LegPrimitive(leg, description_of(self), gaits.gait, parameters)
+        gaits, description = GaitReader(self), description_of(self)
+        self._primitive = LegPrimitive(leg, description, gaits.gait, parameters)
+        self._motion = LegMotion(
+            self._joints, Movements(description), self._primitive.transformation
+        )
+        self._motion_state: MotionState | None = None
+        self._body = BodyCommand()
         self._state, self._last_ns = self._primitive.initial_state(), -1
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
         inputs = ['canonical_state', 'reference', 'posture_feedback']
@@ -92,17 +100,15 @@ class LegTransformation(ManagedNode):
         """Advance the leg to the stamp of the canonical state."""
         dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
         self._last_ns = stamp_ns
-        x, x_dot, self._primitive.gait = values['canonical_state']
         feedback, joints = values['posture_feedback'], self._joints
-        self._state, goal, goal_velocity = self._primitive.step(
-            self._state,
-            x[self._place],
-            x_dot[self._place],
-            values['reference'],
-            feedback.shift_in_base[self._place],
-            feedback.correction,
-            dt,
-        )
+        if feedback.mode != self._body.text:
+            self._body = BodyCommand.from_text(feedback.mode)
+        if self._body.balanced:
+            goal, goal_velocity = self._walk(values, dt)
+        else:
+            self._motion_state, self._state, goal, goal_velocity = self._motion.step(
+                self._motion_state, self._state, self._body, feedback.measured[joints], dt
+            )
         measured = None
         if 'joint_states' in values:
             position, velocity, _ = values['joint_states']
@@ -112,9 +118,30 @@ class LegTransformation(ManagedNode):
         )
         self._publisher.publish(self._writer.fill(stamp_ns, targets))
 
+    def _walk(self, values: dict[str, Any], dt: float) -> tuple[Array, Array]:
+        """Advance the gait's primitive; returns its goals."""
+        self._motion_state = None
+        x, x_dot, self._primitive.gait = values['canonical_state']
+        feedback = values['posture_feedback']
+        self._state, goal, goal_velocity = self._primitive.step(
+            self._state,
+            x[self._place],
+            x_dot[self._place],
+            values['reference'],
+            feedback.shift_in_base[self._place],
+            feedback.correction,
+            dt,
+        )
+        return goal, goal_velocity
+
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Which leg, and how much it swings."""
-        return {'leg': LEGS[self._place], 'activity': self._state.activity}
+        return {
+            'leg': LEGS[self._place],
+            'activity': self._state.activity,
+            'body_mode': self._body.mode,
+            'movement': self._body.movement or 'none',
+        }
 
 
 def main() -> int:

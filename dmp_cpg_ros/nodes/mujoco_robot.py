@@ -17,6 +17,7 @@ from rclpy.clock_type import ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.body_command import BALANCED
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation_parameters import StateSourceParameters
 from dmp_cpg_ros.core.robot_state import RobotState
@@ -30,6 +31,7 @@ from dmp_cpg_ros.core.suite_parameters import (
 )
 from dmp_cpg_ros.core.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.world_choice import WorldParameters
+from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
 from dmp_cpg_ros.nodes.conversions import JointTargetsReader, read_push_force
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.interfaces import BODY_TOPICS, Interface
@@ -38,10 +40,10 @@ from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
 from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
 from dmp_cpg_ros.nodes.robot_timing import RobotTiming
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
-from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
+from dmp_cpg_ros.robot.refuge import Refuge
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.target_guard import TargetGuard
 
@@ -62,6 +64,13 @@ VOTING_TOPICS = ('imu', 'foot_contacts')
 STATE_TOPICS = ('/clock', 'imu', 'odom', 'foot_contacts', 'joint_states')
 """What the robot publishes at every tick, the tick itself last."""
 
+RETREATS = {
+    'stand': 'it takes up a stand',
+    'lie': 'it lowers itself onto its belly',
+    'damp': 'its joints are damped',
+}
+"""What the robot does by itself, in words."""
+
 
 class MujocoRobotNode(ManagedNode):
     """Publishes the robot's state at every control tick and moves its joints to their targets."""
@@ -75,8 +84,9 @@ class MujocoRobotNode(ManagedNode):
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._tick_ns = self.parameters_of(TickParameters).tick_ns
         self._robot = self._make_robot()
-        stand = home_joint_position(self._robot.description)
-        self._guard = TargetGuard(stand, round(self._options.target_timeout * 1e9))
+        refuge = Refuge(self._robot.description)
+        self._guard = TargetGuard(refuge, round(self._options.target_timeout * 1e9))
+        self._body_mode = 'standing' if self._options.start_pose == 'standing' else 'lying'
         self._timing, self._writer, self._reader = (
             RobotTiming(),
             RobotStateWriter(),
@@ -86,6 +96,7 @@ class MujocoRobotNode(ManagedNode):
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._state_publishers = [self.publisher(name) for name in STATE_TOPICS]
         self.listen('joint_targets', self._on_targets)
+        self.listen('body_mode', self._on_body_mode)
         self.listen('push', self._on_push, command=True)
         if self._options.gated:
             self._held = self.publisher(f'{self.KIND}/holding_at')
@@ -173,23 +184,32 @@ class MujocoRobotNode(ManagedNode):
     def _step(self) -> None:
         """Move the robot by one tick under the targets that are there."""
         now = self._state.time_ns
-        targets = self._guard.targets(now, self._state.joint_position)
+        targets = self._guard.targets(self._state)
         silent = self._guard.silent(now)
         if silent and any(self._guard.stamps):
             self.warn(
                 'silent',
                 f'no targets from {", ".join(silent)} for {self._options.target_timeout} s: '
-                'the robot holds a stand by itself',
+                f'the robot looks after itself: {RETREATS[self._guard.retreat]}',
                 error=True,
             )
         elif not silent:
             self.clear('silent')
         self._state = self._robot.step(targets)
-        if not self._fell and getattr(self._robot, 'fallen', False):
+        should_stand = self._body_mode in BALANCED
+        if should_stand and not self._fell and getattr(self._robot, 'fallen', False):
             self._fell = True
             self.warn('fell', f'the robot fell at {self._state.time_ns * 1e-9:.3f} s', error=True)
         if self._viewer is not None and self._viewer.is_running():
             self._viewer.sync()
+
+    def _on_body_mode(self, message: Any) -> None:
+        """Know when lying is no fall; a fall is over when the robot stands again."""
+        mode = read_body_mode(message)
+        if mode == 'standing' and self._body_mode != 'standing':
+            self._fell = False
+            self.clear('fell')
+        self._body_mode = mode
 
     def _on_targets(self, message: Any) -> None:
         leg, targets = self._reader.read(message)
@@ -283,7 +303,7 @@ class MujocoRobotNode(ManagedNode):
         p, file = self._options, find_config(self.parameters_of(RobotFileParameters).robot)
         world = chosen_world(self.parameters_of(WorldParameters), p)
         if p.physics == 'perfect_tracking':
-            return PerfectTrackingRobot(load_description(file), self._tick_ns)
+            return PerfectTrackingRobot(load_description(file), self._tick_ns, p.start_pose)
         from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
         robot_file = load_robot_file(file)
@@ -296,6 +316,7 @@ class MujocoRobotNode(ManagedNode):
             p.initial_spread,
             world=world,
             sensors=self.parameters_of(SensorParameters),
+            start_pose=p.start_pose,
         )
 
 

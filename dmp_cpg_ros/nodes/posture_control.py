@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``posture_control``: virtual-model feedback torques and foot placement from the body's state."""
+"""``posture_control``: what the body does, and while it stands the torques that balance it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from dmp_cpg_ros.core.body_control import BodyControl
+from dmp_cpg_ros.core.body_mode import ModeParameters
+from dmp_cpg_ros.core.body_requests import REQUESTS
 from dmp_cpg_ros.core.estimation_parameters import EstimationParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters
 from dmp_cpg_ros.core.posture import PostureController, PostureParameters
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
+from dmp_cpg_ros.nodes.body_mode_messages import BodyModeWriter
 from dmp_cpg_ros.nodes.body_state import BodyState
 from dmp_cpg_ros.nodes.conversions import (
     CanonicalStateReader,
@@ -26,7 +30,10 @@ from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 
 class PostureControl(ManagedNode):
-    """Balances the body: torques for the stance legs, placement for the swinging feet."""
+    """Balances the body: torques for the stance legs, placement for the swinging feet.
+
+    Decides its mode, too: stands it up, lays it down, notices a fall, brings it back.
+    """
 
     KIND = 'posture_control'
     PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
@@ -44,12 +51,16 @@ class PostureControl(ManagedNode):
         )
         self._body = BodyState(self, description)
         self._memory, self._last_ns = self._controller.initial_state(), -1
+        self._modes = BodyControl(description, self.parameters_of(ModeParameters))
+        self._mode, self._told = self._modes.initial_state(), ''
+        self._mode_writer, self._mode_publisher = BodyModeWriter(), self.publisher('body_mode')
+        self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
         self._ticks = self.match(
             (*self._body.inputs, 'reference', 'canonical_state'),
             'canonical_state',
             optional=self._body.optional,
-            lock_step=self.parameters_of(LockStepParameters).lock_step,
+            lock_step=self._lock_step,
         )
         readers: dict[str, Callable[[Any], Any]] = {
             **self._body.readers,
@@ -61,6 +72,13 @@ class PostureControl(ManagedNode):
         }
         for name, read in readers.items():
             self.listen(name, self._taking(name, read))
+        for what in REQUESTS:
+            self.serve(what, self._answering(what))
+
+    def activate(self) -> None:
+        """Tell late joiners the mode from the start; in lock-step the first tick does."""
+        if not self._lock_step:
+            self._tell()
 
     def _taking(self, name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
         return lambda message: self._ticks.add(name, header_ns(message), read(message))
@@ -70,20 +88,68 @@ class PostureControl(ManagedNode):
         self._controller.parameters = self.parameters_of(PostureParameters)
         self._body.on_parameters()
 
-    def diagnostic_values(self) -> Mapping[str, Any]:
-        """Tell what the estimator found out about the robot and its ground."""
-        return self._body.diagnostic_values()
-
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Compute the feedback for the stamp of the canonical state."""
         dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
         self._last_ns = stamp_ns
         state = self._body.state(stamp_ns, values)
         x, x_dot, self._controller.gait = values['canonical_state']
-        self._memory, feedback = self._controller.step(
-            self._memory, state, x, x_dot, values['reference'], dt
-        )
+        r, modes = values['reference'], self._modes
+        self._mode = modes.step(self._mode, state, x, x_dot, r, self._memory.activity)
+        if modes.balances(self._mode):
+            self._memory, feedback = self._controller.step(self._memory, state, x, x_dot, r, dt)
+            feedback = modes.labelled(self._mode, feedback)
+        else:
+            self._memory, feedback = (
+                self._controller.initial_state(),
+                modes.feedback(self._mode, state),
+            )
         self._publisher.publish(self._writer.fill(stamp_ns, feedback))
+        if self._lock_step or self._mode.mode != self._told:
+            self._tell()
+
+    def diagnostic_values(self) -> Mapping[str, Any]:
+        """What the body does and why, and what the estimator found out."""
+        condition = self._mode.condition
+        measured = {} if condition is None else {
+            'tilt': condition.tilt,
+            'height': condition.height,
+            'support': condition.support,
+        }
+        return {
+            'body_mode': self._mode.mode,
+            'reason': self._mode.reason,
+            **measured,
+            **self._body.diagnostic_values(),
+        }
+
+    def _answering(self, what: str) -> Callable[[Any, Any], Any]:
+        """Take a request; the answer says what will happen from the next tick on, or why not."""
+
+        def answer(request: Any, response: Any) -> Any:
+            if not self.active:
+                response.success = False
+                response.message = f'posture_control is {self.state_label}, not active'
+                return response
+            self._mode, given = self._modes.request(self._mode, what)
+            response.success, response.message = given.accepted, given.text
+            return response
+
+        return answer
+
+    def _tell(self) -> None:
+        """Publish the mode; a new one is logged, a fall is an error until it is over."""
+        self._mode_publisher.publish(self._mode_writer.fill(self._mode))
+        mode, reason = self._mode.mode, self._mode.reason
+        if mode == self._told:
+            return
+        if self._told:
+            self.get_logger().info(f'{self._told} -> {mode}: {reason}')
+        self._told = mode
+        if mode == 'damped':
+            self.warn('fell', f'{reason}; the joints are damped, call recover', error=True)
+        elif mode in ('standing', 'lying'):
+            self.clear('fell')
 
 
 def main() -> int:

@@ -15,13 +15,15 @@ from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 
+from dmp_cpg_ros.core.body_requests import REQUESTS
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.push import Push
 from dmp_cpg_ros.core.scenario import Scenario
 from dmp_cpg_ros.core.scenario_events import Command
 from dmp_cpg_ros.nodes.acknowledged_topic import AcknowledgedTopic
+from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
@@ -63,6 +65,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         Done at the end of the scenario, with an exception when it could not be played.
     time_ns : int
         Stamp of the robot's last tick [ns].
+    mode : str
+        What the body does, as last told; empty before.
     """
 
     def __init__(
@@ -91,6 +95,10 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
         self._inhibit = self.create_client(SetBool, interface('inhibit').name)
         self._setter = ParameterSetter(self)
+        self._modes = {
+            what: self.create_client(Trigger, interface(what).name) for what in REQUESTS
+        }
+        self.mode = ''
         self._gait = self.create_client(SetParameters, f'{GAIT_OWNER}/set_parameters')
         self._deliver: dict[str, Callable[[Any], None]] = {
             'command': self._send,
@@ -99,10 +107,12 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             'push': self._push,
             'set': self._set,
             'votes': self._vote,
+            **{what: self._asking(what) for what in REQUESTS},
         }
         for name, callback in (
             (f'{GATE_OWNER}/holding_at', self._on_holding),
             ('inhibition_state', self._on_inhibition),
+            ('body_mode', self._on_body_mode),
             ('/clock', self._on_clock),
         ):
             topic = interface(name)
@@ -111,7 +121,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     def connected(self) -> bool:
         """Whether the gate, the readers of commands and the service are there."""
-        services = (self._inhibit, self._gait)
+        services = (self._inhibit, self._gait, *self._modes.values())
         return (
             self._gate.get_subscription_count() > 0
             and all(client.service_is_ready() for client in services)
@@ -231,6 +241,29 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             return
         self._say(self.time_ns * 1e-9, f'  inhibit: {answer.message}')
         self._delivered()
+
+    def _asking(self, what: str) -> Callable[[Any], None]:
+        """What delivers a request to stand up, lie down or recover."""
+
+        def answered(future: Future) -> None:
+            answer = future.result()
+            if answer is None or not answer.success:
+                self._fail(f'service {what}: {"no answer" if answer is None else answer.message}')
+                return
+            self._say(self.time_ns * 1e-9, f'  {what}: {answer.message}')
+            self._delivered()
+
+        def ask(_: Any) -> None:
+            self._modes[what].call_async(Trigger.Request()).add_done_callback(answered)
+
+        return ask
+
+    def _on_body_mode(self, message: DiagnosticArray) -> None:
+        mode = read_body_mode(message)
+        if mode != self.mode:
+            known, self.mode = self.mode, mode
+            if known or mode != 'standing':
+                self._say(header_ns(message) * 1e-9, mode)
 
     def _set_gait(self, name: str) -> None:
         """Set the parameter as ``ros2 param set`` does; a change that was accepted acts at the

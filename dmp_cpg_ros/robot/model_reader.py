@@ -131,7 +131,8 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
     kd = file.kd or tuple(DAMPING_TIME * np.sqrt(leg_length / GRAVITY) * gain for gain in kp)
     description = RobotDescription(
         name=file.model.stem, legs=legs, mass=mass, base_inertia=np.zeros((3, 3)),
-        com_in_base=np.zeros(3), stance_height=height, kp=np.array(kp), kd=np.array(kd))
+        com_in_base=np.zeros(3), stance_height=height, kp=np.array(kp), kd=np.array(kd),
+        belly_depth=_belly_depth(model, ids.base))
     standing = pose(model, ids, home_joint_position(description))
     com, inertia = _composite_inertia(model, standing, ids.base)
     return replace(description, base_inertia=inertia, com_in_base=com)
@@ -187,6 +188,24 @@ def _stance_height(model: mujoco.MjModel, ids: ModelIds, legs: tuple[LegGeometry
     data = pose(model, ids, home)
     height = max(foot.radius - float(foot_position(data, foot)[2]) for foot in ids.feet)
     return height if 0.6 * usual < height < 1.3 * usual else usual
+
+
+def _belly_depth(model: mujoco.MjModel, base: int) -> float:
+    """Return how far the base body's colliding shapes reach below its origin [m].
+
+    A base without any (some models let only the legs collide) is taken by its visible shapes.
+    """
+    geoms = np.flatnonzero(model.geom_bodyid == base)
+    colliding = geoms[(model.geom_contype[geoms] | model.geom_conaffinity[geoms]) != 0]
+    depth = 0.0
+    for geom in colliding if len(colliding) else geoms:
+        R = np.zeros(9)
+        mujoco.mju_quat2Mat(R, model.geom_quat[geom])
+        down = R.reshape(3, 3)[2]
+        centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
+        lowest = model.geom_pos[geom, 2] + down @ centre - np.abs(down) @ half
+        depth = max(depth, -float(lowest))
+    return depth
 
 
 def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData,

@@ -27,6 +27,8 @@ from dmp_cpg_ros.robot.port import RobotError, steps_per_tick
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
 from dmp_cpg_ros.robot.sensor_noise import SensorNoise
 from dmp_cpg_ros.robot.standing_torque import standing_torque
+from dmp_cpg_ros.robot.start_pose import StartPose
+from dmp_cpg_ros.robot.start_pose import start_pose as pose_of
 
 Vector = NDArray[np.float64]
 
@@ -60,6 +62,8 @@ class MujocoRobot:
         What it walks on; by default the flat floor.
     sensors : SensorParameters, optional
         Noise of the sensors, from the same seed; by default they are perfect.
+    start_pose : str
+        ``standing``, ``lying`` (on the belly) or ``fallen`` (somehow, by the seed).
 
     Raises
     ------
@@ -70,7 +74,7 @@ class MujocoRobot:
     def __init__(self, robot_file: RobotFile | Path | str | None = None, tick_ns: int = 4_000_000,
                  seed: int = 0, initial_spread: float = 0.0,
                  initial_height: float | None = None, world: World | None = None,
-                 sensors: SensorParameters | None = None) -> None:
+                 sensors: SensorParameters | None = None, start_pose: str = 'standing') -> None:
         if not isinstance(robot_file, RobotFile):
             robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
         self.world = world = world or World()
@@ -96,6 +100,8 @@ class MujocoRobot:
         self._seed, self._spread = seed, initial_spread
         self._initial_height = initial_height
         self._sensors = None if sensors is None else SensorNoise(sensors, seed, tick_ns)
+        self._start = (
+            None if start_pose == 'standing' else pose_of(start_pose, self.description, seed))
         self.data = mujoco.MjData(model)
         self._tick = 0
         self._push: tuple[Vector, int] = (np.zeros(3), 0)
@@ -103,7 +109,30 @@ class MujocoRobot:
         self.reset()
 
     def reset(self) -> RobotState:
-        """Stand in the home pose at time 0, held by the torques that standing takes."""
+        """Be in the start pose at time 0.
+
+        A standing robot is in its home pose, held by the torques that standing takes; the other
+        poses come to rest before time 0.
+        """
+        return self._reset_standing() if self._start is None else self._reset_down(self._start)
+
+    def _reset_down(self, start: StartPose) -> RobotState:
+        data, b = self.data, self._base_qpos
+        mujoco.mj_resetData(self.model, data)
+        self._drive.reset()
+        self._push = (np.zeros(3), 0)
+        data.qpos[b:b + 3] = start.base_position
+        data.qpos[b + 3:b + 7] = start.base_quaternion
+        data.qpos[self._qpos] = held = start.joint_position
+        mujoco.mj_forward(self.model, data)
+        for _ in range(round(start.settling_s * 1e9 / self.tick_ns)):
+            state = self.step(JointTargets(held, np.zeros(12), np.zeros(12)))
+            held = state.joint_position if start.limp else held
+        self._drive.reset()
+        self._tick, data.time = 0, 0.0
+        return self._state()
+
+    def _reset_standing(self) -> RobotState:
         data, model = self.data, self.model
         mujoco.mj_resetData(model, data)
         self._drive.reset()
@@ -122,9 +151,9 @@ class MujocoRobot:
         self._effort = self._drive.limited(holding, np.zeros(12))
         self._actuators.apply(data, self._effort)
         mujoco.mj_forward(model, data)
-        # As held at rest: the first instant of the contacts is nothing that a sensor would show.
-        R_world_base = data.xmat[self._ids.base].reshape(3, 3)
-        self._specific_force = -model.opt.gravity @ R_world_base
+        d = self._base_dof
+        acceleration_in_world = data.qacc[d:d + 3] - model.opt.gravity
+        self._specific_force = acceleration_in_world @ data.xmat[self._ids.base].reshape(3, 3)
         return self._state()
 
     def step(self, targets: JointTargets) -> RobotState:

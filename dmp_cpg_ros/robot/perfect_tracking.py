@@ -7,7 +7,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
+from dmp_cpg_ros.core.postures import lying_posture
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import JointTargets, RobotState
 from dmp_cpg_ros.robot.home_pose import home_joint_position
@@ -34,24 +36,31 @@ class PerfectTrackingRobot:
         The robot to stand in for.
     tick_ns : int
         Control tick [ns].
+    start_pose : str
+        ``standing`` or ``lying``.
 
     Raises
     ------
     ParameterError
-        If the tick is not positive.
+        If the tick is not positive, or there is no such pose.
     """
 
-    def __init__(self, description: RobotDescription, tick_ns: int = 4_000_000) -> None:
+    def __init__(self, description: RobotDescription, tick_ns: int = 4_000_000,
+                 start_pose: str = 'standing') -> None:
         steps_per_tick(tick_ns, 1)
         self.description = description
         self.tick_ns = tick_ns
         self._legs = [LegKinematics(leg) for leg in description.legs]
         self._radius = np.array([leg.foot_radius for leg in description.legs])
-        self._home = home_joint_position(description)
+        if start_pose not in ('standing', 'lying'):
+            raise ParameterError(f"start_pose = '{start_pose}': a robot that tracks perfectly "
+                                 'is standing or lying')
+        self._home = (home_joint_position(description) if start_pose == 'standing'
+                      else lying_posture(description))
         self.reset()
 
     def reset(self) -> RobotState:
-        """Stand in the home pose at time 0."""
+        """Be in the start pose at time 0."""
         self._tick = 0
         self._place, self._yaw = np.zeros(2), 0.0
         self._velocity_in_world, self._yaw_rate = np.zeros(3), 0.0

@@ -1,37 +1,37 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the joints are told when legs fall silent: the robot holds a stand and does not fall."""
+"""What the joints are told when legs fall silent: the robot looks after itself."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS, JointTargets
-
-Array = NDArray[np.float64]
-
-RAMP_NS = 600_000_000
-"""Time in which a stand is taken up from wherever the joints are [ns]."""
+from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.robot.refuge import Refuge, Retreat
 
 
 class TargetGuard:
-    """The newest targets of the four legs, or a stand when one of them is too old.
+    """The newest targets of the four legs, or a retreat when one of them is too old.
 
     Parameters
     ----------
-    stand : ndarray (12,)
-        Joint angles of the stand [rad].
+    refuge : Refuge
+        What the robot does by itself.
     timeout_ns : int
-        Age of a leg's targets from which the robot holds the stand [ns].
+        Age of a leg's targets from which the robot retreats [ns].
     """
 
-    def __init__(self, stand: Array, timeout_ns: int) -> None:
-        """Start without targets: hold the stand."""
-        self._stand, self._timeout_ns = stand.copy(), timeout_ns
-        self._position, self._velocity, self._effort = stand.copy(), np.zeros(12), np.zeros(12)
+    def __init__(self, refuge: Refuge, timeout_ns: int) -> None:
+        """Start without targets."""
+        self._refuge, self._timeout_ns = refuge, timeout_ns
+        self._position, self._velocity, self._effort = (np.zeros(12) for _ in range(3))
         self.stamps: list[int | None] = [None] * len(LEGS)
-        self._hold_from: tuple[int, Array] | None = (-RAMP_NS, stand.copy())
+        self._retreat: Retreat | None = None
+
+    @property
+    def retreat(self) -> str:
+        """``stand``, ``lie`` or ``damp`` while the robot retreats; else empty."""
+        return '' if self._retreat is None else self._retreat.what
 
     def accept(self, leg: str, stamp_ns: int, targets: JointTargets) -> None:
         """Take a leg's targets; older ones than the newest are ignored."""
@@ -57,27 +57,12 @@ class TargetGuard:
         known = [stamp for stamp in self.stamps if stamp is not None]
         return now_ns - min(known) if len(known) == len(self.stamps) else 0
 
-    def targets(self, now_ns: int, joint_position: Array) -> JointTargets:
-        """Targets of all joints at a time.
-
-        Parameters
-        ----------
-        now_ns : int
-            Stamp of the robot's state [ns].
-        joint_position : ndarray (12,)
-            Measured angles [rad]; where the way to the stand begins.
-
-        Returns
-        -------
-        JointTargets
-            (12,) each.
-        """
-        if not self.silent(now_ns):
-            self._hold_from = None
+    def targets(self, state: RobotState) -> JointTargets:
+        """Targets of all joints, (12,) each, at a state of the robot."""
+        if not self.silent(state.time_ns):
+            self._retreat = None
             return JointTargets(self._position.copy(), self._velocity.copy(), self._effort.copy())
-        if self._hold_from is None:
-            self._hold_from = (now_ns, joint_position.copy())
-        since, start = self._hold_from
-        share = min(max((now_ns - since) / RAMP_NS, 0.0), 1.0)
-        smooth = share * share * (3.0 - 2.0 * share)
-        return JointTargets(start + smooth * (self._stand - start), np.zeros(12), np.zeros(12))
+        if self._retreat is None:
+            self._retreat = self._refuge.begin(state)
+        self._retreat, targets = self._refuge.go_on(self._retreat, state)
+        return targets

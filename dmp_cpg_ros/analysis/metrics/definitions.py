@@ -8,7 +8,7 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
     'robot.fell': (
         '',
         'base below half the standing height over the ground, or tilted by more than 60°, at any '
-        'time',
+        'time at which it should stand; or the suite noticed a fall',
     ),
     'robot.distance_m': (
         'm',

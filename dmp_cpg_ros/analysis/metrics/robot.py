@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.analysis.body_modes import fall_noticed, should_stand
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import MOVING, gait_period, steady_segments
 from dmp_cpg_ros.analysis.foot_motion import foot_slip
@@ -58,14 +59,17 @@ def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
 
 
 def fell(recording: Recording, context: RunContext) -> bool | None:
-    """Whether the base ever was too low or too tilted."""
+    """Whether the base ever was too low or too tilted while the robot should stand, or the suite
+    noticed a fall.
+    """
     odometry = recording.odometry
     if not odometry.time.size:
         return None
     height = height_over_ground(odometry, context)
     standing = height[0] if context.robot is None else context.robot.stance_height
     too_low = height < FALLEN_HEIGHT_SHARE * standing
-    return bool(np.any(too_low | (tilt(odometry.quaternion) > FALLEN_TILT)))
+    down = too_low | (tilt(odometry.quaternion) > FALLEN_TILT)
+    return fall_noticed(recording) or bool(np.any(down & should_stand(recording, odometry.time)))
 
 
 def distance_walked(recording: Recording) -> float | None:

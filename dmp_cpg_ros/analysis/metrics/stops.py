@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.analysis.body_modes import stands_until
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import RUNNING, STARTING, STOPPING, Episode, episodes
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
@@ -50,11 +51,12 @@ def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[s
     entry = _times(episode, at_rest)
     if at_rest is None:
         return entry
-    window = (min(at_rest.time + REST_SETTLING, episode.end), episode.end)
+    end = stands_until(recording, at_rest.time, episode.end)
+    window = (min(at_rest.time + REST_SETTLING, end), end)
     return {
         **entry,
         'rest_s': at_rest.time,
-        'rest_until_s': episode.end,
+        'rest_until_s': end,
         **_body_at_rest(recording, entry['request_s'], window),
         **_feet_at_rest(recording, context, window),
     }
