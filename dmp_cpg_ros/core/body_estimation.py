@@ -10,7 +10,7 @@ standing legs correct.
 
 What cannot be used (not finite, impossible, absent) never reaches the filter and is named in
 ``BodyEstimate.problems``: a leg without joints measures nothing, a foot without contact sensor is
-judged by its joint torques, and without IMU the last turn rate is held for a moment.
+judged by its joint torques, and without IMU the standing feet tell how the body turns.
 """
 
 from __future__ import annotations
@@ -21,11 +21,17 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.body_estimate import BodyEstimate
 from dmp_cpg_ros.core.estimation_parameters import EstimationParameters
 from dmp_cpg_ros.core.gait import GRAVITY
-from dmp_cpg_ros.core.leg_odometry import FootMotion, LegOdometry, force_from_torque
+from dmp_cpg_ros.core.leg_odometry import (
+    FootMotion,
+    LegOdometry,
+    force_from_torque,
+    turn_rate_of_feet,
+)
 from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.robot_state import LEGS, RobotState
+from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.rotations import levelled, rotation_matrix
 from dmp_cpg_ros.core.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.terrain_plane import (
@@ -34,12 +40,13 @@ from dmp_cpg_ros.core.terrain_plane import (
     normal_in_world,
     terrain_step,
 )
-from dmp_cpg_ros.core.velocity_filter import FilterNoise, FilterState, predict, update
+from dmp_cpg_ros.core.velocity_filter import FilterNoise, FilterState, predict, settle, update
 
 Array = NDArray[np.float64]
 
 BLIND = 0.02
-"""Time for which the last turn rate is held without IMU [s]; then the body counts as not turning.
+"""Time for which the last turn rate is held without IMU and feet [s]; then the body counts as not
+turning. Also the gap between ticks beyond which readings do not stand for their mean.
 """
 
 BLIND_NOISE = (0.3, 3.0)
@@ -51,52 +58,14 @@ INITIAL_DEVIATION = (0.05, 0.1, 0.005, 0.1)
 UNTRUSTED_SHARE = 0.2
 """Share of the force of full trust below which a foot is not trusted at all."""
 
-STILL = 0.3
-"""Joint velocity below which a robot on all four feet stands still [rad/s]."""
+STILL_JOINT, STILL_TURN = 0.15, 0.03
+"""Velocities of joints and body below which a robot on all four feet stands still [rad/s]."""
 
-STILL_TRUST = 4.0
-"""How much less a foot's velocity deviates in a robot that stands still."""
+STILL_DEVIATION = 0.01
+"""By which such a body turns all the same [rad/s]."""
 
 HEIGHT_RATE = 50.0
 """Rate at which the height follows the kinematics of the stance legs [1/s]."""
-
-
-@dataclass(frozen=True)
-class BodyEstimate:
-    """The body's state as far as the sensors tell it.
-
-    Attributes
-    ----------
-    time_ns : int
-        Stamp [ns].
-    position_in_world : ndarray (3,)
-        By leg odometry, from where the robot was switched on; z over the ground there [m].
-    quaternion : ndarray (4,)
-        Orientation of ``base_link``, x, y, z, w; yaw is 0 where the robot was switched on.
-    velocity_in_base, rate_in_base : ndarray (3,)
-        [m/s], [rad/s]
-    height : float
-        Of ``base_link`` over the ground under the stance feet, along its normal [m].
-    normal_in_world : ndarray (3,)
-        Of the ground's plane, upwards.
-    trust : ndarray (4,)
-        How well each foot stands, in [0, 1].
-    velocity_variance : ndarray (3,)
-        Of ``velocity_in_base``, as the filter believes [m^2/s^2].
-    problems : tuple of str
-        Sensors that could not be used at this tick.
-    """
-
-    time_ns: int
-    position_in_world: Array
-    quaternion: Array
-    velocity_in_base: Array
-    rate_in_base: Array
-    height: float
-    normal_in_world: Array
-    trust: Array
-    velocity_variance: Array
-    problems: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -168,23 +137,27 @@ class BodyEstimator:
         )
         blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
         noise = self._noise(blind)
-        predicted, rate = self._predicted(memory, readings, seeing, blind, dt, noise)
+        if seeing:
+            rate, force = readings.rate_in_base, readings.specific_force_in_base
+        else:
+            rate, force = self._guessed(memory, readings, legs, blind)
+        predicted = predict(memory.filter, 0.5 * (memory.rate + rate), force, dt, noise)
         motion, normal = self._motion(memory.terrain, predicted, readings, legs)
         trust = self._trust(readings, contacts, motion, normal)
         trust = np.minimum(trust, memory.estimate.trust + dt / self.parameters.contact_settling)
         trust[~legs] = 0.0
         state, stands = predicted, trust > 0.0
         if stands.any():
-            still = bool(stands.all() and np.abs(readings.joint_velocity).max() < STILL)
             state, _ = update(
                 predicted,
                 rate,
                 motion.contact_in_base[stands],
                 motion.velocity_in_base[stands],
-                trust[stands] * (STILL_TRUST if still else 1.0),
+                trust[stands],
                 noise,
-                still,
             )
+        if seeing and stands.all() and _is_still(readings, state):
+            state = settle(state, rate, STILL_DEVIATION)
         problems = _problems(legs, contacts, seeing)
         if not np.isfinite(state.covariance.sum() + state.velocity_in_base.sum()):
             problems = (*problems, 'filter')
@@ -224,24 +197,23 @@ class BodyEstimator:
         terrain = initial_terrain(contact) if legs.all() else flat
         return EstimatorState(state, terrain, estimate, estimate.rate_in_base, 0.0), estimate
 
-    def _predicted(
+    def _guessed(
         self,
         memory: EstimatorState,
         readings: SensorReadings,
-        seeing: bool,
+        legs: NDArray[np.bool_],
         blind: float,
-        dt: float,
-        noise: FilterNoise,
-    ) -> tuple[FilterState, Array]:
-        """Prediction to the new stamp, and the turn rate at it as the gyroscope would say it."""
-        state = memory.filter
-        if seeing:
-            rate, force = readings.rate_in_base, readings.specific_force_in_base
-        else:
-            rate = memory.rate if blind <= BLIND else state.gyro_bias
-            upward = rotation_matrix(state.quaternion)[2]
-            force = GRAVITY * upward + state.accelerometer_bias
-        return predict(state, 0.5 * (memory.rate + rate), force, dt, noise), rate
+    ) -> tuple[Array, Array]:
+        """Guess what a silent IMU would read: the feet tell the turn rate, nothing accelerates."""
+        state, trust = memory.filter, np.where(legs, memory.estimate.trust, 0.0)
+        upward = rotation_matrix(state.quaternion)[2]
+        rate = memory.rate if blind <= BLIND else state.gyro_bias
+        if trust.any():
+            motion, _ = self._motion(memory.terrain, state, readings, legs)
+            rate = state.gyro_bias + turn_rate_of_feet(
+                motion.contact_in_base, motion.velocity_in_base, trust
+            )
+        return rate, GRAVITY * upward + state.accelerometer_bias
 
     def _motion(
         self,
@@ -329,20 +301,11 @@ class BodyEstimator:
         return EstimatorState(state, terrain, estimate, rate, blind), estimate
 
 
-def estimated_state(readings: SensorReadings, estimate: BodyEstimate) -> RobotState:
-    """Robot's state with an estimate in place of the ground truth, for the controllers."""
-    return RobotState(
-        readings.time_ns,
-        readings.joint_position,
-        readings.joint_velocity,
-        readings.joint_effort,
-        estimate.position_in_world,
-        estimate.quaternion,
-        estimate.velocity_in_base,
-        estimate.rate_in_base,
-        readings.specific_force_in_base,
-        readings.foot_force,
-        readings.rate_in_base,
+def _is_still(readings: SensorReadings, state: FilterState) -> bool:
+    """Whether neither joints nor body move."""
+    turn = readings.rate_in_base - state.gyro_bias
+    return bool(
+        np.abs(readings.joint_velocity).max() < STILL_JOINT and turn @ turn < STILL_TURN**2
     )
 
 

@@ -111,6 +111,32 @@ def shank_rate(
     return sign[0] * rate[0], cos(abduction) * pitching, sin(abduction) * pitching
 
 
+def turn_rate_of_feet(contact_in_base: Array, velocity_in_base: Array, trust: Array) -> Array:
+    """Angular velocity of a body from the feet alone, for when its gyroscope is silent.
+
+    Least squares of v + ω × r_i = m_i, weighted by the trust and slightly damped: two feet tell
+    nothing of a turn about the line between them, and one tells nothing at all.
+
+    Parameters
+    ----------
+    contact_in_base, velocity_in_base : ndarray (n, 3)
+        r_i [m] and m_i [m/s].
+    trust : ndarray (n,)
+        Weights, not all 0.
+
+    Returns
+    -------
+    ndarray (3,)
+        ω in the base [rad/s].
+    """
+    weight = trust / trust.sum()
+    r = contact_in_base - weight @ contact_in_base
+    m = velocity_in_base - weight @ velocity_in_base
+    squares = float(weight @ (r * r).sum(axis=1)) + 1e-4
+    normal = squares * np.eye(3) - (weight[:, None] * r).T @ r
+    return np.linalg.solve(normal, weight @ np.cross(r, m))
+
+
 def force_from_torque(jacobian: Array, torque: Array, normal_in_base: Array) -> float:
     """Normal force on a foot from the joint torques alone, for when its sensor is silent.
 

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.gait import GRAVITY
-from dmp_cpg_ros.core.rotations import rotation_matrix, skew, turned
+from dmp_cpg_ros.core.rotations import rotation_matrix, turned
 
 Array = NDArray[np.float64]
 
@@ -150,18 +150,15 @@ def predict(
     )
 
 
-def foot_jacobian(contact_in_base: Array, still: bool = True) -> Array:
+def foot_jacobian(contact_in_base: Array) -> Array:
     """Jacobians H of v + (ω̃ − b_ω) × r with respect to the error state: (n, 3) → (n, 3, 12).
 
-    Unless the body is ``still`` the derivative with respect to b_ω is left out, so that walking
-    legs do not correct it by themselves: feet that pivot under load measure a turn rate that is
-    off by about one part in a hundred, and that is no bias. (The bias of roll and pitch is still
-    seen, through gravity.)
+    The derivative with respect to b_ω is left out on purpose: feet that pivot under load measure
+    a turn rate that is off by about one part in a hundred, which is no bias. (The biases of roll
+    and pitch are still seen, through gravity; that of yaw is seen in standing, :func:`settle`.)
     """
     H = np.zeros((len(contact_in_base), 3, 12))
     H[:, (0, 1, 2), (3, 4, 5)] = 1.0
-    if still:
-        H[:, :, GYRO_BIAS] = skew(contact_in_base)
     return H
 
 
@@ -172,7 +169,6 @@ def update(
     velocity_in_base: Array,
     trust: Array,
     noise: FilterNoise,
-    still: bool = False,
 ) -> tuple[FilterState, Array]:
     """Correct by the velocities that standing feet measure.
 
@@ -188,8 +184,6 @@ def update(
         In (0, 1]: the deviation of a foot is ``noise.foot / trust``.
     noise : FilterNoise
         Noise.
-    still : bool
-        Whether the robot stands still, so that its feet tell the bias of the gyroscope.
 
     Returns
     -------
@@ -198,7 +192,7 @@ def update(
         Of the feet before their weights.
     """
     n = len(trust)
-    H = foot_jacobian(contact_in_base, still).reshape(3 * n, 12)
+    H = foot_jacobian(contact_in_base).reshape(3 * n, 12)
     P = state.covariance
     y = velocity_in_base - state.velocity_in_base - _cross(rate - state.gyro_bias, contact_in_base)
     HP = H @ P
@@ -210,16 +204,40 @@ def update(
     variance *= np.maximum((nu + distance_squared) / (nu + 3.0), 1.0)
     S.ravel()[:: 3 * n + 1] += np.repeat(variance, 3)
     gain = np.linalg.solve(S, HP)  # (3n, 12), the transpose of K
-    error = y.ravel() @ gain
-    P = P - HP.T @ gain
-    corrected = FilterState(
+    return _corrected(state, y.ravel() @ gain, P - HP.T @ gain), distance_squared
+
+
+def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
+    """Correct by the knowledge that the body does not turn: what the gyroscope reads is its bias.
+
+    Parameters
+    ----------
+    state : FilterState
+        State of a robot that stands still.
+    rate : ndarray (3,)
+        ω̃ [rad/s].
+    deviation : float
+        Of the turn rate of a robot that stands still [rad/s].
+
+    Returns
+    -------
+    FilterState
+    """
+    HP = state.covariance[GYRO_BIAS]
+    S = HP[:, GYRO_BIAS].copy()
+    S.ravel()[::4] += deviation * deviation
+    gain = np.linalg.solve(S, HP)
+    return _corrected(state, (rate - state.gyro_bias) @ gain, state.covariance - HP.T @ gain)
+
+
+def _corrected(state: FilterState, error: Array, covariance: Array) -> FilterState:
+    return FilterState(
         turned(state.quaternion, error[TILT]),
         state.velocity_in_base + error[VELOCITY],
         state.gyro_bias + error[GYRO_BIAS],
         state.accelerometer_bias + error[ACCELEROMETER_BIAS],
-        0.5 * (P + P.T),
+        0.5 * (covariance + covariance.T),
     )
-    return corrected, distance_squared
 
 
 def _spread(noise: FilterNoise) -> Array:

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.body_command import BodyCommand
 from dmp_cpg_ros.core.body_control import BodyControl
-from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState, estimated_state
+from dmp_cpg_ros.core.body_estimate import estimated_state
+from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.body_mode import ModeState
 from dmp_cpg_ros.core.body_requests import REQUESTS
 from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running

@@ -10,12 +10,8 @@ from typing import Any
 import numpy as np
 from sensor_msgs.msg import Imu, JointState
 
-from dmp_cpg_ros.core.body_estimation import (
-    BodyEstimate,
-    BodyEstimator,
-    EstimatorState,
-    estimated_state,
-)
+from dmp_cpg_ros.core.body_estimate import BodyEstimate, estimated_state
+from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.estimation_parameters import (
     ESTIMATE,
     EstimationParameters,

@@ -151,9 +151,9 @@ class MujocoRobot:
         self._effort = self._drive.limited(holding, np.zeros(12))
         self._actuators.apply(data, self._effort)
         mujoco.mj_forward(model, data)
-        d = self._base_dof
-        acceleration_in_world = data.qacc[d:d + 3] - model.opt.gravity
-        self._specific_force = acceleration_in_world @ data.xmat[self._ids.base].reshape(3, 3)
+        # As held at rest: the first instant of the contacts is nothing that a sensor would show.
+        R_world_base = data.xmat[self._ids.base].reshape(3, 3)
+        self._specific_force = -model.opt.gravity @ R_world_base
         return self._state()
 
     def step(self, targets: JointTargets) -> RobotState:

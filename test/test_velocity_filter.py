@@ -1,0 +1,198 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parts of the estimator: Jacobians against differences, rotations, contact forces, planes."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from core_examples import GRAVITY, differences, quadruped
+
+from dmp_cpg_ros.core.leg_kinematics import LegKinematics
+from dmp_cpg_ros.core.leg_odometry import LegOdometry, force_from_torque, turn_rate_of_feet
+from dmp_cpg_ros.core.rotations import levelled, roll_pitch_yaw, rotation_matrix, skew, turned
+from dmp_cpg_ros.core.terrain_plane import STEEPEST, fitted_slope, normal_in_world
+from dmp_cpg_ros.core.velocity_filter import (
+    FilterNoise,
+    FilterState,
+    foot_jacobian,
+    predict,
+    settle,
+    transition,
+    update,
+)
+
+NOISE = FilterNoise(2e-3, 0.05, 1e-5, 1e-4, 0.1, 4.0)
+RANDOM = np.random.default_rng(7)
+
+
+def some_state() -> FilterState:
+    quaternion = turned(np.array([0.0, 0.0, 0.0, 1.0]), RANDOM.normal(0.0, 0.5, 3))
+    root = RANDOM.normal(0.0, 0.1, (12, 12))
+    return FilterState(quaternion, RANDOM.normal(0.0, 1.0, 3), RANDOM.normal(0.0, 0.01, 3),
+                       RANDOM.normal(0.0, 0.1, 3), root @ root.T)
+
+
+def moved(state: FilterState, error: np.ndarray) -> FilterState:
+    """State plus an error state."""
+    return FilterState(turned(state.quaternion, error[:3]), state.velocity_in_base + error[3:6],
+                       state.gyro_bias + error[6:9], state.accelerometer_bias + error[9:],
+                       state.covariance)
+
+
+def error_between(state: FilterState, other: FilterState) -> np.ndarray:
+    """Error state, to first order, that takes a state to another."""
+    E = rotation_matrix(state.quaternion).T @ rotation_matrix(other.quaternion)
+    turn = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
+    return np.concatenate((turn, other.velocity_in_base - state.velocity_in_base,
+                           other.gyro_bias - state.gyro_bias,
+                           other.accelerometer_bias - state.accelerometer_bias))
+
+
+@pytest.mark.parametrize('_', range(5))
+def test_the_jacobian_of_the_prediction(_: int) -> None:
+    state, dt = some_state(), 1e-3
+    rate, force = RANDOM.normal(0.0, 2.0, 3), RANDOM.normal(0.0, 10.0, 3)
+    after = predict(state, rate, force, dt, NOISE)
+    by_differences = differences(
+        lambda e: error_between(after, predict(moved(state, e), rate, force, dt, NOISE)),
+        np.zeros(12), 1e-5)
+    F = transition(state, rotation_matrix(state.quaternion), rate - state.gyro_bias, dt)
+    # F is of first order in dt; rates here are up to 20 per second.
+    np.testing.assert_allclose(F, by_differences, atol=(20.0 * dt) ** 2)
+    assert np.abs(by_differences - np.eye(12)).max() > 5.0 * dt
+
+
+def test_the_jacobian_of_a_foot() -> None:
+    state, rate = some_state(), RANDOM.normal(0.0, 2.0, 3)
+    contact = RANDOM.normal(0.0, 0.3, (4, 3))
+
+    def predicted(error: np.ndarray) -> np.ndarray:
+        other = moved(state, error)
+        return (other.velocity_in_base + np.cross(rate - other.gyro_bias, contact)).ravel()
+
+    H, exact = foot_jacobian(contact).reshape(12, 12), differences(predicted, np.zeros(12))
+    np.testing.assert_allclose(H[:, :6], exact[:, :6], atol=1e-8)
+    np.testing.assert_allclose(H[:, 9:], exact[:, 9:], atol=1e-8)
+    assert not H[:, 6:9].any() and exact[:, 6:9].any()  # walking feet shall not tell that bias
+
+
+def test_an_update_reduces_the_covariance_and_keeps_it_one() -> None:
+    state = some_state()
+    contact = RANDOM.normal(0.0, 0.3, (3, 3))
+    measured = np.tile(state.velocity_in_base, (3, 1))
+    after, _ = update(state, state.gyro_bias, contact, measured, np.full(3, 0.7), NOISE)
+    assert np.array_equal(after.covariance, after.covariance.T)
+    assert np.linalg.eigvalsh(after.covariance).min() > -1e-12
+    assert np.linalg.eigvalsh(state.covariance - after.covariance).min() > -1e-9
+    np.testing.assert_allclose(after.velocity_in_base, state.velocity_in_base, atol=1e-12)
+
+
+def test_standing_still_makes_the_reading_the_bias() -> None:
+    state = dataclasses.replace(some_state(), covariance=np.diag(np.full(12, 0.01)))
+    rate = state.gyro_bias + (0.003, -0.002, 0.001)
+    after = settle(state, rate, 0.1)  # as uncertain as the bias was: half the way
+    np.testing.assert_allclose(after.gyro_bias, 0.5 * (state.gyro_bias + rate))
+    assert np.array_equal(after.velocity_in_base, state.velocity_in_base)
+    assert after.covariance.diagonal()[6:9] == pytest.approx(np.full(3, 0.005))
+
+
+def test_a_foot_that_disagrees_weighs_less() -> None:
+    state = dataclasses.replace(some_state(), covariance=np.diag(np.full(12, 0.01)))
+    contact, zero = np.zeros((2, 3)), np.zeros(3)
+    gains = []
+    for size in (0.01, 1.0, 100.0):
+        measured = state.velocity_in_base + np.array([[size, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        after, distance = update(state, zero, contact, measured, np.ones(2), NOISE)
+        gains.append((after.velocity_in_base - state.velocity_in_base)[0] / size)
+        assert distance[0] > distance[1]
+    assert gains[0] > 1.5 * gains[1] > 10.0 * gains[2] > 0.0
+
+
+def test_feet_tell_the_turn_rate() -> None:
+    v, rate = RANDOM.normal(0.0, 1.0, 3), RANDOM.normal(0.0, 1.0, 3)
+    contact = np.array([[x, y, -0.3] for x in (0.2, -0.2) for y in (0.1, -0.1)])
+    measured = v + np.cross(rate, contact)
+    trust = np.array([1.0, 0.3, 0.8, 1.0])
+    np.testing.assert_allclose(turn_rate_of_feet(contact, measured, trust), rate, rtol=0.02)
+    two = turn_rate_of_feet(contact[:2], measured[:2], trust[:2])  # on a line along y
+    assert two[1] == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(two[[0, 2]], rate[[0, 2]], rtol=0.02)
+    assert not turn_rate_of_feet(contact[:1], measured[:1], trust[:1]).any()
+
+
+def test_rotations_agree_with_each_other() -> None:
+    for _ in range(10):
+        v, u = RANDOM.normal(0.0, 1.0, 3), RANDOM.normal(0.0, 1.0, 3)
+        np.testing.assert_allclose(skew(v) @ u, np.cross(v, u))
+        q = turned(np.array([0.0, 0.0, 0.0, 1.0]), v)
+        R = rotation_matrix(q)
+        np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
+        angle = np.linalg.norm(v)
+        np.testing.assert_allclose(
+            R, np.eye(3) + np.sin(angle) / angle * skew(v)
+            + (1.0 - np.cos(angle)) / angle**2 * skew(v) @ skew(v), atol=1e-12)  # Rodrigues
+        np.testing.assert_allclose(rotation_matrix(turned(q, u)), R @ rotation_matrix(
+            turned(np.array([0.0, 0.0, 0.0, 1.0]), u)), atol=1e-12)
+    for small in (0.0, 1e-12, 1e-7):
+        np.testing.assert_allclose(
+            turned(q, np.full(3, small)), q, atol=2.0 * small + 1e-15)
+
+
+def test_a_body_at_rest_is_levelled_by_its_accelerometer() -> None:
+    for _ in range(10):
+        R = rotation_matrix(turned(np.array([0.0, 0.0, 0.0, 1.0]), RANDOM.normal(0.0, 0.6, 3)))
+        q = levelled(GRAVITY * R[2])
+        np.testing.assert_allclose(rotation_matrix(q)[2], R[2], atol=1e-12)
+        assert roll_pitch_yaw(q)[2] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_torques_tell_the_force_on_a_foot() -> None:
+    for leg in quadruped().legs:
+        kinematics = LegKinematics(leg)
+        q = np.array([0.1, 0.7, leg.knee_sign * 1.4])
+        J, force = kinematics.jacobian_in_base(q), np.array([3.0, -2.0, 25.0])
+        normal = np.array([0.0, 0.1, 0.995])
+        assert force_from_torque(J, -J.T @ force, normal) == pytest.approx(normal @ force)
+    assert force_from_torque(np.zeros((3, 3)), np.ones(3), normal) == 0.0
+
+
+def test_a_rolling_foot_measures_the_whole_speed() -> None:
+    """The centre of a foot of radius rho under a shank that turns at s moves at rho s."""
+    robot = quadruped()
+    odometry, leg = LegOdometry(robot), LegKinematics(robot.legs[0])
+    q, radius = np.array([0.0, 0.8, -1.5]), robot.legs[0].foot_radius
+    v = np.array([0.7, 0.0, 0.0])  # of the base; the ground is level and so is the base
+    pitching = np.array([0.0, *robot.legs[0].axis_sign[1:]])
+    # J q' = -v + s x rho n with s = pitching . q' about y, so that s x rho n = (rho s, 0, 0).
+    rolling = np.outer((radius, 0.0, 0.0), pitching)
+    q_dot = np.linalg.solve(leg.jacobian_in_base(q) - rolling, -v)
+    motion = odometry.motion(np.tile(q, 4), np.tile(q_dot, 4), np.array([0.0, 0.0, 1.0]))
+    np.testing.assert_allclose(motion.velocity_in_base[0], v, atol=1e-12)
+    np.testing.assert_allclose(
+        motion.contact_in_base[0], leg.foot_in_base(q) - (0.0, 0.0, radius), atol=1e-12)
+    assert abs((leg.jacobian_in_base(q) @ q_dot)[0]) < 0.97 * 0.7  # what rolling leaves out
+
+
+def test_a_plane_is_fitted_through_footholds() -> None:
+    points = np.array([[0.2, 0.1, 0.0], [0.2, -0.1, 0.0], [-0.2, 0.1, 0.0], [-0.2, -0.1, 0.0]])
+    for slope in ((0.1, 0.0), (0.0, -0.2), (-0.15, 0.15)):
+        tilted = points + np.array([3.0, -5.0, 2.0])
+        tilted[:, 2] += points[:, :2] @ slope
+        # Ridge regression falls short by the ratio of NARROWEST to the points' spread.
+        np.testing.assert_allclose(fitted_slope(tilted), slope, rtol=0.03, atol=1e-12)
+        normal = normal_in_world(np.array(slope))
+        assert normal @ normal == pytest.approx(1.0)
+        np.testing.assert_allclose(np.diff(tilted, axis=0) @ normal, 0.0, atol=1e-12)
+
+
+def test_impossible_planes_stay_bounded() -> None:
+    cliff = np.array([[0.2, 0.1, 5.0], [0.2, -0.1, 5.0], [-0.2, 0.1, 0.0], [-0.2, -0.1, 0.0]])
+    assert np.linalg.norm(fitted_slope(cliff)) == pytest.approx(STEEPEST)
+    assert np.array_equal(fitted_slope(np.ones((4, 3))), np.zeros(2))
+    line = np.array([[i * 0.1, 0.0, 0.0] for i in range(4)])
+    assert np.isfinite(fitted_slope(line)).all()
+
+
