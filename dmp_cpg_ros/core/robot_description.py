@@ -38,7 +38,8 @@ class LegGeometry:
     rotor_inertia : ndarray (3,)
         Reflected rotor inertia at the joint [kg m^2] (the paper's J).
     foot_radius : float
-        Radius of the contact sphere [m].
+        Distance from the centre of the contact sphere to where it touches the ground while the
+        robot stands: its radius, less what soft feet give way [m].
     """
 
     name: str

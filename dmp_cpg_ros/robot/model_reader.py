@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.robot.foot_load import rolling_radius
 from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.leg_reader import (
     Foot,
@@ -135,7 +136,10 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
         belly_depth=_belly_depth(model, ids.base))
     standing = pose(model, ids, home_joint_position(description))
     com, inertia = _composite_inertia(model, standing, ids.base)
-    return replace(description, base_inertia=inertia, com_in_base=com)
+    radius = rolling_radius(model, standing, int(model.jnt_qposadr[ids.free_joint]), ids.feet)
+    if radius is not None:
+        legs = tuple(replace(leg, foot_radius=radius) for leg in legs)
+    return replace(description, legs=legs, base_inertia=inertia, com_in_base=com)
 
 
 def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, index: int,

@@ -79,7 +79,10 @@ class MujocoRobot:
             robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
         self.world = world = world or World()
         self.model = model = load_model(robot_file.model, robot_file.base, world)
-        self.description: RobotDescription = read_description(model, robot_file)
+        # what the controllers know of the robot does not depend on the world, not in the last bit
+        self.description: RobotDescription = read_description(
+            model if world == World() else load_model(robot_file.model, robot_file.base),
+            robot_file)
         self.tick_ns = tick_ns
         self._step_ns = round(model.opt.timestep * 1e9)
         self._steps = steps_per_tick(tick_ns, self._step_ns)
