@@ -276,3 +276,27 @@ def test_a_given_clamp_is_kept_and_told_apart_from_one_that_fits(changes: dict[s
 def test_impossible_rules_are_refused(name: str, value: object) -> None:
     with pytest.raises(ParameterError, match=name):
         InhibitionParameters(**{name: value})  # type: ignore[arg-type]
+
+
+def test_the_clamp_follows_the_cadence_and_settles_where_it_stays() -> None:
+    counting, slow = voting(), network('amble').gait
+    x, state = counting.network.locked_state(), None
+    before = counting.clamp.limit
+    for k, factor in enumerate((1.0, 1.05, 1.1, 1.1, 1.1)):
+        counting.network = network('amble').with_cadence_of(slow.scaled(factor))
+        reading = vote_sensors(replace(STANDING, time_ns=k * TICK_NS))
+        state = counting.step(state, k * TICK_NS, reading, x, R, False,
+                              (('user', (9.0, 9.0, 9.0, NAN)),))
+        assert state.ballot.weights[0] == pytest.approx(factor * before, rel=0.02)
+        assert state.ballot.stops
+    fresh = Voting(counting.inhibition, SOURCES, counting.network, ReferenceParameters(), 90.0)
+    assert counting.clamp == fresh.clamp
+    assert state.ballot.weights[0] == fresh.clamp.limit
+
+
+def test_changed_parameters_act_from_the_next_step_on() -> None:
+    counting = voting()
+    x, votes = counting.network.locked_state(), (('user', (9.0, NAN, NAN, NAN)),)
+    counting.follow(replace(counting.inhibition, vote_limit=0.05), ReferenceParameters(), SOURCES)
+    state = counting.step(None, 0, vote_sensors(STANDING), x, R, False, votes)
+    assert state.ballot.weights[0] == 0.05

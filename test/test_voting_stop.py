@@ -13,6 +13,7 @@ from test_core_supervisor import Run, walking
 
 from dmp_cpg_ros.core.certificate import Certificate, certify
 from dmp_cpg_ros.core.certificate_range import operating_range
+from dmp_cpg_ros.core.certificate_suggest import suggest_gains
 from dmp_cpg_ros.core.certificate_votes import vote_bound, votes_needed
 from dmp_cpg_ros.core.gait_network import CanonicalParameters
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
@@ -206,6 +207,16 @@ def test_as_many_votes_are_needed_as_are_wanted(majority: int) -> None:
     gait, p = network(), voters(vote_majority=majority)
     needed = votes_needed(gait, p, operating_range(gait, p, SuiteParameters().reference))
     assert needed.certain == majority and needed.powerless == majority - 1
+
+
+def test_gains_are_suggested_with_which_votes_are_certified_too() -> None:
+    p = SuiteParameters()
+    running = (network('pronk', coupling_gain=5.0), voters(inhibited_legs=LEGS[:3]), p.reference,
+               p.leg, p.posture, TICK)
+    assert [entry.name for entry in certify(*running).failing] == ['votes_needed']
+    found = suggest_gains(*running)
+    assert found is not None and found.changed and found.certificate['votes_needed'].holds
+    assert suggest_gains(network(coupling_graph='path'), *running[1:]) is None
 
 
 def test_nobody_is_certain_to_stop_legs_that_are_not_coupled_enough() -> None:

@@ -59,12 +59,13 @@ def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
         The present gains when they hold; None when an inequality fails that gains cannot mend, or
         no gains within the parameters' ranges are enough.
     """
-    def at(k: float, k_inh: float) -> Certificate:
-        return certify(_with_coupling(network, k), replace(inhibition, inhibition_gain=k_inh),
+    def at(k: float, k_inh: float, voting: bool = False) -> Certificate:
+        return certify(_with_coupling(network, k),
+                       replace(inhibition, inhibition_gain=k_inh, voting=voting),
                        reference, leg, posture, tick_s)
 
     k0, k_inh0 = network.parameters.coupling_gain, inhibition.inhibition_gain
-    present = at(k0, k_inh0)
+    present = at(k0, k_inh0, inhibition.voting)
     if present.holds:
         return Suggestion(k0, k_inh0, present, False)
     k = k0
@@ -73,7 +74,10 @@ def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
         while k_inh <= _LARGEST_INHIBITION:
             found = at(k, k_inh)
             if found.holds and (k == k0 or _has_margin(found)):
-                return Suggestion(k, k_inh, found, True)
+                found = at(k, k_inh, True) if inhibition.voting else found
+                if found.holds:
+                    return Suggestion(k, k_inh, found, True)
+                break  # the votes of some legs may still need stronger couplings
             if any(entry.name not in GAIN_ROWS for entry in found.failing):
                 return None
             k_inh = _next_inhibition(found, k_inh)

@@ -46,12 +46,11 @@ class VoteCounter:
             inhibition, sources, network, reference, mass * GRAVITY)
         self._state: VotingState | None = None
 
-    def follow(self, inhibition: InhibitionParameters, network: GaitNetwork,
-               reference: ReferenceParameters, sources: VoteSourceParameters | None = None
-               ) -> None:
+    def follow(self, inhibition: InhibitionParameters, reference: ReferenceParameters,
+               sources: VoteSourceParameters) -> None:
         """Take over parameters that have changed; whether there is voting never does."""
         if self.voting is not None:
-            self.voting.follow(inhibition, network, reference, sources or self.voting.sources)
+            self.voting.follow(inhibition, reference, sources)
 
     def count(self, time_ns: int, sensors: VoteSensors, network: GaitNetwork, x: Array, r: Array,
               word: str) -> Ballot:

@@ -84,9 +84,11 @@ class Voting:
                  network: GaitNetwork, reference: ReferenceParameters, weight: float) -> None:
         """Compute the clamp."""
         self.inhibition, self.sources, self.network = inhibition, sources, network
-        self._weight = weight
-        self._rules = (inhibition, network.parameters, reference)
-        self.clamp: VoteClamp = _clamp(inhibition, network, reference)
+        self.reference, self._weight = reference, weight
+        self._omega = self._clamped_omega = float('nan')
+        self._rules: tuple[object, ...] = ()
+        self.clamp: VoteClamp
+        self._limit()
 
     def initial_state(self, time_ns: int = 0) -> VotingState:
         """Nobody has voted; sensors have their time from here on."""
@@ -139,16 +141,28 @@ class Voting:
             memory = memory.heard(voter, weights, time_ns)
         fade_ns = round(self.inhibition.vote_fade * 1e9)
         memory = memory.alive(time_ns, fade_ns) if memory.asks else memory
-        ballot = self._count(state.ballot, memory, time_ns, fade_ns)
+        ballot = self._count(state.ballot, memory, time_ns, fade_ns, self._limit())
         return VotingState(time_ns, memory, contact, last_good, up, ballot)
 
-    def follow(self, inhibition: InhibitionParameters, network: GaitNetwork,
-               reference: ReferenceParameters, sources: VoteSourceParameters) -> None:
-        """Take over parameters that have changed; what the clamp depends on costs a clamp."""
-        self.sources, rules = sources, (inhibition, network.parameters, reference)
-        if rules != self._rules:
-            self.inhibition, self._rules = inhibition, rules
-            self.clamp = _clamp(inhibition, network, reference)
+    def follow(self, inhibition: InhibitionParameters, reference: ReferenceParameters,
+               sources: VoteSourceParameters) -> None:
+        """Take over parameters that have changed; they act from the next step on."""
+        self.inhibition, self.reference, self.sources = inhibition, reference, sources
+
+    def _limit(self) -> float:
+        """Clamp of the weights for the oscillators that act.
+
+        It is computed anew for new parameters and for a gait that has come to stay; in between it
+        follows the cadence, as the threshold of stiff couplings does.
+        """
+        omega = self.network.omega(np.zeros(3))
+        stays, self._omega = omega == self._omega, omega
+        rules = (self.inhibition, self.network.parameters, self.reference)
+        if rules != self._rules or (stays and omega != self._clamped_omega):
+            self._rules, self._clamped_omega = rules, omega
+            self.clamp = vote_clamp(self.network, self.inhibition, operating_range(
+                self.network, self.inhibition, self.reference))
+        return self.clamp.limit * (omega / self._clamped_omega)
 
     def _contact(self, contact: ContactState, time_ns: int, sensors: VoteSensors, x: Array,
                  r: Array, walking: bool
@@ -161,12 +175,13 @@ class Voting:
             contact, self.sources, time_ns, walking, network.gait.cycle_position(phase(x)),
             network.gait.duty(speed, network.scale), network.omega(r), load)
 
-    def _count(self, before: Ballot, memory: VoteMemory, time_ns: int, fade_ns: int) -> Ballot:
+    def _count(self, before: Ballot, memory: VoteMemory, time_ns: int, fade_ns: int,
+               limit: float) -> Ballot:
         """Count; the threshold is computed only when a weight has changed."""
         if not memory.asks:
             return NO_VOTES
         p = self.inhibition
-        weights = np.minimum(memory.weights(time_ns, fade_ns), self.clamp.limit)
+        weights = np.minimum(memory.weights(time_ns, fade_ns), limit)
         causes = memory.causes(time_ns, fade_ns)
         if np.array_equal(weights, before.weights):
             return before if causes == before.causes else replace(before, causes=causes)
@@ -174,8 +189,3 @@ class Voting:
         omega = self.network.omega(np.zeros(3))
         stops = holds_at_rest(self.network.system, omega, gains, p.region_radius)
         return Ballot(weights, gains, stops, causes)
-
-
-def _clamp(inhibition: InhibitionParameters, network: GaitNetwork,
-           reference: ReferenceParameters) -> VoteClamp:
-    return vote_clamp(network, inhibition, operating_range(network, inhibition, reference))

@@ -178,7 +178,7 @@ class WalkingLoop:
             self._running.change(p.canonical)
             self.gate.parameters = self.reference.parameters = p.reference
             self.supervisor.parameters = p.inhibition
-            self.votes.follow(p.inhibition, self._running.network, p.reference, p.votes)
+            self.votes.follow(p.inhibition, p.reference, p.votes)
         return verdict.reason
 
     def vote(self, weights: Mapping[str, float], voter: str = '') -> None:

@@ -120,9 +120,8 @@ class InhibitionNode(CertifiedNode):
         self._gate.parameters = self.parameters_of(ReferenceParameters)
         self._reference.parameters = self.parameters_of(ReferenceParameters)
         acting = self._supervisor.network.gait
-        network = self.new_network()
-        self._supervisor.network = network.with_cadence_of(acting)
-        self._votes.follow(network)
+        self._supervisor.network = self.new_network().with_cadence_of(acting)
+        self._votes.follow()
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the state of the stop to the stamp of the canonical state."""

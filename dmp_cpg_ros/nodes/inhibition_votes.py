@@ -73,10 +73,10 @@ class NodeVotes:
         node.listen(IMU, imu)
         node.listen('votes', lambda message: box.accept(*read_votes(message)), command=True)
 
-    def follow(self, network: GaitNetwork) -> None:
+    def follow(self) -> None:
         """Take over changed parameters."""
         of = self._node.parameters_of
-        self.counter.follow(of(InhibitionParameters), network, of(ReferenceParameters),
+        self.counter.follow(of(InhibitionParameters), of(ReferenceParameters),
                             of(VoteSourceParameters))
 
     def count(self, stamp_ns: int, values: dict[str, Any], network: GaitNetwork,
