@@ -176,6 +176,9 @@ def _robot_messages(recording: Recording) -> Iterator[tuple[int, str, str, Any]]
         )
     for row, time in enumerate(odometry.time):
         yield _ns(time), 'odom', 'nav_msgs/msg/Odometry', _odometry(odometry, row, time)
+    for row, time in enumerate(recording.estimate.time):
+        message = _odometry(recording.estimate, row, time)
+        yield _ns(time), 'estimated_odom', 'nav_msgs/msg/Odometry', message
 
 
 def _odometry(odometry: Any, row: int, time: float) -> Any:

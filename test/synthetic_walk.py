@@ -80,6 +80,17 @@ def amble(duty_factor: float = 0.7) -> Gait:
     )
 
 
+BELIEVED: dict[str, float | tuple[float, ...]] = {
+    'velocity': (0.01, -0.02, 0.03),
+    'pitch': 0.01,
+    'yaw_rate': 0.002,
+    'position_share': 0.05,
+    'start': (3.0, 2.0, 0.0),
+}
+"""How the estimate differs from the truth: constant error of velocity [m/s] and pitch [rad], yaw
+error that grows [rad/s], a way that is too long, from another place [m]."""
+
+
 @dataclass(frozen=True)
 class SyntheticWalk:
     """What is prescribed; a test asks the metrics for the same numbers."""
@@ -200,11 +211,27 @@ class SyntheticWalk:
             reference=VelocitySeries(t, reference),
             commands=self.commands(),
             odometry=OdometrySeries(t, position, quaternion, velocity, rate),
+            estimate=self._estimate(position, yaw, velocity, rate),
             imu=ImuSeries(t, quaternion, rate, gravity),
             feet=FootForceSeries(t, force),
             posture=PostureSeries(t, 0.1 * effort, np.zeros((len(t), 4, 2))),
             inhibition=self.events(),
             statuses=self.statuses(),
+        )
+
+    def _estimate(
+        self, position: Array, yaw: Array, velocity: Array, rate: Array
+    ) -> OdometrySeries:
+        """What the robot believes: at every fifth stamp, wrong by what ``BELIEVED`` says."""
+        t, few = self.time, slice(None, None, 5)
+        wrong = yaw + BELIEVED['yaw_rate'] * t
+        pitch = np.full(len(t), BELIEVED['pitch'])
+        sy, cy, sp, cp = np.sin(wrong / 2), np.cos(wrong / 2), np.sin(pitch / 2), np.cos(pitch / 2)
+        quaternion = np.column_stack([-sy * sp, cy * sp, sy * cp, cy * cp])
+        position = position * (1.0 + BELIEVED['position_share']) + BELIEVED['start']
+        velocity = velocity + BELIEVED['velocity']
+        return OdometrySeries(
+            t[few], position[few], quaternion[few], velocity[few], rate[few]
         )
 
     def _joint_angles(self, position: Array, yaw: Array) -> Array:

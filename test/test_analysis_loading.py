@@ -17,7 +17,8 @@ from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.recording import JointSeries, Recording, StatusEvent
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 
-SERIES = ('joints', 'targets', 'canonical', 'reference', 'odometry', 'imu', 'feet', 'posture')
+SERIES = ('joints', 'targets', 'canonical', 'reference', 'odometry', 'estimate', 'imu', 'feet',
+          'posture')
 
 
 @pytest.fixture(scope='module')

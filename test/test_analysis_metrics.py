@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic_walk import MASS, SyntheticWalk, robot
+from synthetic_walk import BELIEVED, MASS, SyntheticWalk, robot
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.foot_motion import feet_in_base, foot_slip, shank_rate_in_base
@@ -38,7 +38,7 @@ def plain_metrics() -> dict[str, Any]:
 
 def test_an_empty_recording_has_no_numbers() -> None:
     metrics = compute_metrics(Recording(), RunContext(robot()))
-    flat = {**metrics['robot'], **metrics['gait'], **metrics['timing']}
+    flat = {**metrics['robot'], **metrics['gait'], **metrics['timing'], **metrics['estimation']}
     assert all(value is None for value in flat.values())
     assert metrics['stop'] | {'all': 0} == {
         'predicted_s': None,
@@ -328,3 +328,26 @@ def test_numbers_that_are_not_finite_are_null_in_json() -> None:
         'd': np.bool_(True),
     }
     assert json.loads(to_json(value)) == {'a': None, 'b': [None, 1.5], 'c': [0, 1], 'd': True}
+
+
+def test_the_errors_of_the_estimate_are_those_that_were_put_in() -> None:
+    walk = SyntheticWalk()
+    recording = walk.recording()
+    height = float(recording.odometry.position_in_world[0, 2]) + 0.004
+    told = tuple(StatusEvent(time, 0, 'active', {'estimated_height_m': repr(height)})
+                 for time in (1.0, 2.0, 3.0))
+    found = metrics_of(walk, statuses={'posture_control': told})['estimation']
+    for name, wrong in zip('xyz', BELIEVED['velocity'], strict=True):
+        assert found[f'v_{name}_rmse'] == pytest.approx(abs(wrong))
+    assert found['roll_rmse_deg'] == pytest.approx(0.0, abs=1e-6)
+    assert found['pitch_rmse_deg'] == pytest.approx(np.rad2deg(BELIEVED['pitch']))
+    time = recording.estimate.time
+    drift = np.rad2deg(BELIEVED['yaw_rate'] * (time[-1] - time[0]))
+    assert found['yaw_error_deg'] == pytest.approx(drift, rel=1e-6)
+    way = recording.odometry.position_in_world[::5, :2]
+    walked = np.hypot(*np.diff(way, axis=0).T).sum()
+    assert found['yaw_error_deg_per_10m'] == pytest.approx(drift * 10.0 / walked, rel=1e-6)
+    straight = np.hypot(*(way[-1] - way[0]))
+    share = BELIEVED['position_share'] * straight / walked
+    assert found['position_error_share'] == pytest.approx(share, rel=1e-6)
+    assert found['height_rmse_m'] == pytest.approx(0.004, rel=1e-6)

@@ -51,7 +51,8 @@ class Collector:
         """Start empty."""
         self._named = {topic: NamedValues() for topic in JOINT_TOPICS}
         self._rows: dict[str, Rows] = {
-            topic: ([], []) for topic in ('reference', 'cmd_vel', 'odom', 'imu')
+            topic: ([], [])
+            for topic in ('reference', 'cmd_vel', 'odom', 'estimated_odom', 'imu')
         }
         self._unstamped_commands: Rows = ([], [])
         self._clock: tuple[list[int], list[int]] = ([], [])  # bag time, robot's clock [ns]
@@ -70,7 +71,10 @@ class Collector:
             ('reference', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('reference'),
             ('cmd_vel', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('cmd_vel'),
             ('cmd_vel', 'geometry_msgs/msg/Twist'): self._take_unstamped_twist,
-            ('odom', 'nav_msgs/msg/Odometry'): self._take_odometry,
+            **{
+                (name, 'nav_msgs/msg/Odometry'): self._taker_of_odometry(name)
+                for name in ('odom', 'estimated_odom')
+            },
             ('imu', 'sensor_msgs/msg/Imu'): self._take_imu,
             ('clock', 'rosgraph_msgs/msg/Clock'): self._take_clock,
             ('inhibition_state', 'diagnostic_msgs/msg/DiagnosticArray'): self._take_inhibition,
@@ -96,7 +100,6 @@ class Collector:
             [f'{leg}_x{k}' for leg in LEGS for k in (1, 2)]
         )
         x, x_dot = (canonical[name].reshape(-1, len(LEGS), 2) for name in ('position', 'velocity'))
-        odometry = stacked(self._rows['odom'], 13)
         imu = stacked(self._rows['imu'], 10)
         return Recording(
             joints=self._joints('joint_states'),
@@ -104,7 +107,8 @@ class Collector:
             canonical=CanonicalSeries(time, x, x_dot),
             reference=VelocitySeries(*stacked(self._rows['reference'], 3)),
             commands=self._commands(),
-            odometry=OdometrySeries(odometry[0], *np.split(odometry[1], (3, 7, 10), axis=1)),
+            odometry=self._odometry('odom'),
+            estimate=self._odometry('estimated_odom'),
             imu=ImuSeries(imu[0], *np.split(imu[1], (4, 7), axis=1)),
             feet=self._feet(),
             posture=self._posture(),
@@ -118,6 +122,10 @@ class Collector:
     def _joints(self, topic: str) -> JointSeries:
         time, values = self._named[topic].table(JOINT_NAMES)
         return JointSeries(time, values['position'], values['velocity'], values['effort'])
+
+    def _odometry(self, topic: str) -> OdometrySeries:
+        time, rows = stacked(self._rows[topic], 13)
+        return OdometrySeries(time, *np.split(rows, (3, 7, 10), axis=1))
 
     def _feet(self) -> FootForceSeries:
         time, values = self._named['foot_contacts'].table(LEGS)
@@ -172,19 +180,13 @@ class Collector:
         self._unstamped_commands[0].append(bag_ns)
         self._unstamped_commands[1].append(twist(message))
 
-    def _take_odometry(self, _: int, message: Any) -> None:
-        pose, twist = message.pose.pose, message.twist.twist
-        self._row(
-            'odom',
-            message,
-            [
-                *xyz(pose.position),
-                *xyz(pose.orientation),
-                pose.orientation.w,
-                *xyz(twist.linear),
-                *xyz(twist.angular),
-            ],
-        )
+    def _taker_of_odometry(self, topic: str) -> Callable[[int, Any], None]:
+        def handle(_: int, message: Any) -> None:
+            pose, twist = message.pose.pose, message.twist.twist
+            row = [*xyz(pose.position), *xyz(pose.orientation), pose.orientation.w]
+            self._row(topic, message, [*row, *xyz(twist.linear), *xyz(twist.angular)])
+
+        return handle
 
     def _take_imu(self, _: int, message: Any) -> None:
         self._row(

@@ -220,8 +220,8 @@ class Recording:
         Oscillators.
     reference, commands : VelocitySeries
         The filtered reference and the commands as sent.
-    odometry : OdometrySeries
-        Body motion.
+    odometry, estimate : OdometrySeries
+        Body motion, and what the robot believes of it.
     imu : ImuSeries
         Inertial measurements.
     feet : FootForceSeries
@@ -246,6 +246,7 @@ class Recording:
     reference: VelocitySeries = field(default_factory=VelocitySeries)
     commands: VelocitySeries = field(default_factory=VelocitySeries)
     odometry: OdometrySeries = field(default_factory=OdometrySeries)
+    estimate: OdometrySeries = field(default_factory=OdometrySeries)
     imu: ImuSeries = field(default_factory=ImuSeries)
     feet: FootForceSeries = field(default_factory=FootForceSeries)
     posture: PostureSeries = field(default_factory=PostureSeries)

@@ -15,6 +15,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import (
     attitude,
     canonical_states,
+    estimation,
     footfall,
     path,
     phase_portrait,
@@ -57,6 +58,7 @@ CATALOGUE: tuple[FigureEntry, ...] = tuple(
         (path, 'Path'),
         (speed_tracking, 'Speed tracking'),
         (attitude, 'Body attitude'),
+        (estimation, 'Estimate of the body'),
         (torques, 'Joint torques'),
         (timing, 'Timing'),
     )

@@ -40,6 +40,26 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
         '',
         'largest relative error of mean forward speed among stretches of constant reference',
     ),
+    'estimation.v_x_rmse': (
+        'm/s',
+        "root mean square of estimated minus true forward velocity of the base, at the estimate's "
+        'stamps',
+    ),
+    'estimation.v_y_rmse': ('m/s', 'the same to the left'),
+    'estimation.v_z_rmse': ('m/s', 'the same upwards'),
+    'estimation.roll_rmse_deg': ('°', 'the same of the roll angle'),
+    'estimation.pitch_rmse_deg': ('°', 'the same of the pitch angle'),
+    'estimation.yaw_error_deg': ('°', 'error of the estimated yaw gained over the run'),
+    'estimation.yaw_error_deg_per_10m': ('°/10 m', 'its size per distance walked'),
+    'estimation.position_error_share': (
+        'm/m',
+        'horizontal error of the estimated way over the run, per distance walked',
+    ),
+    'estimation.z_error_share': ('m/m', 'its vertical error, per distance walked'),
+    'estimation.height_rmse_m': (
+        'm',
+        'root mean square of estimated minus true height over the ground, once per second',
+    ),
     'gait.name': ('', 'gait that was walked'),
     'gait.phase_error_rad_max': (
         'rad',

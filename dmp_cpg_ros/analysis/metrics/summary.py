@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.metrics.estimation import estimation_metrics
 from dmp_cpg_ros.analysis.metrics.gait import gait_metrics
 from dmp_cpg_ros.analysis.metrics.robot import robot_metrics
 from dmp_cpg_ros.analysis.metrics.stops import start_metrics, stop_metrics
@@ -41,6 +42,7 @@ def compute_metrics(
     return {
         'robot': robot_metrics(recording, context),
         'tracking': tracking_metrics(recording),
+        'estimation': estimation_metrics(recording, context),
         'gait': gait_metrics(recording, context),
         'stop': stop_metrics(recording, context),
         'start': start_metrics(recording),
