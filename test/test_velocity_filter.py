@@ -97,6 +97,17 @@ def test_standing_still_makes_the_reading_the_bias() -> None:
     np.testing.assert_allclose(after.gyro_bias, 0.5 * (state.gyro_bias + rate))
     assert np.array_equal(after.velocity_in_base, state.velocity_in_base)
     assert after.covariance.diagonal()[6:9] == pytest.approx(np.full(3, 0.005))
+    state = some_state()
+    after = settle(state, rate, 0.1)
+    assert np.array_equal(after.quaternion, state.quaternion)
+    assert np.linalg.eigvalsh(after.covariance).min() > -1e-12
+    # The bias is corrected as the full filter would correct it.
+    bias = np.arange(6, 9)
+    P = state.covariance[np.ix_(bias, bias)]
+    K = P @ np.linalg.inv(P + 0.01 * np.eye(3))
+    np.testing.assert_allclose(after.gyro_bias, state.gyro_bias + K @ (rate - state.gyro_bias))
+    np.testing.assert_allclose(after.covariance[np.ix_(bias, bias)], (np.eye(3) - K) @ P,
+                               atol=1e-12)
 
 
 def test_a_foot_that_disagrees_weighs_less() -> None:

@@ -61,6 +61,9 @@ UNTRUSTED_SHARE = 0.2
 STILL_JOINT, STILL_TURN = 0.15, 0.03
 """Velocities of joints and body below which a robot on all four feet stands still [rad/s]."""
 
+STILL_TIME = 0.3
+"""Time after which a robot that seems to stand still does so [s]; it sways out before."""
+
 STILL_DEVIATION = 0.01
 """By which such a body turns all the same [rad/s]."""
 
@@ -84,6 +87,8 @@ class EstimatorState:
         Last usable reading of the gyroscope [rad/s].
     blind : float
         Time since the IMU could be used [s].
+    still : float
+        Time for which the robot has stood still [s].
     """
 
     filter: FilterState
@@ -91,6 +96,7 @@ class EstimatorState:
     estimate: BodyEstimate
     rate: Array
     blind: float
+    still: float
 
 
 class BodyEstimator:
@@ -156,15 +162,18 @@ class BodyEstimator:
                 trust[stands],
                 noise,
             )
-        if seeing and stands.all() and _is_still(readings, state):
+        rests = seeing and bool(stands.all()) and _is_still(readings, state)
+        still = memory.still + dt if rests else 0.0
+        if still > STILL_TIME:
             state = settle(state, rate, STILL_DEVIATION)
         problems = _problems(legs, contacts, seeing)
         if not np.isfinite(state.covariance.sum() + state.velocity_in_base.sum()):
             problems = (*problems, 'filter')
             state = memory.filter
-        return self._finished(
-            memory, state, readings.time_ns, rate, blind, motion, trust, problems
+        terrain, estimate = self._finished(
+            memory, state, readings.time_ns, rate, motion, trust, problems
         )
+        return EstimatorState(state, terrain, estimate, rate, blind, still), estimate
 
     def _begin(self, readings: SensorReadings) -> tuple[EstimatorState, BodyEstimate]:
         """Start at rest: the accelerometer tells the vertical, the feet the ground."""
@@ -195,7 +204,8 @@ class BodyEstimator:
             _problems(legs, contacts, seeing),
         )
         terrain = initial_terrain(contact) if legs.all() else flat
-        return EstimatorState(state, terrain, estimate, estimate.rate_in_base, 0.0), estimate
+        rate = estimate.rate_in_base
+        return EstimatorState(state, terrain, estimate, rate, 0.0, 0.0), estimate
 
     def _guessed(
         self,
@@ -265,11 +275,10 @@ class BodyEstimator:
         state: FilterState,
         time_ns: int,
         rate: Array,
-        blind: float,
         motion: FootMotion,
         trust: Array,
         problems: tuple[str, ...],
-    ) -> tuple[EstimatorState, BodyEstimate]:
+    ) -> tuple[TerrainState, BodyEstimate]:
         """Integrate the position, follow the ground, and put the estimate together."""
         last = memory.estimate
         dt = (time_ns - last.time_ns) * 1e-9
@@ -298,7 +307,7 @@ class BodyEstimator:
             state.covariance.diagonal()[3:6],
             problems,
         )
-        return EstimatorState(state, terrain, estimate, rate, blind), estimate
+        return terrain, estimate
 
 
 def _is_still(readings: SensorReadings, state: FilterState) -> bool:

@@ -208,14 +208,17 @@ def update(
 
 
 def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
-    """Correct by the knowledge that the body does not turn: what the gyroscope reads is its bias.
+    """Correct the gyroscope's bias by the knowledge that the body does not turn.
+
+    Nothing else is corrected (Schmidt's consider filter): what yaw should have been all the while
+    that the bias was not known is not to be guessed from how a robot sways that has just stopped.
 
     Parameters
     ----------
     state : FilterState
         State of a robot that stands still.
     rate : ndarray (3,)
-        ω̃ [rad/s].
+        ω̃, which is the bias then [rad/s].
     deviation : float
         Of the turn rate of a robot that stands still [rad/s].
 
@@ -223,11 +226,17 @@ def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
     -------
     FilterState
     """
-    HP = state.covariance[GYRO_BIAS]
-    S = HP[:, GYRO_BIAS].copy()
+    P = state.covariance.copy()
+    S = P[GYRO_BIAS, GYRO_BIAS].copy()
     S.ravel()[::4] += deviation * deviation
-    gain = np.linalg.solve(S, HP)
-    return _corrected(state, (rate - state.gyro_bias) @ gain, state.covariance - HP.T @ gain)
+    left = np.eye(3) - np.linalg.solve(S, P[GYRO_BIAS, GYRO_BIAS]).T  # I − K
+    after = left @ P[GYRO_BIAS]
+    P[GYRO_BIAS] = after
+    P[:, GYRO_BIAS] = after.T
+    bias = rate - left @ (rate - state.gyro_bias)
+    return FilterState(
+        state.quaternion, state.velocity_in_base, bias, state.accelerometer_bias, 0.5 * (P + P.T)
+    )
 
 
 def _corrected(state: FilterState, error: Array, covariance: Array) -> FilterState:
