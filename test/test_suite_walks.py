@@ -42,6 +42,17 @@ events:
   - {at: 4.4, inhibit: false}
 """
 
+ON_BLOCKS = """\
+name: blocks
+duration: 3.0
+events:
+  - {at: 0.1, inhibit: false}
+  - {at: 0.1, command: {v_x: 0.5}}
+"""
+
+WITH_CONTACTS = {'contact_feedback': True}
+"""All that listens to the feet."""
+
 RUN_S = 240.0
 """How long a run may take on a loaded machine before the test gives up [s]."""
 
@@ -76,10 +87,12 @@ def load_the_machine(until: Any) -> None:
         sum(range(10000))
 
 
-def plain_run(scenario_file: Path) -> tuple[list[RobotState], list[Any]]:
+def plain_run(scenario_file: Path, **values: Any) -> tuple[list[RobotState], list[Any]]:
     """Run the scenario on the plain loop; states and ticks."""
-    scenario, suite = load_scenario(scenario_file), load_suite()
-    robot = MujocoRobot(suite.robot_file, suite.tick_ns, sensors=suite.sensors)
+    scenario, suite = load_scenario(scenario_file), load_suite(None, values)
+    robot = MujocoRobot(
+        suite.robot_file, suite.tick_ns, world=suite.world, sensors=suite.sensors
+    )
     loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
     states, ticks = [robot.reset()], []
 
@@ -136,6 +149,30 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
     metrics = json.loads((first / 'metrics.json').read_text(encoding='utf-8'))
     assert metrics['robot']['fell'] is False
     assert metrics['stop']['measured_s'] == pytest.approx(metrics['stop']['predicted_s'], abs=1e-6)
+
+
+def test_contacts_reach_the_nodes_at_the_tick_at_which_they_are_measured(
+    processes: Processes, tmp_path: Path
+) -> None:
+    scenario = tmp_path / 'blocks.yaml'
+    scenario.write_text(ON_BLOCKS, encoding='utf-8')
+    world = {'world': 'blocks', 'world_height': 0.03}
+    values = {**world, **WITH_CONTACTS}
+    options = [f'{name}:={str(value).lower()}' for name, value in values.items()]
+    run = walked(
+        processes,
+        scenario,
+        tmp_path / 'run',
+        '--lock-step',
+        *(word for option in options for word in ('--set', option)),
+    )
+    recording, (_, ticks) = load_recording(run / 'bag'), plain_run(scenario, **values)
+    np.testing.assert_array_equal(recording.canonical.x_dot, [tick.x_dot for tick in ticks])
+    np.testing.assert_array_equal(
+        recording.targets.position, [tick.targets.position for tick in ticks]
+    )
+    _, without = plain_run(scenario, **world)
+    assert any(np.any(a.x_dot != b.x_dot) for a, b in zip(ticks, without, strict=True))
 
 
 def test_real_time_run_stops_and_starts(

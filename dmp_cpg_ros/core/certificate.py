@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.certificate_contact import contact_limits, later_stop, slowest_cadence
 from dmp_cpg_ros.core.certificate_hierarchy import hierarchy_inequalities
 from dmp_cpg_ros.core.certificate_inequality import Inequality
 from dmp_cpg_ros.core.certificate_network import analyse_network, network_inequalities
@@ -25,6 +26,7 @@ from dmp_cpg_ros.core.certificate_rest import rest_inequalities
 from dmp_cpg_ros.core.certificate_step import step_inequalities
 from dmp_cpg_ros.core.certificate_time import time_to_rest, time_to_walking
 from dmp_cpg_ros.core.certificate_votes import vote_inequalities
+from dmp_cpg_ros.core.contact_phase import ContactLimits
 from dmp_cpg_ros.core.contraction.finding import PROVED, weakest
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait_network import GaitNetwork
@@ -59,6 +61,8 @@ class Certificate:
         Phase by which each leg rests ahead of its place [rad]; empty without an equilibrium.
     rest_radius : tuple of float
         |x_i| of each leg at rest.
+    contact : ContactLimits or None
+        What contact feedback may do; None where it is off.
     """
 
     inequalities: tuple[Inequality, ...]
@@ -68,6 +72,7 @@ class Certificate:
     time_to_walking: float
     rest_phase: tuple[float, ...]
     rest_radius: tuple[float, ...]
+    contact: ContactLimits | None = None
 
     def __getitem__(self, name: str) -> Inequality:
         """Return the inequality of a name; raises ParameterError with the names that exist."""
@@ -159,13 +164,19 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     stop = time_to_rest(network, analysis.capture, analysis.rest, span, reference.alpha_r,
                         leg.activity_rate, inhibition.region_radius, tick_s)
     start = time_to_walking(network, found, analysis.rest, span, leg.activity_rate, tick_s)
+    contact = None
+    if p.contact_feedback:
+        contact, contact_row = contact_limits(p, analysis, span, start)
+        stop += later_stop(span, tick_s)
     network_rows = network_inequalities(network, inhibition, span, analysis)
     rows = [entry for entry in network_rows if entry.name != 'frequency_mismatch']
     rows += step_inequalities(p.rho, p.radius, span.omega[1], slowest, inhibition.region_radius,
                               tick_s)
-    rows += hierarchy_inequalities(reference, leg, posture, found, p.rho, p.radius, span.omega[0])
+    rows += hierarchy_inequalities(reference, leg, posture, found, p.rho, p.radius,
+                                   slowest_cadence(span, p))
     rows += rest_inequalities(network, leg, analysis.rest)
     rows += [entry for entry in network_rows if entry.name == 'frequency_mismatch']
+    rows += [contact_row] if p.contact_feedback else []
     rows += _time_inequalities(stop, start)
     rows += vote_inequalities(network, inhibition, span, reference.alpha_r, leg.activity_rate,
                               tick_s)
@@ -173,7 +184,7 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     return Certificate(
         tuple(rows), analysis.contraction.reach, span.omega[1], stop, start,
         () if rest is None else tuple(float(a) for a in rest.phase_ahead),
-        () if rest is None else tuple(float(a) for a in rest.radius))
+        () if rest is None else tuple(float(a) for a in rest.radius), contact)
 
 
 def _time_inequalities(stop: float, start: float) -> list[Inequality]:

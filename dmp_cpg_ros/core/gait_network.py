@@ -48,6 +48,28 @@ class CanonicalParameters(Parameters):
     cadence_scale: float = parameter(
         1.0, "factor on the gait's cadence at every speed", minimum=0.25, maximum=4.0
     )
+    contact_feedback: bool = parameter(
+        False, 'whether early and late touchdown shift the phase of the legs'
+    )
+    contact_gain: float = parameter(
+        20.0,
+        'frequency offset per phase by which a touchdown is early or late',
+        unit='1/s',
+        minimum=0.0,
+        maximum=1e3,
+    )
+    contact_hold: float = parameter(
+        0.5,
+        'largest share of the cadence by which late feet hold the phase back',
+        minimum=0.0,
+        maximum=0.9,
+    )
+    margin_share: float = parameter(
+        0.5,
+        'share of the margin for unequal leg frequencies that contact feedback may use',
+        minimum=0.0,
+        maximum=0.95,
+    )
 
 
 class GaitNetwork:
@@ -98,22 +120,32 @@ class GaitNetwork:
             self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2])), self.scale
         )
 
-    def step(self, x: Array, r: Array, inhibition: Inhibition, dt: float) -> Array:
+    def step(
+        self,
+        x: Array,
+        r: Array,
+        inhibition: Inhibition,
+        dt: float,
+        feedback: Array | float = 0.0,
+    ) -> Array:
         """Advance the states (4, 2) by dt [s] at reference r under an inhibition that is
         switched by region.
 
-        After a gap in the robot's states the time is made up in parts of at most ``LONGEST_STEP``.
+        Feedback, ndarray (4,), is added to the legs' ω [rad/s]. After a gap in the robot's states
+        the time is made up in parts of at most ``LONGEST_STEP``.
         """
         parts = max(1, ceil(dt / LONGEST_STEP - 1e-9))
         for _ in range(parts):
             gains = inhibition.acting_gains(x, self.system.target)
-            x = self.system.step(x, self.omega(r), gains, dt / parts)
+            x = self.system.step(x, self.omega(r) + feedback, gains, dt / parts)
         return x
 
-    def rate(self, x: Array, r: Array, inhibition: Inhibition) -> Array:
-        """Rate of the states, ẋ (4, 2) [1/s]."""
+    def rate(
+        self, x: Array, r: Array, inhibition: Inhibition, feedback: Array | float = 0.0
+    ) -> Array:
+        """Rate of the states, ẋ (4, 2) [1/s], with feedback as in :meth:`step`."""
         gains = inhibition.acting_gains(x, self.system.target)
-        return self.system.field(x, self.omega(r), gains)
+        return self.system.field(x, self.omega(r) + feedback, gains)
 
     def locked_state(self, phi: float = 0.0) -> Array:
         """States (4, 2) on the limit cycle with fl at phase φ [rad] and all legs in their

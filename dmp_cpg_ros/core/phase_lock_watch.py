@@ -76,7 +76,7 @@ class PhaseLockWatch:
         self._found: Synchronisation | None = None
 
     def step(self, before: PhaseLock | None, network: GaitNetwork, r: Array, x: Array, free: bool,
-             dt: float) -> PhaseLock:
+             dt: float, contact: float = 0.0) -> PhaseLock:
         """Look at the state after a tick.
 
         Parameters
@@ -93,6 +93,8 @@ class PhaseLockWatch:
             Whether no inhibition acted.
         dt : float
             Time since the tick before [s].
+        contact : float
+            How unequal contact feedback may make the legs' frequencies [rad/s].
 
         Returns
         -------
@@ -109,7 +111,7 @@ class PhaseLockWatch:
         if before is None or not free:
             return PhaseLock(error, pi, LOCKED, epsilon, places)
         size = max(network.parameters.radius, float(np.abs(z).max()))
-        steady = EXPECTED_MISMATCH * network.omega(r) * size / found.rate
+        steady = (EXPECTED_MISMATCH * network.omega(r) + contact) * size / found.rate
         moved = np.abs(_centred(places - before.places)).max() * size
         fade = exp(-found.rate * dt)
         envelope = max(steady, before.envelope * fade + (1.0 - fade) * steady) + moved

@@ -115,6 +115,9 @@ class RobotParameters(Parameters):
         'whether joints follow targets or receive torques only',
         choices=('kinematic', 'torque'),
     )
+    contact_feedback: bool = parameter(
+        False, 'whether early and late touchdown shift the phase of the legs'
+    )
     gated: bool = parameter(
         False,
         'whether the robot waits for mujoco_robot/advance_until: for each tick in '

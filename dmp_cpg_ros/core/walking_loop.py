@@ -21,12 +21,14 @@ from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.body_mode import ModeState
 from dmp_cpg_ros.core.body_requests import REQUESTS
 from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
+from dmp_cpg_ros.core.contact_phase import ContactPhase, initial_contact_state
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation_parameters import ESTIMATE
+from dmp_cpg_ros.core.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.gait_network import GaitNetwork
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
-from dmp_cpg_ros.core.inhibition import InhibitionParameters, initial_inhibition
+from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
 from dmp_cpg_ros.core.leg_primitive import LegPrimitive, LegState, body_scale
 from dmp_cpg_ros.core.posture import PostureController, PostureFeedback
 from dmp_cpg_ros.core.posture_motion import LegMotion, MotionState
@@ -121,6 +123,10 @@ class WalkingLoop:
         )
         self.estimator_state: EstimatorState | None = None
         self.mode, self.barring = self.body.initial_state(), 'standing'
+        self.contact = (
+            ContactPhase(quarter_weight(description)) if p.canonical.contact_feedback else None
+        )
+        self.contact_state = initial_contact_state()
         self.leg_states: list[LegState] = [leg.initial_state() for leg in self.legs]
         self.motion_states: list[MotionState | None] = [None] * len(LEGS)
         self._time_ns: int | None = None
@@ -179,6 +185,8 @@ class WalkingLoop:
             self.gate.parameters = self.reference.parameters = p.reference
             self.supervisor.parameters = p.inhibition
             self.votes.follow(p.inhibition, p.reference, p.votes)
+            if self.contact is not None:
+                self.contact.limits = verdict.certificate.contact
         return verdict.reason
 
     def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
@@ -251,8 +259,10 @@ class WalkingLoop:
         inhibition = self.inhibition
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
         self.r = self.reference.step(self.r, r_ext, dt)
-        self.x = self.network.step(self.x, self.r, inhibition, dt) if dt > 0.0 else self.x
-        x_dot = self.network.rate(self.x, self.r, inhibition)
+        offset = self._contact_offset(state, inhibition, dt)
+        if dt > 0.0:
+            self.x = self.network.step(self.x, self.r, inhibition, dt, offset)
+        x_dot = self.network.rate(self.x, self.r, inhibition, offset)
         feedback = self._balance(self._body(state), x_dot, dt)
         self.barring = self.mode.mode
         ballot = self.votes.count(
@@ -284,6 +294,20 @@ class WalkingLoop:
             ),
             self.mode,
         )
+
+    def _contact_offset(
+        self, state: RobotState, inhibition: Inhibition, dt: float
+    ) -> Array | float:
+        """Frequency offsets from the contacts, where these are fed back [rad/s]."""
+        if self.contact is None:
+            return 0.0
+        if self.contact.limits is None and dt > 0.0:
+            running = Running(self.parameters, self._gait, self.network.scale, dt)
+            self.contact.limits = running.certificate().contact
+        self.contact_state, offset = self.contact.step(
+            self.contact_state, state.foot_force, self.network, self.x, self.r, inhibition, dt
+        )
+        return offset
 
     def _follow(self, network: GaitNetwork) -> None:
         """Let all parts use the network that acts, and its gait."""

@@ -12,8 +12,11 @@ from math import nan
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.contact_phase import ContactPhase, initial_contact_state
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
 from dmp_cpg_ros.core.phase_lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
@@ -24,10 +27,13 @@ from dmp_cpg_ros.core.walking_loop import initial_canonical_state
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, read_reference
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import certificate_words, gait_of
+from dmp_cpg_ros.nodes.gait_setup import certificate_words, description_of, gait_of
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionMessage, read_inhibition_state
 from dmp_cpg_ros.nodes.message_values import header_ns
+from dmp_cpg_ros.nodes.robot_state_messages import FootContactsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+
+Array = NDArray[np.float64]
 
 
 class CanonicalOscillators(CertifiedNode):
@@ -51,9 +57,11 @@ class CanonicalOscillators(CertifiedNode):
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
         self._writer, self._publisher = CanonicalStateWriter(), self.publisher('canonical_state')
+        contacts = self._read_contacts()
         self._ticks = self.match(
-            ('reference',),
+            ('reference', *contacts),
             'reference',
+            optional=contacts,
             delayed=('inhibition_state',),
             lock_step=self.parameters_of(LockStepParameters).lock_step,
         )
@@ -88,9 +96,10 @@ class CanonicalOscillators(CertifiedNode):
         self._last_ns = stamp_ns
         self._inhibition = values['inhibition_state'] or self._inhibition
         r, network = values['reference'], self._running_network.advance(dt)
+        offset = self._contact_offset(stamp_ns, values, network, dt)
         if dt > 0.0:
-            self._x = network.step(self._x, r, self._inhibition, dt)
-        x_dot = network.rate(self._x, r, self._inhibition)
+            self._x = network.step(self._x, r, self._inhibition, dt, offset)
+        x_dot = network.rate(self._x, r, self._inhibition, offset)
         word = self._running_network.word
         self._publisher.publish(self._writer.fill(stamp_ns, self._x, x_dot, word))
         self._watch_phases(network, r, dt)
@@ -101,11 +110,41 @@ class CanonicalOscillators(CertifiedNode):
             self._x, network.system.target
         ).any()
         former = LOCKED if self._lock is None else self._lock.level
-        self._lock = self._watch.step(self._lock, network, r, self._x, not acting, dt)
+        limits = self.certificate.contact
+        own = 0.0 if limits is None else limits.own
+        self._lock = self._watch.step(self._lock, network, r, self._x, not acting, dt, own)
         if self._lock.level > former:
             self.warn('phase_lock', self._lock.alarm, error=self._lock.level == LOST)
         elif self._lock.level == LOCKED != former:
             self.clear('phase_lock')
+
+    def _read_contacts(self) -> tuple[str, ...]:
+        """Listen to the feet where they are fed back; returns the topics."""
+        self._contact: ContactPhase | None = None
+        if not self.parameters_of(CanonicalParameters).contact_feedback:
+            return ()
+        self._contact = ContactPhase(quarter_weight(description_of(self)))
+        self._contact_state, reader = initial_contact_state(), FootContactsReader(strict=False)
+        self.listen(
+            'foot_contacts',
+            lambda message: self._ticks.add(
+                'foot_contacts', header_ns(message), (header_ns(message), reader.read(message))
+            ),
+        )
+        return ('foot_contacts',)
+
+    def _contact_offset(
+        self, stamp_ns: int, values: dict[str, Any], network: GaitNetwork, dt: float
+    ) -> Array | float:
+        """Frequency offsets from the contacts of this tick; a lost message gives none [rad/s]."""
+        if self._contact is None:
+            return 0.0
+        feet, self._contact.limits = values['foot_contacts'], self.certificate.contact
+        force = feet[1] if feet and feet[0] == stamp_ns else np.full(len(LEGS), np.nan)
+        self._contact_state, offset = self._contact.step(
+            self._contact_state, force, network, self._x, values['reference'], self._inhibition, dt
+        )
+        return offset
 
     def _without_certificate(self, reason: str) -> None:
         """Refuse to walk without a certificate, or say loudly that nothing is guaranteed."""

@@ -144,6 +144,8 @@ class MujocoRobotNode(ManagedNode):
             readers = (*readers, 'posture_control')
         if topic.name in VOTING_TOPICS and self.parameters_of(VotingSwitch).voting:
             readers = (*readers, 'inhibition')
+        if topic.name == 'foot_contacts' and self._options.contact_feedback:
+            readers = (*readers, 'canonical_oscillators')
         return readers
 
     def diagnostic_values(self) -> Mapping[str, Any]:
