@@ -1,0 +1,239 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A grid of 2,304 settings through the certificate of the suite and its canonical system.
+
+Whatever is certified synchronises from everywhere at its rate, enters C and never leaves it, and
+comes to rest, with legs whose own frequencies differ. What a naive check passes and the
+certificate does not is simulated too: among it are settings that fail.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections import Counter
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import pytest
+from contraction_batches import Batch, Setting, locked, random_graph
+from core_examples import GAITS, TICK, quadruped
+
+from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.certificate import Certificate, certify
+from dmp_cpg_ros.core.certificate_range import operating_range
+from dmp_cpg_ros.core.contraction.capture import capture_set
+from dmp_cpg_ros.core.contraction.connectivity import synchronisation_complement
+from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
+from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
+from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.graph import graph_from_edges
+from dmp_cpg_ros.core.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.leg_primitive import LegParameters, body_scale
+from dmp_cpg_ros.core.posture import PostureParameters
+from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.robot_state import LEGS
+
+GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')
+LARGEST_MISMATCH = 0.05
+SECONDS = 8.0
+SCALE, LEG, POSTURE = body_scale(quadruped()), LegParameters(), PostureParameters()
+
+
+@dataclass(frozen=True)
+class Case:
+    """One setting with its certificate and what naive checks would say."""
+
+    setting: Setting
+    certificate: Certificate
+    free: Synchronisation
+    misread: bool
+    contracts: bool
+
+
+def case_of(graph: str, gait: str, gain: float, share: float, region: float, leg: str, rho: float,
+            rng: np.random.Generator) -> Case:
+    """Certify a setting of the grid; radius, speed, cadence and frequencies are drawn."""
+    radius = float(rng.uniform(0.5, 2.0))
+    canonical = CanonicalParameters(
+        rho=rho / radius**2, radius=radius, coupling_gain=gain,
+        coupling_graph='ring' if graph == 'directed' else graph,
+        cadence_scale=float(rng.uniform(0.6, 1.6)))
+    reference = ReferenceParameters(max_speed=float(rng.uniform(0.2, 1.5)))
+    network = GaitNetwork(canonical, GAITS[gait], SCALE)
+    if graph == 'directed':
+        edges = random_graph('directed', len(LEGS), gain, rng).edges
+        network.system = CanonicalSystem(
+            graph_from_edges(len(LEGS), edges, gain, network.gait.phases),
+            network.system.oscillators, network.system.target)
+    plain = InhibitionParameters(inhibited_legs=(leg,), region_radius=region * radius)
+    omega = operating_range(network, plain, reference).omega[1]
+    inhibition = InhibitionParameters(
+        inhibited_legs=(leg,), region_radius=region * radius,
+        inhibition_gain=share * len(LEGS) * omega * radius / (region * radius))
+    certificate = certify(network, inhibition, reference, LEG, POSTURE, TICK)
+    gains = inhibition.armed_gains
+    free = synchronisation(network.system.graph, rho)
+    omegas = omega * (1.0 - own_frequencies(network.system, omega, gains, free, inhibition, rng))
+    setting = Setting(network.system, omegas, gains, inhibition.region_radius, graph)
+    eigenvalues = np.linalg.eigvals(network.system.graph.block_laplacian()).real
+    contraction = certificate['contraction']
+    return Case(setting, certificate, free, bool(np.sort(eigenvalues)[len(LEGS)] > rho),
+                contraction.right > rho)
+
+
+def own_frequencies(system: CanonicalSystem, omega: float, gains: np.ndarray,
+                    free: Synchronisation, inhibition: InhibitionParameters,
+                    rng: np.random.Generator) -> np.ndarray:
+    """Shares by which legs turn slower than ω, so unequal that they are still in their places
+    within what capture allows; none where nothing is known.
+    """
+    if not free.synchronises or free.weights is None:
+        return np.zeros(len(LEGS))
+    oscillator = system.oscillators[0]
+    allowed = 0.5 * capture_set(system, omega, gains, inhibition.region_radius).tolerance
+    share = LARGEST_MISMATCH
+    while share > 1e-4 and not mismatch_bound(
+            free, oscillator.rho, oscillator.radius, share * omega).distance <= allowed:
+        share *= 0.5
+    return rng.uniform(0.0, share, len(LEGS)) if share > 1e-4 else np.zeros(len(LEGS))
+
+
+@functools.lru_cache(maxsize=1)
+def grid() -> tuple[Case, ...]:
+    """The whole grid."""
+    rng = np.random.default_rng(4)
+    return tuple(case_of(*values, rng) for values in product(
+        GRAPHS, ('amble', 'trot', 'bound'), (10.0, 25.0, 60.0, 200.0), (0.65, 0.95, 1.15, 2.0),
+        (0.15, 0.35), ('fl', 'rr'), (3.0, 9.0)))
+
+
+def disagreement(case: Case, x: np.ndarray) -> float:
+    """(Σ ξ_i |z_i − z̄|²)^½ of one setting's state."""
+    z = (x[:, 0] - 1j * x[:, 1]) * np.exp(-1j * case.setting.system.graph.phases)
+    weights = case.free.weights
+    weights = np.full(len(z), 0.25) if weights is None else weights
+    return float(np.sqrt(weights @ np.abs(z - weights @ z)**2))
+
+
+def synchronised(cases: list[Case], seconds: float, rng: np.random.Generator
+                 ) -> tuple[np.ndarray, np.ndarray]:
+    """Disagreement of alike oscillators at the start and at the end; every second network starts
+    near the origin in the direction that decides, the others anywhere.
+    """
+    settings = [Setting(s.system, np.full(4, s.omega.max()), s.gains, s.region_radius, s.name)
+                for s in (case.setting for case in cases)]
+    V = synchronisation_complement(4)
+    x = []
+    for k, setting in enumerate(settings):
+        L = setting.system.graph.block_laplacian()
+        worst = V.T @ np.linalg.eigh(V @ (L + L.T) @ V.T)[1][:, 0]
+        anywhere = rng.uniform(0.1, 2.0) * rng.normal(size=(4, 2))
+        x.append((1e-3 * worst.reshape(4, 2) if k % 2 else anywhere)
+                 * setting.system.radius[0])
+    start = np.array([disagreement(case, state) for case, state in zip(cases, x, strict=True)])
+    batch, states = Batch(settings, 0.001), np.stack(x)
+    for _ in range(round(seconds / 0.001)):
+        states = batch.step(states, armed=False)
+    return start, np.array([disagreement(case, state)
+                            for case, state in zip(cases, states, strict=True)])
+
+
+def stopped(cases: list[Case], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Whether each setting, armed at a random phase, stays in C once there and ends at rest."""
+    count = len(cases)
+    batch = Batch([case.setting for case in cases], TICK)
+    x = np.stack([locked(case.setting, rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.99, 1.0))
+                  for case in cases])
+    kept, entered, at_rest = np.ones(count, bool), np.zeros(count, bool), np.zeros(count, bool)
+    left = np.arange(count)
+    for tick in range(1, round(SECONDS / TICK) + 1):
+        x = batch.step(x)
+        inside = batch.inside(x)
+        kept[left[entered[left] & ~inside]] = False
+        entered[left[inside]] = True
+        if tick % 250 == 0:
+            moving = ~(inside & (batch.speed(x) < 1e-3 * batch.settings[0].system.radius[0]))
+            at_rest[left[~moving]] = True
+            if not np.any(moving):
+                break
+            batch, x, left = batch.subset(moving), x[moving], left[moving]
+    return kept & entered, at_rest
+
+
+def test_the_grid_has_every_kind_of_setting_certified_and_not() -> None:
+    cases = grid()
+    assert len(cases) >= 2000
+    certified = Counter(case.setting.name for case in cases if case.certificate.holds)
+    failing = Counter(case.setting.name for case in cases if not case.certificate.holds)
+    for name in GRAPHS:
+        assert certified[name] > 40 and failing[name] > 40, (name, certified, failing)
+    unequal = sum(np.ptp(case.setting.omega) > 0.01 * case.setting.omega.max()
+                  for case in cases if case.certificate.holds)
+    assert unequal > 200
+
+
+def test_the_batch_is_the_canonical_system() -> None:
+    rng = np.random.default_rng(0)
+    cases = [grid()[k] for k in rng.integers(len(grid()), size=40)]
+    batch = Batch([case.setting for case in cases], TICK)
+    x = np.stack([locked(case.setting, rng.uniform(0.0, 6.0)) for case in cases])
+    acting = batch.inside(x)[:, None] * batch.gains
+    for k, after in enumerate(batch.step(x)):
+        setting = cases[k].setting
+        np.testing.assert_allclose(
+            after, setting.system.step(x[k], setting.omega, acting[k], TICK), atol=1e-12)
+
+
+def test_every_certified_setting_synchronises_at_its_rate_from_everywhere() -> None:
+    cases = [case for case in grid() if case.certificate.holds]
+    start, end = synchronised(cases, 0.4, np.random.default_rng(1))
+    rates = np.array([case.certificate['synchronisation'].margin for case in cases])
+    weighted = np.array([case.free.weights is not None for case in cases])
+    assert np.all((end <= 1.001 * start * np.exp(-rates * 0.4) + 1e-12)[weighted])
+    # In a hierarchy the rate shows after those in front have settled: at half of it from here on.
+    slower = np.exp(-0.5 * rates * 0.4)
+    assert np.all((end <= 30.0 * start * slower + 1e-12)[~weighted])
+
+
+def test_every_certified_setting_stays_in_its_places_with_unequal_frequencies() -> None:
+    cases = [case for case in grid() if case.certificate.holds and case.free.weights is not None
+             and np.ptp(case.setting.omega) > 0.0]
+    batch = Batch([case.setting for case in cases], TICK)
+    x = np.stack([locked(case.setting, 0.0) for case in cases])
+    bounds = np.array([mismatch_bound(
+        case.free, case.setting.system.rho[0], case.setting.system.radius[0],
+        float(np.ptp(case.setting.omega))).distance for case in cases])
+    for _ in range(250):
+        x = batch.step(x, armed=False)
+    for case, state, bound in zip(cases, x, bounds, strict=True):
+        z = (state[:, 0] - 1j * state[:, 1]) * np.exp(-1j * case.setting.system.graph.phases)
+        assert np.abs(z[:, None] - z[None, :]).max() <= bound
+
+
+def test_every_certified_setting_stops_with_legs_of_unequal_frequencies() -> None:
+    cases = [case for case in grid() if case.certificate.holds]
+    kept, at_rest = stopped(cases, np.random.default_rng(2))
+    assert np.all(kept), [cases[k].certificate.explained() for k in np.flatnonzero(~kept)[:3]]
+    assert np.all(at_rest), f'{np.count_nonzero(~at_rest)} of {len(cases)} still move'
+
+
+def test_settings_that_the_misread_eigenvalue_passes_are_refused_and_fail() -> None:
+    cases = [case for case in grid() if case.misread and not case.free.synchronises]
+    assert cases
+    assert not any(case.certificate.holds for case in cases)
+    assert all('synchronisation' in [entry.name for entry in case.certificate.failing]
+               for case in cases)
+    start, end = synchronised([case for case in cases for _ in range(2)], 0.4,
+                              np.random.default_rng(3))
+    assert np.count_nonzero(end > start) >= 0.3 * len(cases)
+
+
+@pytest.mark.parametrize('graph', ['all_to_all', 'ring', 'star', 'directed_ring', 'path'])
+def test_settings_that_contract_without_capture_are_refused_and_some_walk_on(graph: str) -> None:
+    cases = [case for case in grid() if case.contracts and case.setting.name == graph
+             and not case.certificate['capture'].holds]
+    assert cases
+    assert not any(case.certificate.holds for case in cases)
+    kept, at_rest = stopped(cases, np.random.default_rng(5))
+    assert np.any(~(kept & at_rest))
