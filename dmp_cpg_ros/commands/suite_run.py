@@ -26,6 +26,7 @@ from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario import Scenario
 from dmp_cpg_ros.nodes.executors import make_executor
+from dmp_cpg_ros.nodes.lying_down import LyingDown
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
@@ -38,6 +39,9 @@ SLICE_S = 0.1
 
 LAST_WORDS_S = 10.0
 """How long a node may take to finish its work at the end of a run [s]."""
+
+LYING_WITHIN_S = 60.0
+"""How long a machine may take to simulate how the robot lies down [s]."""
 
 SETTLED_S = 0.3
 """Time without a new message after which the recording counts as complete [s]."""
@@ -108,6 +112,8 @@ def run_suite(plan: RunPlan, say: Say) -> None:
             player = ScenarioPlayer(plan.scenario, plan.tick_ns, plan.lock_step, say)
             executor = make_executor('events')
             executor.add_node(player)
+            # In lock-step no time passes that nobody asks for: nothing can fall.
+            lying_down = None if plan.lock_step else LyingDown(player, say)
             watch = _Watch(executor, player, group, interrupted)
             try:
                 watch.until_ready([node.name for node in SUITE_NODES] + [RECORDER.name])
@@ -115,6 +121,8 @@ def run_suite(plan: RunPlan, say: Say) -> None:
                 watch.until(player.finished, float('inf'))
                 player.finished.result()
             finally:
+                if lying_down is not None and player.time_ns > 0:
+                    watch.lay_down(lying_down)
                 watch.finish_work()
                 executor.remove_node(player)
                 player.destroy_node()
@@ -162,6 +170,7 @@ class _Watch:
             node.name: player.create_client(ChangeState, f'{node.name}/change_state')
             for node in (*SUITE_NODES, RECORDER)
         }
+        self._recording = True
         self._recorded = player.create_client(Trigger, f'{RECORDER.name}/recorded')
 
     def until(self, future: Future, patience_s: float) -> bool:
@@ -195,6 +204,25 @@ class _Watch:
                     )
             self.until(Future(), SLICE_S)
 
+    def lay_down(self, lying_down: LyingDown) -> None:
+        """End the recording, then lay the robot down; a second Ctrl-C cuts it short."""
+        if self._group.ended():
+            return
+        interrupted, self._interrupted = self._interrupted, []
+        begun = len(interrupted)
+        try:
+            for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
+                self._change_state(RECORDER.name, transition)
+            self._recording = False
+            down, deadline = lying_down.begin(), time.monotonic() + LYING_WITHIN_S
+            while len(interrupted) == begun and time.monotonic() < deadline:
+                if self.until(down, SLICE_S):
+                    return
+        except DmpCpgError:
+            return
+        finally:
+            self._interrupted = interrupted
+
     def finish_work(self) -> None:
         """Stop the robot, let the recorder take all that was said, deactivate everything."""
         if self._group.ended():
@@ -202,16 +230,20 @@ class _Watch:
         *others, robot = SUITE_NODES
         try:
             self._deactivate(robot.name)
-            self._until_recorded()
-            for node in (*others, RECORDER):
+            if self._recording:
+                self._until_recorded()
+            for node in (*others, RECORDER) if self._recording else others:
                 self._deactivate(node.name)
         except DmpCpgError:
             return
 
     def _deactivate(self, name: str) -> None:
+        self._change_state(name, Transition.TRANSITION_DEACTIVATE)
+
+    def _change_state(self, name: str, transition: int) -> None:
         client = self._transitions[name]
         client.wait_for_service(timeout_sec=LAST_WORDS_S)
-        request = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_DEACTIVATE))
+        request = ChangeState.Request(transition=Transition(id=transition))
         self._ask(client, request, LAST_WORDS_S)
 
     def _until_recorded(self) -> None:

@@ -1,0 +1,244 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The body's mode: what may follow what, when it has fallen, and what travels to the legs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from core_examples import TICK, TICK_NS, quadruped, standing_state
+
+from dmp_cpg_ros.core.body_command import MODES, MOVING, BodyCommand
+from dmp_cpg_ros.core.body_condition import BodyCondition, BodySense
+from dmp_cpg_ros.core.body_mode import BodyModes, ModeParameters, ModeState
+from dmp_cpg_ros.core.body_requests import REQUESTS, request
+from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.fall_detection import FallDetector, FallParameters, FallState
+from dmp_cpg_ros.core.gait import GRAVITY
+from dmp_cpg_ros.core.leg_kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_state import RobotState
+
+ROBOT = quadruped()
+HEIGHT = ROBOT.stance_height
+UPRIGHT = BodyCondition(np.array((0.0, 0.0, -1.0)), 0.0, HEIGHT, 1.0)
+FOLDED = replace(UPRIGHT, height=0.05, support=0.0)
+LEFT = BodyCondition(np.array((0.0, 1.0, 0.0)), math.pi / 2.0, 0.1, 0.0)
+BACK = BodyCondition(np.array((0.0, -0.1, 0.995)), 3.0, 0.1, 0.0)
+
+
+class Machine:
+    """A state machine tick by tick, under conditions of the test's choice."""
+
+    def __init__(self, start_mode: str = 'standing', **changes: object) -> None:
+        self.modes = BodyModes(ROBOT, ModeParameters(start_mode=start_mode, **changes))
+        self.state: ModeState = self.modes.initial_state()
+        self.time_ns = 0
+        self.seen = [self.state.mode]
+
+    def go(self, seconds: float, condition: BodyCondition = UPRIGHT,
+           at_rest: bool = True) -> Machine:
+        for _ in range(max(1, round(seconds / TICK))):
+            self.state = self.modes.step(self.state, condition, self.time_ns, at_rest)
+            self.time_ns += TICK_NS
+            if self.state.mode != self.seen[-1]:
+                self.seen.append(self.state.mode)
+        return self
+
+    def ask(self, what: str) -> tuple[bool, str]:
+        self.state, answer = request(self.modes, self.state, what)
+        return answer.accepted, answer.text
+
+
+@pytest.mark.parametrize('command', [
+    *(BodyCommand(mode) for mode in MODES if mode not in MOVING),
+    *(BodyCommand(mode, 'rise', 7, x) for mode in MOVING for x in (1.0, 1.0 / 3.0, 1e-300, 0.0)),
+])
+def test_the_text_reads_back_bit_for_bit(command: BodyCommand) -> None:
+    assert BodyCommand.from_text(command.text) == command
+
+
+@pytest.mark.parametrize('text', [
+    '', 'flying', 'base_link', 'rising', 'rising rise 3', 'standing rise 3 0.5', 'rising rise x 1',
+    'rising rise 3 nan', 'rising rise 3 1.5', 'rising rise 3 0.5 6',
+])
+def test_other_texts_are_refused_with_what_is_valid(text: str) -> None:
+    with pytest.raises(DataError, match='standing, stopping, lying|body mode|phase in'):
+        BodyCommand.from_text(text)
+
+
+def test_up_and_down_again() -> None:
+    machine = Machine('lying').go(0.1, FOLDED)
+    accepted, text = machine.ask('stand_up')
+    duration = machine.modes.movements.duration(('rise',))
+    assert accepted and f'{duration:.2f} s' in text
+    assert machine.go(duration + 3 * TICK, UPRIGHT).state.mode == 'standing'
+    assert machine.ask('lie_down')[0]
+    assert machine.go(1.0, at_rest=False).state.mode == 'stopping'
+    assert machine.go(duration + 3 * TICK, FOLDED).state.mode == 'lying'
+    assert machine.seen == ['lying', 'rising', 'standing', 'stopping', 'lowering', 'lying']
+
+
+def test_the_phase_of_a_movement_falls_from_one_by_the_canonical_system() -> None:
+    machine = Machine('lying').go(0.1, FOLDED)
+    machine.ask('stand_up')
+    phases = []
+    for _ in range(100):
+        machine.go(TICK)
+        phases.append(machine.modes.command(machine.state).x)
+    assert phases[0] == 1.0
+    ratios = np.array(phases[1:]) / np.array(phases[:-1])
+    np.testing.assert_allclose(ratios, ratios[0], rtol=1e-12)
+    assert ratios[0] < 1.0
+
+
+@pytest.mark.parametrize(('mode', 'condition', 'what', 'accepted'), [
+    ('standing', UPRIGHT, 'stand_up', True),
+    ('standing', UPRIGHT, 'recover', False),
+    ('lying', FOLDED, 'lie_down', True),
+    ('lying', FOLDED, 'recover', False),
+    ('damped', LEFT, 'stand_up', False),
+    ('damped', BACK, 'lie_down', False),
+    ('damped', FOLDED, 'stand_up', True),
+    ('damped', FOLDED, 'lie_down', True),
+    ('damped', BACK, 'recover', True),
+])
+def test_what_cannot_be_is_refused_with_the_reason(
+        mode: str, condition: BodyCondition, what: str, accepted: bool) -> None:
+    machine = Machine(mode)
+    machine.state = machine.modes.step(machine.state, condition, 0, True)
+    before = machine.state.mode
+    done, text = machine.ask(what)
+    assert done == accepted and len(text) > 10
+    if not accepted:
+        assert machine.state.mode == before
+        assert 'recover' in text or 'stand_up' in text
+
+
+def test_nothing_is_accepted_before_the_robot_has_said_anything() -> None:
+    for what in REQUESTS:
+        accepted, text = Machine().ask(what)
+        assert not accepted and 'mujoco_robot' in text
+
+
+def test_an_unknown_request_is_an_error() -> None:
+    with pytest.raises(ParameterError, match='stand_up, lie_down, recover'):
+        Machine().go(TICK).ask('jump')
+
+
+def test_recovering_refuses_everything_else_and_ends_on_the_feet() -> None:
+    machine = Machine('damped').go(0.1, BACK)
+    assert machine.ask('recover')[0]
+    machine.go(0.1, BACK)
+    for what in ('stand_up', 'lie_down'):
+        accepted, text = machine.ask(what)
+        assert not accepted and 'recovering' in text
+    assert machine.ask('recover')[0]
+    machine.go(1.0, BACK).go(1.0, LEFT).go(2.0, FOLDED).go(5.0, UPRIGHT)
+    assert machine.seen == ['damped', 'recovering', 'rising', 'standing']
+    assert machine.state.tries == 1
+
+
+def test_it_gives_up_after_its_tries_and_says_so() -> None:
+    machine = Machine('damped', recovery_tries=2).go(0.1, BACK)
+    machine.ask('recover')
+    machine.go(30.0, BACK)
+    assert machine.seen == ['damped', 'recovering', 'damped']
+    assert '2 tries' in machine.state.reason
+
+
+def test_a_robot_that_does_not_rise_is_damped() -> None:
+    machine = Machine('lying').go(0.1, FOLDED)
+    machine.ask('stand_up')
+    machine.go(5.0, FOLDED)
+    assert machine.state.mode == 'damped' and 'did not rise' in machine.state.reason
+
+
+def test_lying_down_is_given_up_when_the_gait_never_rests() -> None:
+    machine = Machine().go(0.1)
+    machine.ask('lie_down')
+    machine.go(20.0, at_rest=False)
+    assert machine.seen == ['standing', 'stopping', 'standing']
+    assert 'given up' in machine.state.reason
+
+
+def test_lying_down_can_be_called_off() -> None:
+    machine = Machine().go(0.1, at_rest=False)
+    machine.ask('lie_down')
+    assert machine.go(0.1, at_rest=False).state.mode == 'stopping'
+    assert machine.ask('stand_up')[0]
+    assert machine.go(1.0).state.mode == 'standing'
+
+
+@pytest.mark.parametrize('mode', ['standing', 'lying'])
+def test_a_tilt_is_a_fall_in_every_mode_that_is_not_already_one(mode: str) -> None:
+    machine = Machine(mode).go(0.5, UPRIGHT if mode == 'standing' else FOLDED).go(0.5, LEFT)
+    assert machine.state.mode == 'damped' and 'tilted' in machine.state.reason
+
+
+@pytest.mark.parametrize(('condition', 'word'), [
+    (replace(UPRIGHT, height=0.3 * HEIGHT), 'over its feet'),
+    (replace(UPRIGHT, support=0.0), 'no ground'),
+])
+def test_low_or_without_ground_is_a_fall_of_a_robot_that_should_stand(
+        condition: BodyCondition, word: str) -> None:
+    machine = Machine().go(0.5).go(1.0, condition)
+    assert machine.state.mode == 'damped' and word in machine.state.reason
+    assert Machine('lying').go(2.0, condition).state.mode == 'lying'
+
+
+def test_a_moment_is_no_fall() -> None:
+    parameters = FallParameters()
+    machine = Machine().go(0.5)
+    for _ in range(5):
+        machine.go(0.8 * parameters.fall_delay, LEFT).go(0.1)
+        machine.go(0.8 * parameters.fall_support_delay, replace(UPRIGHT, support=0.0)).go(0.1)
+    assert machine.state.mode == 'standing'
+
+
+def test_the_detector_keeps_its_delays() -> None:
+    detector = FallDetector(FallParameters(fall_delay=0.2), HEIGHT)
+    state, sign, k = FallState(), '', 0
+    while not sign:
+        state, sign = detector.step(state, LEFT, k * TICK_NS, True)
+        k += 1
+    assert (k - 1) * TICK == pytest.approx(0.2)
+
+
+def rolled(state: RobotState, angle: float) -> RobotState:
+    return replace(state, base_quaternion=np.array(
+        (math.sin(0.5 * angle), 0.0, 0.0, math.cos(0.5 * angle))))
+
+
+@pytest.mark.parametrize('angle', [-3.0, -1.0, 0.0, 0.4, 2.0])
+def test_tilt_and_down_are_those_of_the_orientation(angle: float) -> None:
+    condition = BodySense(ROBOT).condition(rolled(standing_state(ROBOT), angle))
+    assert condition.tilt == pytest.approx(abs(angle), abs=1e-6)
+    np.testing.assert_allclose(
+        condition.down_in_base, (0.0, -math.sin(angle), -math.cos(angle)), atol=1e-12)
+
+
+def test_height_is_over_the_lowest_sole_and_support_is_what_the_torques_press() -> None:
+    sense = BodySense(ROBOT)
+    state = replace(standing_state(ROBOT), foot_force=np.zeros(4))
+    for share in (0.0, 0.4, 1.0):
+        carried = replace(state, joint_effort=sense.carrying_torque(state, share))
+        condition = sense.condition(carried)
+        assert condition.height == pytest.approx(HEIGHT, abs=1e-9)
+        assert condition.support == pytest.approx(share, rel=0.02, abs=1e-9)
+
+
+def test_the_carrying_torque_balances_weight_without_a_moment() -> None:
+    state = rolled(standing_state(ROBOT), 0.2)
+    torque = BodySense(ROBOT).carrying_torque(state, 1.0)
+    up = np.array((0.0, math.sin(0.2), math.cos(0.2)))
+    force, moment = np.zeros(3), np.zeros(3)
+    for i, leg in enumerate(map(LegKinematics, ROBOT.legs)):
+        q = state.joint_position[3 * i:3 * i + 3]
+        f = -np.linalg.solve(leg.jacobian_in_base(q).T, torque[3 * i:3 * i + 3])
+        force += f
+        moment += np.cross(leg.foot_in_base(q) - ROBOT.com_in_base, f)
+    np.testing.assert_allclose(force, ROBOT.mass * GRAVITY * up, rtol=1e-6, atol=1e-4)
+    np.testing.assert_allclose(moment, 0.0, atol=1e-4)
