@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A disturbed oscillator in the running node: the alarm and its end on /diagnostics."""
+"""The oscillators watched and judged while they run: alarms, and ticks that go on."""
 
 from __future__ import annotations
 
@@ -69,5 +69,29 @@ def test_a_disturbed_oscillator_raises_an_alarm_and_its_return_ends_it(ros: Ros)
     assert float(values['phase_error_rad']) <= float(values['phase_error_bound_rad'])
     ros.spin_until(lambda: bool(states))
     ros.executor.remove_node(node)
+    node.close()
+    node.destroy_node()
+
+
+def test_ticks_go_on_while_a_change_is_judged(ros: Ros) -> None:
+    node = CanonicalOscillators(context=ros.context)
+    node.start()
+    topic, writer = interface('reference'), ReferenceWriter()
+    publisher = ros.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
+    ros.spin_until(lambda: publisher.get_subscription_count() == 1
+                   and node.count_publishers('reference') == 1)
+    sent = 0
+
+    def judged() -> bool:
+        """Nobody spins the node: what runs its ticks is the look for the nearest value."""
+        nonlocal sent
+        sent += 1
+        publisher.publish(writer.fill(sent * TICK_NS, np.zeros(3)))
+        (result,) = node.set_parameters([Parameter('cadence_scale', value=4.0)])
+        assert not result.successful
+        assert 'nearest value' in result.reason
+        return bool(node.health.ticks > 0)
+
+    ros.spin_until(judged)
     node.close()
     node.destroy_node()
