@@ -47,8 +47,10 @@ class SensorReadings:
     @property
     def imu_is_usable(self) -> bool:
         """Whether gyroscope and accelerometer both say something possible."""
-        rate, force = self.rate_in_base, self.specific_force_in_base
-        return bool(rate @ rate <= FASTEST_TURN**2 and force @ force <= HARDEST_BLOW**2)
+        return bool(
+            (np.abs(self.rate_in_base) <= FASTEST_TURN).all()
+            and (np.abs(self.specific_force_in_base) <= HARDEST_BLOW).all()
+        )
 
     @property
     def usable_legs(self) -> NDArray[np.bool_]:

@@ -1,0 +1,130 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The posture controller's sensors as messages: silent, stale, not finite."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+import ros_processes
+from core_examples import network, quadruped, standing_state
+from ros_processes import Processes, Ros
+
+from dmp_cpg_ros.core.body_estimation import BodyEstimator
+from dmp_cpg_ros.core.estimation_parameters import EstimationParameters
+from dmp_cpg_ros.core.sensor_readings import readings_of
+from dmp_cpg_ros.nodes.body_state import sensor_readings
+from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, ReferenceWriter
+from dmp_cpg_ros.nodes.interfaces import interface
+from dmp_cpg_ros.nodes.robot_state_messages import (
+    EstimatedOdometryWriter,
+    FootContactsReader,
+    RobotStateWriter,
+    read_imu,
+    read_odom,
+)
+
+processes, ros_domain, ros = ros_processes.processes, ros_processes.ros_domain, ros_processes.ros
+
+JOINTS = (np.zeros(12), np.zeros(12), np.zeros(12))
+IMU = (np.ones(3), np.full(3, 2.0))
+FORCE = np.full(4, 20.0)
+
+
+def test_readings_of_one_stamp_belong_together() -> None:
+    values = {'joint_states': JOINTS, 'imu': (8, IMU), 'foot_contacts': (8, FORCE)}
+    readings = sensor_readings(8, values)
+    assert np.array_equal(readings.rate_in_base, IMU[0])
+    assert np.array_equal(readings.specific_force_in_base, IMU[1])
+    assert np.array_equal(readings.foot_force, FORCE)
+
+
+@pytest.mark.parametrize('old', [(4, IMU), None])
+def test_an_old_or_absent_reading_is_missing(old: Any) -> None:
+    readings = sensor_readings(
+        8, {'joint_states': JOINTS, 'imu': old, 'foot_contacts': (8, FORCE)})
+    assert not readings.imu_is_usable and readings.usable_contacts.all()
+    force = None if old is None else (4, FORCE)
+    readings = sensor_readings(
+        8, {'joint_states': JOINTS, 'imu': (8, IMU), 'foot_contacts': force})
+    assert readings.imu_is_usable and not readings.usable_contacts.any()
+
+
+@pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf, 1e300])
+def test_numbers_that_are_not_finite_reach_the_estimators_judgement(bad: float) -> None:
+    writer = RobotStateWriter()
+    writer.fill(standing_state(quadruped()))
+    writer.imu.angular_velocity.y = bad
+    writer.foot_contacts.effort[2] = bad
+    contacts = FootContactsReader(strict=False).read(writer.foot_contacts)
+    readings = sensor_readings(0, {'joint_states': JOINTS, 'imu': (0, read_imu(writer.imu)),
+                                   'foot_contacts': (0, contacts)})
+    assert not readings.imu_is_usable
+    assert readings.usable_contacts.tolist() == [True, True, False, True]
+
+
+def test_the_estimate_passes_bit_for_bit() -> None:
+    robot = quadruped()
+    estimator = BodyEstimator(robot, EstimationParameters())
+    memory, _ = estimator.step(None, readings_of(standing_state(robot)))
+    _, estimate = estimator.step(memory, readings_of(standing_state(robot, 4_000_000)))
+    message = EstimatedOdometryWriter().fill(estimate)
+    read = read_odom(message)
+    assert np.array_equal(read.position_in_world, estimate.position_in_world)
+    assert np.array_equal(read.quaternion, estimate.quaternion)
+    assert np.array_equal(read.velocity_in_base, estimate.velocity_in_base)
+    assert np.array_equal(read.rate_in_base, estimate.rate_in_base)
+    covariance = np.reshape(message.twist.covariance, (6, 6))
+    assert np.array_equal(covariance.diagonal()[:3], estimate.velocity_variance)
+    assert covariance.sum() == pytest.approx(estimate.velocity_variance.sum())
+
+
+def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros: Ros) -> None:
+    """In real time: all is well at first, then the IMU falls silent and a contact says NaN."""
+    process = processes.node('posture_control')
+    feedback, told = (ros.collect(interface(name).type, name, interface(name).reader_qos)
+                      for name in ('posture_feedback', '/diagnostics'))
+    estimates = ros.collect(interface('estimated_odom').type, 'estimated_odom',
+                            interface('estimated_odom').reader_qos)
+    names = ('imu', 'foot_contacts', 'joint_states', 'reference', 'canonical_state')
+    publishers = {name: ros.node.create_publisher(
+        interface(name).type, name, interface(name).publisher_qos) for name in names}
+    ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers.values()))
+    # The node's robot is the package's own; the example stands much like it.
+    oscillators = network()
+    writer, reference, canonical = RobotStateWriter(), ReferenceWriter(), CanonicalStateWriter()
+
+    ticks = itertools.count(1)
+
+    def ticked(broken: bool) -> bool:
+        time_ns = 4_000_000 * next(ticks)
+        writer.fill(standing_state(quadruped(), time_ns))
+        if broken:
+            writer.foot_contacts.effort[1] = math.nan
+        else:
+            publishers['imu'].publish(writer.imu)
+        publishers['foot_contacts'].publish(writer.foot_contacts)
+        publishers['joint_states'].publish(writer.joint_states)
+        publishers['reference'].publish(reference.fill(time_ns, np.zeros(3)))
+        publishers['canonical_state'].publish(
+            canonical.fill(time_ns, oscillators.locked_state(), np.zeros((4, 2))))
+        return True
+
+    def told_problems() -> str:
+        return ' '.join(status.message for message in told for status in message.status)
+
+    ros.spin_until(lambda: ticked(broken=False) and len(feedback) >= 50 and len(estimates) >= 5)
+    assert 'imu, contact of fr' not in told_problems()  # while nodes find each other one may lack
+    well = len(feedback)
+    ros.spin_until(lambda: ticked(broken=True) and len(feedback) >= well + 50
+                   and 'imu, contact of fr' in told_problems())
+    assert all(math.isfinite(value) for message in feedback for value in message.effort)
+    process.interrupt()
+    assert process.wait() == 0, process
