@@ -8,6 +8,7 @@ The robot starts at the origin, facing along x, on a patch that is flat up to x 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from functools import lru_cache
 from math import cos, radians, sin, tan
 from typing import ClassVar
@@ -69,9 +70,9 @@ class World(Parameters):
         """Height of the floor on which everything stands [m]."""
         return 0.0
 
-    @property
+    @cached_property
     def is_flat(self) -> bool:
-        """Whether nothing stands on the floor."""
+        """Whether nothing stands on the floor; asked for at every tick."""
         return not self.boxes()
 
     def boxes(self) -> tuple[Box, ...]:
