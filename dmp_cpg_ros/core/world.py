@@ -8,8 +8,7 @@ The robot starts at the origin, facing along x, on a patch that is flat up to x 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import cos, radians, sin, tan
 from typing import ClassVar
 
