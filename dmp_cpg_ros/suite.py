@@ -15,7 +15,9 @@ from dmp_cpg_ros.core.body_mode import ModeParameters
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.estimation_parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.gait import Gait
+from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait_network import CanonicalParameters
+from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters
 from dmp_cpg_ros.core.posture import PostureParameters
@@ -145,6 +147,8 @@ def load_suite(
         sets['posture_control'][StateSourceParameters],
         sets['inhibition'][VoteSourceParameters],
         sets['posture_control'][ModeParameters],
+        canonical[GaitChangeParameters],
+        canonical[GaitChoiceParameters],
     )
     gait = canonical[GaitParameters]
     return Suite(

@@ -13,8 +13,11 @@ from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_sta
 from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait_network import CanonicalParameters
+from dmp_cpg_ros.core.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
 from dmp_cpg_ros.core.gait_word import gait_word, read_gait_word
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import body_scale
 from dmp_cpg_ros.core.running_network import CADENCE_RATE, RunningNetwork
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER, SuiteParameters
@@ -103,7 +106,7 @@ def test_an_impossible_value_is_a_parameter_error() -> None:
 def test_every_changeable_parameter_has_one_owner() -> None:
     names = [name for names in CHANGEABLE.values() for name in names]
     assert len(names) == len(set(names)) == len(OWNER)
-    assert set(names) <= set(RUNNING.values)
+    assert set(names) <= {*RUNNING.values, 'gait'}
 
 
 @pytest.mark.parametrize('scale', [1.0, 0.25, 1.1, 1.0 + 2**-52, 3.999999999999999])
@@ -132,19 +135,24 @@ def test_a_scaled_gait_differs_in_its_cadence_only(gait: str) -> None:
 
 
 def test_the_cadence_moves_to_its_factor_at_its_rate() -> None:
-    running = RunningNetwork(CanonicalParameters(), GAITS['amble'], RUNNING.scale)
+    networks = GaitNetworks(
+        CanonicalParameters(), RUNNING.scale, GaitChangeParameters(), GaitReader(GAITS))
+    running, x, free = RunningNetwork(networks, GAITS['amble']), np.ones((4, 2)), Inhibition(
+        False, np.zeros(4), 0.3)
     running.change(CanonicalParameters(cadence_scale=1.2))
     seen, r = [], np.array([0.3, 0.0, 0.0])
     plain = running.network.omega(r)
     for _ in range(120):
-        acting = running.advance(TICK)
+        running.begin_tick(x, r, free, TICK)
+        acting = running.network
         seen.append(running.cadence_scale)
         assert acting.omega(r) == pytest.approx(plain * running.cadence_scale)
         assert read_gait_word(running.word) == ('amble', running.cadence_scale)
     assert np.all(np.diff([1.0, *seen]) <= CADENCE_RATE * TICK + 1e-12)
     assert seen[-1] == 1.2 == seen[int(0.2 / CADENCE_RATE / TICK) + 1]
     running.change(CanonicalParameters(cadence_scale=1.2, coupling_gain=50.0))
-    assert running.advance(TICK).parameters.coupling_gain == 50.0
+    running.begin_tick(x, r, free, TICK)
+    assert running.network.parameters.coupling_gain == 50.0
     assert running.cadence_scale == 1.2
 
 

@@ -27,7 +27,7 @@ from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.scenario import play
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.suite import load_suite
+from dmp_cpg_ros.suite import load_gaits, load_suite
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
@@ -37,8 +37,11 @@ duration: 6.0
 events:
   - {at: 0.2, inhibit: false}
   - {at: 0.2, command: {v_x: 0.5, gamma: 0.1}}
+  - {at: 1.0, gait: trot}
   - {at: 1.5, push: {impulse: [1, 4, 0], duration: 0.15}}
+  - {at: 1.9, gait: walk}
   - {at: 2.0, inhibit: true}
+  - {at: 3.9, gait: pace}
   - {at: 4.4, inhibit: false}
 """
 
@@ -93,7 +96,7 @@ def plain_run(scenario_file: Path, **values: Any) -> tuple[list[RobotState], lis
     robot = MujocoRobot(
         suite.robot_file, suite.tick_ns, world=suite.world, sensors=suite.sensors
     )
-    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
+    loop = WalkingLoop(robot.description, suite.gait, suite.parameters, load_gaits())
     states, ticks = [robot.reset()], []
 
     def step() -> RobotState:
@@ -141,6 +144,10 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
         recording.joints.velocity, [state.joint_velocity for state in states[:-1]]
     )
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
+    words = [tick.gait for tick in ticks]
+    assert list(recording.canonical.frame) == words
+    assert {'amble', 'trot', 'pace'} <= {word.partition(' *')[0] for word in words}
+    assert any(word.startswith('trot>walk') for word in words)
     np.testing.assert_array_equal(recording.canonical.x_dot, [tick.x_dot for tick in ticks])
     np.testing.assert_array_equal(
         recording.targets.effort, [tick.targets.effort for tick in ticks]

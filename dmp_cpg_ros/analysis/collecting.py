@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -55,6 +56,7 @@ class Collector:
             for topic in ('reference', 'cmd_vel', 'odom', 'estimated_odom', 'imu')
         }
         self._unstamped_commands: Rows = ([], [])
+        self._frames: dict[int, str] = {}  # stamp [ns], gait in force
         self._clock: tuple[list[int], list[int]] = ([], [])  # bag time, robot's clock [ns]
         self._ticks: tuple[list[int], list[int]] = ([], [])
         self._inhibition: list[StatusEvent] = []
@@ -66,8 +68,9 @@ class Collector:
             ('joint_targets', 'sensor_msgs/msg/JointState'): self._take_joint_targets,
             **{
                 (name, 'sensor_msgs/msg/JointState'): self._taker_of_named(name)
-                for name in JOINT_TOPICS[2:]
+                for name in JOINT_TOPICS[3:]
             },
+            ('canonical_state', 'sensor_msgs/msg/JointState'): self._take_canonical,
             ('reference', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('reference'),
             ('cmd_vel', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('cmd_vel'),
             ('cmd_vel', 'geometry_msgs/msg/Twist'): self._take_unstamped_twist,
@@ -104,7 +107,7 @@ class Collector:
         return Recording(
             joints=self._joints('joint_states'),
             targets=self._joints('joint_targets'),
-            canonical=CanonicalSeries(time, x, x_dot),
+            canonical=CanonicalSeries(time, x, x_dot, self._gaits(len(time))),
             reference=VelocitySeries(*stacked(self._rows['reference'], 3)),
             commands=self._commands(),
             odometry=self._odometry('odom'),
@@ -159,6 +162,16 @@ class Collector:
         stamp = stamp_ns(message.header.stamp)
         self._last_target[stamp] = bag_ns
         self._named['joint_targets'].add(stamp, message)
+
+    def _take_canonical(self, _: int, message: Any) -> None:
+        stamp = stamp_ns(message.header.stamp)
+        self._frames[stamp] = sys.intern(message.header.frame_id)
+        self._named['canonical_state'].add(stamp, message)
+
+    def _gaits(self, count: int) -> tuple[str, ...]:
+        """Gait in force of each canonical state, in the order of the stamps."""
+        frames = tuple(self._frames[stamp] for stamp in sorted(self._frames))
+        return frames if len(frames) == count and any(frames) else ()
 
     def _take_joint_states(self, bag_ns: int, message: Any) -> None:
         stamp = stamp_ns(message.header.stamp)

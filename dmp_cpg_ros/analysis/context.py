@@ -32,13 +32,15 @@ class RunContext:
     robot : RobotDescription or None
         Geometry, mass and limits; metrics that need them are null without.
     gait : Gait or None
-        The gait that was walked; without, phase offsets are taken from the recording.
+        The gait that the walk began with; without, phase offsets are taken from the recording.
     inhibition : InhibitionParameters
         Region C and inhibited legs.
     radius : float
         Radius r of the limit cycle.
     world : World
         What the robot walked on.
+    gaits : mapping of str to Gait
+        Gaits that it may have changed to.
     """
 
     robot: RobotDescription | None = None
@@ -46,6 +48,7 @@ class RunContext:
     inhibition: InhibitionParameters = field(default_factory=InhibitionParameters)
     radius: float = 1.0
     world: World = field(default_factory=World)
+    gaits: Mapping[str, Gait] = field(default_factory=dict)
 
     @property
     def contact_force(self) -> float:

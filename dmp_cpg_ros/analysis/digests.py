@@ -17,6 +17,9 @@ TOPICS = ('canonical_state', 'joint_states', 'joint_targets')
 SHARED_TOPIC = 'joint_targets'
 """Topic with one publisher per leg; their messages interleave differently in every run."""
 
+WORDED_TOPIC = 'canonical_state'
+"""The one whose text changes its length: the name of the gait, or of the change between two."""
+
 
 def payload_digests(path: Path | str) -> dict[str, str]:
     """One SHA-256 per publisher over the message payloads as recorded, in their order.
@@ -50,10 +53,22 @@ def payload_digests(path: Path | str) -> dict[str, str]:
                 key = connection.topic.rsplit('/', 1)[-1]
                 if key == SHARED_TOPIC:
                     key = f'{key}/{_leg(reader, raw, connection.msgtype)}'
+                elif key == WORDED_TOPIC:
+                    raw = _content(reader, raw, connection.msgtype)
                 hashes.setdefault(key, hashlib.sha256()).update(raw)
     except (AnyReaderError, ReaderError, OSError) as error:
         raise DataError(f"the bag '{folder}' is damaged: {error}") from error
     return {key: value.hexdigest() for key, value in sorted(hashes.items())}
+
+
+def _content(reader: AnyReader, raw: bytes, msgtype: str) -> bytes:
+    """Payload with zeros for its alignment bytes.
+
+    In them the middleware leaves what was in its buffer before: where texts change their length
+    that is a piece of an earlier message, and which one depends on time.
+    """
+    message = reader.deserialize(raw, msgtype)  # type: ignore[attr-defined]
+    return bytes(reader.typestore.serialize_cdr(message, msgtype))
 
 
 def _leg(reader: AnyReader, raw: bytes, msgtype: str) -> str:

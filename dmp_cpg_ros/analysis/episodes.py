@@ -74,6 +74,18 @@ def running_intervals(recording: Recording) -> list[tuple[float, float]]:
     return [(episode.start, episode.end) for episode in episodes(recording, RUNNING)]
 
 
+def changing_intervals(recording: Recording) -> list[tuple[float, float]]:
+    """Intervals in which gaits changed [s]."""
+    frames, time = recording.canonical.frame, recording.canonical.time
+    if not frames:
+        return []
+    changing = np.array(['>' in frame for frame in frames])
+    return [
+        (float(time[first]), float(time[min(past, len(time) - 1)]))
+        for first, past in stretches(changing)
+    ]
+
+
 def unwrapped_phases(recording: Recording) -> Array:
     """Growing phases of the four oscillators, ndarray (n, 4) [rad]."""
     return np.unwrap(phase(recording.canonical.x), axis=0)
@@ -120,6 +132,8 @@ def steady_segments(recording: Recording) -> list[tuple[float, float]]:
     running = np.zeros(len(time), dtype=bool)
     for start, end in running_intervals(recording):
         running |= (time >= start) & (time < end)
+    for start, end in changing_intervals(recording):
+        running &= (time < start) | (time > end)
     segments = []
     for first, past in stretches(steady & running):
         start, end = float(time[first]) + SETTLING, float(time[past - 1])

@@ -54,11 +54,15 @@ class CanonicalSeries:
         [s]
     x, x_dot : ndarray (n, 4, 2)
         States and their time derivatives [1/s].
+    frame : tuple of str
+        Gait in which the phases are to be read, one per state
+        (:mod:`~dmp_cpg_ros.core.gait_reader`); empty where it was not recorded.
     """
 
     time: Array = field(default_factory=no_rows)
     x: Array = field(default_factory=lambda: no_rows(N_LEGS, 2))
     x_dot: Array = field(default_factory=lambda: no_rows(N_LEGS, 2))
+    frame: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

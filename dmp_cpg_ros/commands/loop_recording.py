@@ -53,7 +53,8 @@ def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> Re
         robot,
         targets=JointSeries(time, _column(targets, 'position'), _column(targets, 'velocity'),
                             _column(targets, 'effort')),
-        canonical=CanonicalSeries(time, _column(ticks, 'x'), _column(ticks, 'x_dot')),
+        canonical=CanonicalSeries(time, _column(ticks, 'x'), _column(ticks, 'x_dot'),
+                                  tuple(tick.gait for tick in ticks)),
         reference=VelocitySeries(time, _column(ticks, 'r')), inhibition=tuple(_events(ticks)),
         modes=tuple(_modes(ticks)))
 

@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.world import World
 from dmp_cpg_ros.core.world_choice import WorldParameters
-from dmp_cpg_ros.suite import load_gait
+from dmp_cpg_ros.suite import load_gait, load_gaits
 
 Array = NDArray[np.float64]
 
@@ -61,8 +61,9 @@ def run_context(
     """
     robot, path = _robot(robot_file, find_parameter(parameters, 'robot'))
     radius = float(find_parameter(parameters, 'radius', 1.0))
+    gait, gaits = _gaits(parameters)
     context = RunContext(
-        robot, _gait(parameters), _inhibition(parameters), radius, _world(parameters)
+        robot, gait, _inhibition(parameters), radius, _world(parameters), gaits
     )
     return context, path
 
@@ -99,15 +100,17 @@ def _robot(
         return None, None
 
 
-def _gait(parameters: Mapping[str, Any] | None) -> Gait | None:
+def _gaits(parameters: Mapping[str, Any] | None) -> tuple[Gait | None, dict[str, Gait]]:
+    """Gait that the parameters name, and all of its file."""
     name = find_parameter(parameters, 'gait')
     if name is None:
-        return None
+        return None, {}
     try:
-        return load_gait(name, find_parameter(parameters, 'gaits_file', 'gaits.yaml'))
+        file = find_parameter(parameters, 'gaits_file', 'gaits.yaml')
+        return load_gait(name, file), load_gaits(file)
     except DmpCpgError as error:
         _log.warning('phase offsets are taken from the recording: %s', error)
-        return None
+        return None, {}
 
 
 def _inhibition(parameters: Mapping[str, Any] | None) -> InhibitionParameters:

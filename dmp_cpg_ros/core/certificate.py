@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.certificate_contact import contact_limits, later_stop, slo
 from dmp_cpg_ros.core.certificate_hierarchy import hierarchy_inequalities
 from dmp_cpg_ros.core.certificate_inequality import Inequality
 from dmp_cpg_ros.core.certificate_network import analyse_network, network_inequalities
-from dmp_cpg_ros.core.certificate_range import operating_range
+from dmp_cpg_ros.core.certificate_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.certificate_rest import rest_inequalities
 from dmp_cpg_ros.core.certificate_step import step_inequalities
 from dmp_cpg_ros.core.certificate_time import time_to_rest, time_to_walking
@@ -128,7 +128,7 @@ class Certificate:
 
 def certify(network: GaitNetwork, inhibition: InhibitionParameters,
             reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
-            tick_s: float) -> Certificate:
+            tick_s: float, span: OperatingRange | None = None) -> Certificate:
     """Compute the certificate of running parameters.
 
     Parameters
@@ -143,6 +143,8 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
         Transformation systems and swing filters.
     tick_s : float
         Control tick [s].
+    span : OperatingRange, optional
+        Cadences to hold for, when they are not those of the gait.
 
     Returns
     -------
@@ -155,7 +157,7 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     """
     if not (np.isfinite(tick_s) and tick_s > 0.0):
         raise ParameterError(f'tick = {tick_s!r} s must be positive and finite')
-    span = operating_range(network, inhibition, reference)
+    span = span or operating_range(network, inhibition, reference)
     analysis = analyse_network(network, inhibition, span)
     p, found = network.parameters, analysis.found
     rates = (found.rate, max(analysis.contraction.rate, analysis.capture.rate),

@@ -17,6 +17,7 @@ from itertools import combinations
 from typing import Any
 
 from dmp_cpg_ros.core.certificate import Certificate, certify
+from dmp_cpg_ros.core.certificate_change import certify_changes
 from dmp_cpg_ros.core.certificate_suggest import nearest_value
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait import BodyScale, Gait
@@ -25,7 +26,7 @@ from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, S
 
 UNCERTIFIED = frozenset(
     ('auto_inhibit', 'auto_delay', 'start_inhibited', 'cmd_vel_timeout', 'allow_uncertified',
-     *UNCERTIFIED_VOTES, *VOTE_SOURCES))
+     'auto_speeds', 'auto_hysteresis', *UNCERTIFIED_VOTES, *VOTE_SOURCES))
 """Parameters of certified nodes that no inequality depends on."""
 
 _DIGITS = 4
@@ -45,16 +46,21 @@ class Running:
         The robot's lengths.
     tick_s : float
         Control tick [s].
+    others : tuple of Gait
+        Gaits that it may change to and back, before ``cadence_scale``.
     """
 
     parameters: SuiteParameters
     gait: Gait
     scale: BodyScale
     tick_s: float
+    others: tuple[Gait, ...] = ()
 
     def certificate(self) -> Certificate:
         """Compute the certificate."""
         p = self.parameters
+        if self.others:
+            return certify_changes(p, (self.gait, *self.others), self.scale, self.tick_s)
         network = GaitNetwork(p.canonical, self.gait, self.scale)
         return certify(network, p.inhibition, p.reference, p.leg, p.posture, self.tick_s)
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.gait import GRAVITY
 from dmp_cpg_ros.core.gait_network import GaitNetwork
+from dmp_cpg_ros.core.gait_transition import BlendedGait
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.reference import ReferenceParameters
 
@@ -74,7 +75,11 @@ def operating_range(network: GaitNetwork, inhibition: InhibitionParameters,
 
 def _cadences(network: GaitNetwork, largest: float) -> tuple[Array, Array]:
     """Speeds from 0 to the largest between which ω is linear, and ω there."""
-    knots = network.gait.speed * float(np.sqrt(GRAVITY * network.scale.leg_length))
+    gait = network.gait
+    ends = [gait.transition.before, gait.transition.after] if isinstance(
+        gait, BlendedGait) else [gait]
+    knots = np.concatenate([end.speed for end in ends]) * float(
+        np.sqrt(GRAVITY * network.scale.leg_length))
     between = knots[(knots > 0.0) & (knots < largest)]
     speeds = np.unique(np.concatenate([[0.0], between, [largest]]))
     return speeds, np.array([network.gait.omega(float(u), network.scale) for u in speeds])

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait_word import gait_word
 from dmp_cpg_ros.core.phase import wrapped
 from dmp_cpg_ros.core.robot_state import LEGS
 
@@ -74,12 +75,15 @@ class Gait:
     cadence: Array
     duty_factor: Array
     rest: float = field(init=False)
+    cadence_scale: float = field(init=False, default=1.0)
     _tables: tuple[list[float], list[float], list[float]] = field(
         init=False, repr=False, compare=False
     )
 
     def __post_init__(self) -> None:
         """Validate and find the rest phase."""
+        if not self.name or any(sign.isspace() or sign == '>' for sign in self.name):
+            raise ParameterError(f"gait '{self.name}': a name must be one word without '>'")
         if self.lag.shape != (len(LEGS),) or not np.all((self.lag >= 0.0) & (self.lag < 1.0)):
             raise ParameterError(
                 f"gait '{self.name}': lag needs four fractions in [0, 1), not {self.lag}"
@@ -135,6 +139,7 @@ class Gait:
         scaled = copy(self)
         cadence = self.cadence * cadence_scale
         object.__setattr__(scaled, 'cadence', cadence)
+        object.__setattr__(scaled, 'cadence_scale', self.cadence_scale * cadence_scale)
         object.__setattr__(
             scaled, '_tables', (self._tables[0], cadence.tolist(), self._tables[2])
         )
@@ -144,6 +149,26 @@ class Gait:
     def phases(self) -> Array:
         """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
         return -2.0 * np.pi * self.lag
+
+    @property
+    def word(self) -> str:
+        """Text that travels with the phases, see :mod:`~dmp_cpg_ros.core.gait_word`."""
+        return gait_word(self.name, self.cadence_scale)
+
+    @property
+    def rest_rate(self) -> float:
+        """Rate of the rest phase: 0, other than while gaits change [rad/s]."""
+        return 0.0
+
+    def own_omega(self, leg: int, omega: float) -> float:
+        """Frequency with which one leg goes through its cycle when the gait's is ω: the same
+        [rad/s].
+        """
+        return omega
+
+    def own_omegas(self, omega: float) -> float | Array:
+        """As :meth:`own_omega` for all legs [rad/s]."""
+        return omega
 
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω of the oscillators at a foot speed [rad/s].

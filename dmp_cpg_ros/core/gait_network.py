@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical import CanonicalSystem
-from dmp_cpg_ros.core.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait import BodyScale
+from dmp_cpg_ros.core.gait_transition import GaitInForce
 from dmp_cpg_ros.core.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.hopf import AndronovHopf
 from dmp_cpg_ros.core.inhibition import Inhibition
@@ -72,6 +74,30 @@ class CanonicalParameters(Parameters):
     )
 
 
+def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalSystem:
+    """Coupled oscillators that lock at given phases; inhibition pulls each leg to its place when
+    fl has phase 0.
+
+    Parameters
+    ----------
+    parameters : CanonicalParameters
+        Oscillators and coupling.
+    phases : ndarray (4,)
+        Locked phases relative to fl [rad].
+    """
+    graph = graph_from_edges(
+        len(LEGS),
+        topology(parameters.coupling_graph, len(LEGS)),
+        parameters.coupling_gain,
+        phases,
+    )
+    return CanonicalSystem(
+        graph,
+        AndronovHopf(parameters.rho, parameters.radius),
+        state_at(phases, parameters.radius),
+    )
+
+
 class GaitNetwork:
     """Canonical system of one gait with its frequency taken from the reference.
 
@@ -80,7 +106,7 @@ class GaitNetwork:
     parameters : CanonicalParameters
         Oscillators and coupling.
     gait : Gait
-        Phase offsets and cadence, before ``cadence_scale``.
+        Phase offsets and cadence, before ``cadence_scale`` (a blend while gaits change).
     scale : BodyScale
         The robot's lengths.
 
@@ -90,26 +116,32 @@ class GaitNetwork:
         With the cadence that acts: everything that asks a gait for ω must ask this one.
     """
 
-    def __init__(self, parameters: CanonicalParameters, gait: Gait, scale: BodyScale) -> None:
-        """Build the coupled system; inhibition pulls each leg to its place when fl has phase 0."""
+    gait: GaitInForce
+
+    def __init__(
+        self, parameters: CanonicalParameters, gait: GaitInForce, scale: BodyScale
+    ) -> None:
+        """Keep the parts."""
         self.parameters, self.scale = parameters, scale
         self.gait = gait.scaled(parameters.cadence_scale)
-        graph = graph_from_edges(
-            len(LEGS),
-            topology(parameters.coupling_graph, len(LEGS)),
-            parameters.coupling_gain,
-            gait.phases,
-        )
-        self.system = CanonicalSystem(
-            graph,
-            AndronovHopf(parameters.rho, parameters.radius),
-            state_at(gait.phases, parameters.radius),
-        )
 
-    def with_cadence_of(self, gait: Gait) -> GaitNetwork:
-        """Return this network at the cadence of another gait with the same phases."""
+    @cached_property
+    def system(self) -> CanonicalSystem:
+        """The coupled system with the gait's offsets."""
+        return network_system(self.parameters, self.gait.phases)
+
+    @cached_property
+    def target(self) -> Array:
+        """x_d of every leg, ndarray (4, 2)."""
+        return self.system.target
+
+    def with_cadence_of(self, gait: GaitInForce) -> GaitNetwork:
+        """Return this network at the cadence of another gait with the same phases; what was
+        computed for the phases is kept.
+        """
         if gait is self.gait:
             return self
+        _ = self.target  # computed once for both
         other = copy(self)
         other.gait = gait
         return other
@@ -136,15 +168,33 @@ class GaitNetwork:
         """
         parts = max(1, ceil(dt / LONGEST_STEP - 1e-9))
         for _ in range(parts):
-            gains = inhibition.acting_gains(x, self.system.target)
+            gains = inhibition.acting_gains(x, self.target)
             x = self.system.step(x, self.omega(r) + feedback, gains, dt / parts)
         return x
+
+    def advance(
+        self,
+        x: Array,
+        r: Array,
+        inhibition: Inhibition,
+        dt: float,
+        feedback: Array | float = 0.0,
+    ) -> tuple[GaitNetwork, Array]:
+        """Advance the states as :meth:`step`, and the network: another one while gaits change.
+
+        Returns
+        -------
+        network : GaitNetwork
+            In force after the step.
+        x : ndarray (4, 2)
+        """
+        return self, self.step(x, r, inhibition, dt, feedback)
 
     def rate(
         self, x: Array, r: Array, inhibition: Inhibition, feedback: Array | float = 0.0
     ) -> Array:
         """Rate of the states, ẋ (4, 2) [1/s], with feedback as in :meth:`step`."""
-        gains = inhibition.acting_gains(x, self.system.target)
+        gains = inhibition.acting_gains(x, self.target)
         return self.system.field(x, self.omega(r) + feedback, gains)
 
     def locked_state(self, phi: float = 0.0) -> Array:
@@ -165,6 +215,24 @@ class GaitNetwork:
             if np.array_equal(following, x):
                 break
             x = following
+        return x
+
+    def settled(self, x: Array, r: Array, inhibition: Inhibition) -> Array:
+        """Equilibrium (4, 2) near a state under inhibition, by Newton's iteration.
+
+        Parameters
+        ----------
+        x : ndarray (4, 2)
+            State near it.
+        r : ndarray (3,)
+            Reference, about zero.
+        inhibition : Inhibition
+            That acts at x.
+        """
+        omega, gains = self.omega(r), inhibition.acting_gains(x, self.target)
+        for _ in range(6):
+            off = self.system.field(x, omega, gains).ravel()
+            x = x - np.linalg.solve(self.system.jacobian(x, omega, gains), off).reshape(x.shape)
         return x
 
     def phase_errors(self, x: Array) -> Array:

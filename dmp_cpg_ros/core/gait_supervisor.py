@@ -118,6 +118,12 @@ class GaitSupervisor:
         """Keep the parts."""
         self.parameters, self.network, self.activity_rate = parameters, network, activity_rate
 
+    def on(self, network: GaitNetwork) -> GaitSupervisor:
+        """Return a supervisor of another network with the same parameters."""
+        if network is self.network:
+            return self
+        return GaitSupervisor(self.parameters, network, self.activity_rate)
+
     def initial_state(self, time_ns: int = 0) -> SupervisorState:
         """At rest, or free when ``start_inhibited`` is false."""
         stopped = self.parameters.start_inhibited
@@ -145,7 +151,8 @@ class GaitSupervisor:
         elif state.armed:
             gains = self.parameters.armed_gains if state.asked else gains
             gains = np.maximum(gains, state.vote_gains) if state.voted else gains
-        return Inhibition(state.requested, gains, self.parameters.region_radius)
+        at_rest = state.word == 'at_rest'
+        return Inhibition(state.requested, gains, self.parameters.region_radius, at_rest)
 
     def request(
         self, state: SupervisorState, stop: bool, automatic: bool = False
@@ -193,9 +200,11 @@ class GaitSupervisor:
         SupervisorState
         """
         dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
-        omega = self.network.omega(r)
-        rates = phase_rate(x, x_dot)
-        activity = activity_step(state.activity, rates, omega, self.activity_rate, dt)
+        gait, rates = self.network.gait, phase_rate(x, x_dot)
+        own = gait.own_omegas(self.network.omega(r))
+        activity = activity_step(
+            state.activity, rates + gait.rest_rate, own, self.activity_rate, dt
+        )
         state = replace(state, time_ns=time_ns, activity=activity)
         if body_mode == 'standing':
             state = self._automatic(state, command)
@@ -267,7 +276,7 @@ class GaitSupervisor:
     ) -> SupervisorState:
         armed = state.armed or speed <= self.parameters.capture_speed
         inhibition = self.inhibition(replace(state, armed=armed))
-        if not np.any(inhibition.acting_gains(x, self.network.system.target)):
+        if not np.any(inhibition.acting_gains(x, self.network.target)):
             return replace(state, armed=armed, word='waiting')
         if (
             np.abs(rates).max() > REST_PHASE_RATE

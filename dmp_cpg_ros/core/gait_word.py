@@ -4,7 +4,9 @@
 how to read it.
 
 The word is the gait's name, followed by `` *`` and the factor on its cadence where that is not 1:
-``trot``, ``trot *1.25``. The factor is written so that it reads back to the same float.
+``trot``, ``trot *1.25``. While gaits change it is both names, the share s of the way and its rate
+ṡ [1/s]: ``amble>trot 0.35 0.61``. Numbers are written so that they read back to the same floats.
+It is the ``frame_id`` of ``canonical_state``.
 """
 
 from __future__ import annotations

@@ -85,11 +85,14 @@ class Inhibition:
         Armed gains α_i ≥ 0, zero where not armed [1/s].
     region_radius : float
         r0 of the regions C_i = {|x_{i,d} − x_i| ≤ r0}.
+    at_rest : bool
+        Whether oscillators, reference and swings have come to rest.
     """
 
     requested: bool
     gains: Array
     region_radius: float
+    at_rest: bool = False
 
     def acting_gains(self, x: Array, target: Array) -> Array:
         """Gains that act at a state: α_i inside C_i and zero outside.
@@ -111,4 +114,6 @@ class Inhibition:
 def initial_inhibition(parameters: InhibitionParameters) -> Inhibition:
     """Inhibition before the first request: armed when the gait starts at rest."""
     stopped = parameters.start_inhibited
-    return Inhibition(stopped, parameters.armed_gains * float(stopped), parameters.region_radius)
+    return Inhibition(
+        stopped, parameters.armed_gains * float(stopped), parameters.region_radius, stopped
+    )

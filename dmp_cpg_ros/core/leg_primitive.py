@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.foot_path import FootPath, rolling_share
-from dmp_cpg_ros.core.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait import BodyScale
+from dmp_cpg_ros.core.gait_transition import GaitInForce
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.phase import scalar_phase, scalar_phase_rate
@@ -90,17 +91,17 @@ class LegPrimitive:
     description : RobotDescription
         The robot.
     gait : Gait
-        The gait.
+        The gait in force; the attribute is set when it changes.
     parameters : LegParameters
         Gains and swing.
     """
 
     def __init__(
-        self, leg: str, description: RobotDescription, gait: Gait, parameters: LegParameters
+        self, leg: str, description: RobotDescription, gait: GaitInForce, parameters: LegParameters
     ) -> None:
         """Derive foothold and scale from the description."""
-        self.parameters, self.gait = parameters, gait
-        geometry = description.legs[LEGS.index(leg)]
+        self.parameters, self.gait, self.place = parameters, gait, LEGS.index(leg)
+        geometry = description.legs[self.place]
         self.kinematics = LegKinematics(geometry)
         self.scale = body_scale(description)
         self.foothold_in_base = nominal_foothold(description, leg)
@@ -153,9 +154,10 @@ class LegPrimitive:
         p, gait = self.parameters, self.gait
         v_x, v_y, gamma = r.tolist()
         speed = self.scale.foot_speed(v_x, v_y, gamma)
-        omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
+        duty = gait.duty(speed, self.scale)
+        omega = gait.own_omega(self.place, gait.omega(speed, self.scale))
         x_1, x_2 = x.tolist()
-        rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist())
+        rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
         swinging = abs(position) < 0.5 * (1.0 - duty)

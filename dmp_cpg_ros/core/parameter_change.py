@@ -46,7 +46,7 @@ def read_change(value: Any, where: str) -> tuple[dict[str, Any], str]:
     if len(owners) > 1:
         raise DataError(f'{where}: {", ".join(value)} belong to {" and ".join(owners)}; make one '
                         'event for each')
-    values = {name: _like(_defaults()[name], entry) for name, entry in value.items()}
+    values = {name: _like(_defaults().get(name), entry) for name, entry in value.items()}
     return values, 'set ' + ', '.join(f'{name} = {entry}' for name, entry in value.items())
 
 

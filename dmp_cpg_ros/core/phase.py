@@ -93,6 +93,25 @@ def phase_rotation(phi: float) -> Array:
     return np.array([[c, s], [-s, c]])
 
 
+def turned(x: ArrayLike, phi: ArrayLike) -> Array:
+    """States R(φ) x, whose phases are advanced by φ.
+
+    Parameters
+    ----------
+    x : array_like (N, 2)
+        States.
+    phi : array_like (N,)
+        Angles [rad].
+
+    Returns
+    -------
+    ndarray (N, 2)
+    """
+    c, s = np.cos(phi), np.sin(phi)
+    x = np.asarray(x, dtype=float)
+    return np.stack([c * x[:, 0] + s * x[:, 1], c * x[:, 1] - s * x[:, 0]], axis=1)
+
+
 def phase_generator() -> Array:
     """Generator of the rotation: ``x_dot = omega * phase_generator() @ x`` has φ̇ = ω.
 

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.force_distribution import distribute
-from dmp_cpg_ros.core.gait import GRAVITY, Gait
+from dmp_cpg_ros.core.gait import GRAVITY
+from dmp_cpg_ros.core.gait_transition import GaitInForce
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.leg_primitive import body_scale
 from dmp_cpg_ros.core.parameters import Parameters, parameter
@@ -160,13 +161,13 @@ class PostureController:
     description : RobotDescription
         The robot.
     gait : Gait
-        The gait.
+        The gait in force; the attribute is set when it changes.
     parameters : PostureParameters
         Gains.
     """
 
     def __init__(
-        self, description: RobotDescription, gait: Gait, parameters: PostureParameters
+        self, description: RobotDescription, gait: GaitInForce, parameters: PostureParameters
     ) -> None:
         """Scale the virtual model by the robot's mass and inertia."""
         self.description, self.gait, self.parameters = description, gait, parameters
@@ -205,9 +206,11 @@ class PostureController:
         """
         p = self.parameters
         speed = self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
-        omega, duty = self.gait.omega(speed, self.scale), self.gait.duty(speed, self.scale)
-        activity = activity_step(memory.activity, phase_rate(x, x_dot), omega, p.activity_rate, dt)
-        load = self._load(self.gait.cycle_position(phase(x)), duty, activity)
+        gait = self.gait
+        own, duty = gait.own_omegas(gait.omega(speed, self.scale)), gait.duty(speed, self.scale)
+        rates = phase_rate(x, x_dot) + gait.rest_rate
+        activity = activity_step(memory.activity, rates, own, p.activity_rate, dt)
+        load = self._load(gait.cycle_position(phase(x)), duty, activity)
         R_level_base = level_from_base(state.base_quaternion)
         velocity = R_level_base @ state.base_velocity_in_base
         memory = self._corrected(memory, activity, state, velocity, r, dt)

@@ -61,12 +61,13 @@ def predict(
     float
         [s]; infinite when it does not happen within the horizon.
     """
-    network, tick_ns = supervisor.network, round(dt * 1e9)
+    tick_ns = round(dt * 1e9)
     start_ns, inhibition = state.time_ns, published
     for k in range(1, math.ceil(horizon / dt) + 1):
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
         r = reference.step(r, r_ext, dt)
-        x = network.step(x, r, inhibition, dt)
+        network, x = supervisor.network.advance(x, r, inhibition, dt)
+        supervisor = supervisor.on(network)
         state = supervisor.step(
             state, start_ns + k * tick_ns, x, network.rate(x, r, inhibition), r, command,
             body_mode=body_mode,

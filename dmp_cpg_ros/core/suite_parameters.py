@@ -13,7 +13,9 @@ from dataclasses import dataclass, field
 from dmp_cpg_ros.core.body_mode import ModeParameters
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation_parameters import EstimationParameters, StateSourceParameters
+from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait_network import CanonicalParameters
+from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
@@ -39,6 +41,8 @@ class SuiteParameters:
     state_source: StateSourceParameters = field(default_factory=StateSourceParameters)
     votes: VoteSourceParameters = field(default_factory=VoteSourceParameters)
     mode: ModeParameters = field(default_factory=ModeParameters)
+    gait_change: GaitChangeParameters = field(default_factory=GaitChangeParameters)
+    gait_choice: GaitChoiceParameters = field(default_factory=GaitChoiceParameters)
 
 
 @dataclass(frozen=True)
@@ -172,6 +176,8 @@ CERTIFIED: tuple[type[Parameters], ...] = (
     PostureParameters,
     TickParameters,
     GaitParameters,
+    GaitChangeParameters,
+    GaitChoiceParameters,
     RobotFileParameters,
 )
 """Parameter sets that the certificate is computed from; nodes that compute it declare all of
@@ -228,7 +234,18 @@ CHANGEABLE: dict[str, tuple[str, ...]] = {
         'max_turn_rate',
         'cmd_vel_timeout',
     ),
-    'canonical_oscillators': ('rho', 'coupling_gain', 'coupling_graph', 'cadence_scale'),
+    'canonical_oscillators': (
+        'rho',
+        'coupling_gain',
+        'coupling_graph',
+        'cadence_scale',
+        'gait',
+        'gait_change_rate',
+        'auto_gait',
+        'auto_gaits',
+        'auto_speeds',
+        'auto_hysteresis',
+    ),
     'inhibition': (
         'inhibition_gain',
         'region_radius',

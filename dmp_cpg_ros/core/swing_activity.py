@@ -20,7 +20,11 @@ ActivityT = TypeVar('ActivityT', float, NDArray[np.float64])
 
 
 def activity_step(
-    activity: ActivityT, phase_rate: ActivityT, omega: float, rate: float, dt: float
+    activity: ActivityT,
+    phase_rate: ActivityT,
+    omega: float | NDArray[np.float64],
+    rate: float,
+    dt: float,
 ) -> ActivityT:
     """Advance ȧ = rate · (sat(φ̇/ω) − a) exactly for a held phase rate.
 
@@ -30,8 +34,8 @@ def activity_step(
         a in [0, 1].
     phase_rate : float or ndarray (...)
         φ̇ [rad/s].
-    omega : float
-        Free-running ω > 0 [rad/s].
+    omega : float or ndarray (...)
+        Free-running ω > 0 [rad/s], of all or of each.
     rate : float
         Rate of the filter [1/s].
     dt : float

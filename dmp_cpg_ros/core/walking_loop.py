@@ -20,6 +20,7 @@ from dmp_cpg_ros.core.body_estimate import estimated_state
 from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.body_mode import ModeState
 from dmp_cpg_ros.core.body_requests import REQUESTS
+from dmp_cpg_ros.core.certificate_change import refused_change
 from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
 from dmp_cpg_ros.core.contact_phase import ContactPhase, initial_contact_state
 from dmp_cpg_ros.core.errors import DataError
@@ -27,6 +28,8 @@ from dmp_cpg_ros.core.estimation_parameters import ESTIMATE
 from dmp_cpg_ros.core.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait import Gait
 from dmp_cpg_ros.core.gait_network import GaitNetwork
+from dmp_cpg_ros.core.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait_reader import GaitReader
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
 from dmp_cpg_ros.core.leg_primitive import LegPrimitive, LegState, body_scale
@@ -66,6 +69,8 @@ class Tick:
         Of all twelve joints.
     mode : ModeState
         What the body does.
+    gait : str
+        Word of the gait in which the phases are to be read, as in ``canonical_state``.
     """
 
     time_ns: int
@@ -76,6 +81,7 @@ class Tick:
     feedback: PostureFeedback
     targets: JointTargets
     mode: ModeState
+    gait: str = ''
 
 
 class WalkingLoop:
@@ -89,15 +95,22 @@ class WalkingLoop:
         The gait.
     parameters : SuiteParameters
         Parameters of all parts.
+    gaits : mapping of str to Gait, optional
+        Gaits that it may change to, beside the first.
     """
 
     def __init__(
-        self, description: RobotDescription, gait: Gait, parameters: SuiteParameters | None = None
+        self,
+        description: RobotDescription,
+        gait: Gait,
+        parameters: SuiteParameters | None = None,
+        gaits: Mapping[str, Gait] | None = None,
     ) -> None:
         """Build the parts at rest (or free, with ``start_inhibited`` false)."""
         self.parameters = p = parameters or SuiteParameters()
-        self._gait = gait
-        self._running = RunningNetwork(p.canonical, gait, body_scale(description))
+        reader = GaitReader({**(gaits or {}), gait.name: gait}, unnamed=gait)
+        networks = GaitNetworks(p.canonical, body_scale(description), p.gait_change, reader)
+        self._running = RunningNetwork(networks, gait, p.gait_choice)
         self.network = self._running.network
         self.gate, self.reference = CommandGate(p.reference), ReferenceSystem(p.reference)
         self.supervisor = GaitSupervisor(p.inhibition, self.network, p.leg.activity_rate)
@@ -176,18 +189,34 @@ class WalkingLoop:
         ParameterError
             If a value is impossible.
         """
-        present = Running(self.parameters, self._gait, self.network.scale, self._dt)
-        proposed = present.changed(values)
+        running, name = self._running, values.get('gait', self._running.wanted.name)
+        wanted = running.networks.reader.named(name)
+        present = self._described(self.parameters, running.wanted)
+        proposed = self._described(present.changed(values).parameters, wanted)
+        reason = refused_change(
+            proposed.parameters, (running.leading_to, running.wanted, wanted), present.scale,
+            self._dt,
+        )
+        if reason:
+            return reason
         verdict = CertificateGate().judge(present, present.certificate(), proposed)
         if verdict.accepted:
             self.parameters = p = proposed.parameters
-            self._running.change(p.canonical)
+            self._running.change(p.canonical, p.gait_change)
+            self._running.choice, self._running.wanted = p.gait_choice, wanted
             self.gate.parameters = self.reference.parameters = p.reference
             self.supervisor.parameters = p.inhibition
             self.votes.follow(p.inhibition, p.reference, p.votes)
             if self.contact is not None:
                 self.contact.limits = verdict.certificate.contact
         return verdict.reason
+
+    def _described(self, parameters: SuiteParameters, gait: Gait) -> Running:
+        """What a certificate is computed from."""
+        choice, named = parameters.gait_choice, self._running.networks.reader.named
+        others = [named(name) for name in choice.auto_gaits if choice.auto_gait]
+        return Running(parameters, gait, self.network.scale, self._dt,
+                       tuple(other for other in others if other is not gait))
 
     def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
         """Vote for a stop, as the topic ``votes`` does; counts from the next tick on.
@@ -224,6 +253,10 @@ class WalkingLoop:
             raise DataError(f'{what}: {answer.text}')
         return answer.text
 
+    def change_gait(self, name: str) -> str:
+        """Change the gait, as :meth:`change`."""
+        return self.change({'gait': name})
+
     @property
     def takers(self) -> dict[str, Callable[[Any], Any]]:
         """What takes the events of a scenario, by kind, for
@@ -235,6 +268,7 @@ class WalkingLoop:
             'set': self.change,
             'votes': lambda weights: self.vote(weights, 'scenario'),
             **{what: self._asking(what) for what in REQUESTS},
+            'gait': self.change_gait,
         }
 
     def _asking(self, what: str) -> Callable[[Any], Any]:
@@ -254,14 +288,15 @@ class WalkingLoop:
         """
         dt = 0.0 if self._time_ns is None else (state.time_ns - self._time_ns) * 1e-9
         self._time_ns, self._dt = state.time_ns, dt or self._dt
-        self._follow(self._running.advance(dt))
         command = self.gate.at(state.time_ns)
         inhibition = self.inhibition
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
         self.r = self.reference.step(self.r, r_ext, dt)
+        self.x = self._running.begin_tick(self.x, self.r, inhibition, dt)
+        self._follow(self._running.network)
         offset = self._contact_offset(state, inhibition, dt)
-        if dt > 0.0:
-            self.x = self.network.step(self.x, self.r, inhibition, dt, offset)
+        self.x = self._running.advance(self.x, self.r, inhibition, dt, offset)
+        self._follow(self._running.network)
         x_dot = self.network.rate(self.x, self.r, inhibition, offset)
         feedback = self._balance(self._body(state), x_dot, dt)
         self.barring = self.mode.mode
@@ -293,6 +328,7 @@ class WalkingLoop:
                 )
             ),
             self.mode,
+            self._running.word,
         )
 
     def _contact_offset(
@@ -302,7 +338,7 @@ class WalkingLoop:
         if self.contact is None:
             return 0.0
         if self.contact.limits is None and dt > 0.0:
-            running = Running(self.parameters, self._gait, self.network.scale, dt)
+            running = self._described(self.parameters, self._running.wanted)
             self.contact.limits = running.certificate().contact
         self.contact_state, offset = self.contact.step(
             self.contact_state, state.foot_force, self.network, self.x, self.r, inhibition, dt

@@ -17,19 +17,27 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.contact_phase import ContactPhase, initial_contact_state
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.foot_contact import quarter_weight
+from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
 from dmp_cpg_ros.core.phase_lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.running_network import RunningNetwork
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CertificateParameters
+from dmp_cpg_ros.core.suite_parameters import (
+    NODE_PARAMETERS,
+    CertificateParameters,
+    GaitParameters,
+)
 from dmp_cpg_ros.core.walking_loop import initial_canonical_state
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, read_reference
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import certificate_words, description_of, gait_of
+from dmp_cpg_ros.nodes.gait_changes import check_gait, take_gait
+from dmp_cpg_ros.nodes.gait_setup import certificate_words, description_of, gait_name
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionMessage, read_inhibition_state
 from dmp_cpg_ros.nodes.message_values import header_ns
+from dmp_cpg_ros.nodes.parameterized_node import Sets
 from dmp_cpg_ros.nodes.robot_state_messages import FootContactsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
@@ -49,7 +57,9 @@ class CanonicalOscillators(CertifiedNode):
         if not self.certificate.holds:
             self._without_certificate(self.certificate.explained())
         self._running_network = RunningNetwork(
-            self.parameters_of(CanonicalParameters), gait_of(self), self._scale
+            self.new_networks(),
+            self.gaits.named(gait_name(self)),
+            self.parameters_of(GaitChoiceParameters),
         )
         network = self._running_network.network
         self._x, self._last_ns = initial_canonical_state(network, inhibition), -1
@@ -82,7 +92,19 @@ class CanonicalOscillators(CertifiedNode):
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
-        self._running_network.change(self.parameters_of(CanonicalParameters))
+        running = self._running_network
+        running.change(
+            self.parameters_of(CanonicalParameters), self.parameters_of(GaitChangeParameters)
+        )
+        take_gait(
+            running, self.parameters_of(GaitParameters), self.parameters_of(GaitChoiceParameters)
+        )
+
+    def check_parameters(self, sets: Sets) -> None:
+        """Refuse a gait that there is not, and a change of gait that is not certified."""
+        if self.configured:
+            check_gait(self._running_network, sets, self._accepted)
+        super().check_parameters(sets)
 
     def others_changed(self) -> None:
         """Watch the certificate of all that runs: two nodes may have accepted changes at the same
@@ -95,19 +117,19 @@ class CanonicalOscillators(CertifiedNode):
         dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
         self._last_ns = stamp_ns
         self._inhibition = values['inhibition_state'] or self._inhibition
-        r, network = values['reference'], self._running_network.advance(dt)
-        offset = self._contact_offset(stamp_ns, values, network, dt)
-        if dt > 0.0:
-            self._x = network.step(self._x, r, self._inhibition, dt, offset)
-        x_dot = network.rate(self._x, r, self._inhibition, offset)
+        r, running = values['reference'], self._running_network
+        self._x = running.begin_tick(self._x, r, self._inhibition, dt)
+        offset = self._contact_offset(stamp_ns, values, running.network, dt)
+        self._x = running.advance(self._x, r, self._inhibition, dt, offset)
+        x_dot = running.network.rate(self._x, r, self._inhibition, offset)
         word = self._running_network.word
         self._publisher.publish(self._writer.fill(stamp_ns, self._x, x_dot, word))
-        self._watch_phases(network, r, dt)
+        self._watch_phases(self._running_network.network, r, dt)
 
     def _watch_phases(self, network: GaitNetwork, r: Any, dt: float) -> None:
         """Compare the phases with their bound; an alarm is published at once."""
         acting = self._inhibition.gains.any() and self._inhibition.acting_gains(
-            self._x, network.system.target
+            self._x, network.target
         ).any()
         former = LOCKED if self._lock is None else self._lock.level
         limits = self.certificate.contact
@@ -162,6 +184,7 @@ class CanonicalOscillators(CertifiedNode):
             'phase_error_rad': nan if self._lock is None else self._lock.error,
             'phase_error_bound_rad': nan if self._lock is None else self._lock.bound,
             'gait': self._running_network.word,
+            'gait_wanted': self._running_network.wanted.name,
             'certificate': certificate_words(self.certificate),
         }
 
@@ -171,7 +194,12 @@ def inhibition_from(message: InhibitionMessage) -> Inhibition:
     finite.
     """
     gains = np.array([message.number(f'gain_{leg}') for leg in LEGS])
-    return Inhibition(message.flag('requested'), gains, message.number('region_radius'))
+    return Inhibition(
+        message.flag('requested'),
+        gains,
+        message.number('region_radius'),
+        message.word == 'at_rest',
+    )
 
 
 def main() -> int:

@@ -9,8 +9,8 @@ refuses a change that would lose it; the others follow what the owner has accept
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 from rclpy.parameter import Parameter
 
@@ -23,7 +23,10 @@ from dmp_cpg_ros.core.certificate_gate import (
     shown,
 )
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
-from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
+from dmp_cpg_ros.core.gait_network import CanonicalParameters
+from dmp_cpg_ros.core.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait_transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters, body_scale
 from dmp_cpg_ros.core.posture import PostureParameters
@@ -36,10 +39,10 @@ from dmp_cpg_ros.core.suite_parameters import (
     SuiteParameters,
     TickParameters,
 )
-from dmp_cpg_ros.nodes.gait_setup import description_of, gaits_of
+from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.parameter_follower import ParameterFollower
-from dmp_cpg_ros.nodes.parameterized_node import Sets
+from dmp_cpg_ros.nodes.parameterized_node import P, Sets
 from dmp_cpg_ros.nodes.ros_parameters import ros_value
 from dmp_cpg_ros.nodes.tick_inputs import drain
 
@@ -62,6 +65,8 @@ class CertifiedNode(ManagedNode):
         self._following = False
         self._judged: Verdict | None = None
         self._held: Certificate | None = None
+        self._held_in: dict[str, Certificate] = {}
+        self._held_for: Sets = {}
         self._changes = CertificateGate(self._let_ticks_pass)
         super().__init__(name, **options)
 
@@ -74,17 +79,31 @@ class CertifiedNode(ManagedNode):
             self._held = self._running(self._accepted).certificate()
         return self._held
 
+    def certificate_in(self, gait: GaitInForce) -> Certificate:
+        """Certificate of a gait in force, or of a change between two, with the same parameters."""
+        if gait.name == self._accepted_of(GaitParameters).gait:
+            return self.certificate
+        if self._held_for is not self._accepted:
+            self._held_for, self._held_in = self._accepted, {}
+        found = self._held_in.get(gait.name)
+        if found is None:
+            ends = (gait.transition.before, gait.transition.after) if isinstance(
+                gait, BlendedGait) else (gait,)
+            names = [end.name for end in ends]
+            found = self._held_in[gait.name] = self._running(self._accepted, names).certificate()
+        return found
+
     def prepare_certificate(self) -> None:
         """Read what certificates are computed from, and follow the others; in ``configure``."""
-        self._gaits, self._scale = gaits_of(self), body_scale(description_of(self))
+        self.gaits, self._scale = gait_reader(self), body_scale(description_of(self))
         self._held = None
         others = {node: names for node, names in CHANGEABLE.items() if node != self.KIND}
         self._follower = ParameterFollower(self, others, self._follow)
 
-    def new_network(self) -> GaitNetwork:
-        """Network of the parameters in effect, without reading any file."""
-        return GaitNetwork(self.parameters_of(CanonicalParameters),
-                           self._gaits[self.parameters_of(GaitParameters).gait], self._scale)
+    def new_networks(self) -> GaitNetworks:
+        """Networks of all gaits with the parameters in effect, without reading any file."""
+        return GaitNetworks(self.parameters_of(CanonicalParameters), self._scale,
+                            self.parameters_of(GaitChangeParameters), self.gaits)
 
     def certificate_changed(self) -> None:
         """Say on ``/diagnostics`` whether the accepted parameters are certified."""
@@ -101,20 +120,26 @@ class CertifiedNode(ManagedNode):
             self._follower = None
         super().destroy_entities()
 
-    def _running(self, sets: Sets) -> Running:
-        """What parameter sets describe; raises ParameterError for a gait that there is not."""
+    def _accepted_of(self, cls: type[P]) -> P:
+        return cast(P, self._accepted[cls])
+
+    def _running(self, sets: Sets, names: Sequence[str] = ()) -> Running:
+        """What parameter sets describe, or the same with other gaits; raises ParameterError for a
+        gait that there is not.
+        """
         def of(cls: Any) -> Any:
             return sets[cls]
 
-        name = of(GaitParameters).gait
-        if name not in self._gaits:
-            raise ParameterError(
-                f"there is no gait '{name}'; valid are {', '.join(self._gaits)}")
+        choice = of(GaitChoiceParameters)
+        chosen = choice.auto_gaits if choice.auto_gait else ()
+        names = names or (of(GaitParameters).gait, *chosen)
+        gait, *others = [self.gaits.named(name) for name in dict.fromkeys(names)]
         parameters = SuiteParameters(of(ReferenceParameters), of(CanonicalParameters),
                                      of(InhibitionParameters), of(LegParameters),
-                                     of(PostureParameters))
-        return Running(parameters, self._gaits[name], self._scale,
-                       of(TickParameters).tick_ns * 1e-9)
+                                     of(PostureParameters), gait_change=of(GaitChangeParameters),
+                                     gait_choice=choice)
+        return Running(parameters, gait, self._scale, of(TickParameters).tick_ns * 1e-9,
+                       tuple(others))
 
     # Own changes -------------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.certificate import Certificate
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters
@@ -27,7 +28,7 @@ from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference, read_twist
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import GaitReader, certificate_words
+from dmp_cpg_ros.nodes.gait_setup import certificate_words
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
 from dmp_cpg_ros.nodes.inhibition_votes import NodeVotes
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
@@ -51,8 +52,9 @@ class InhibitionNode(CertifiedNode):
             self.parameters_of(ReferenceParameters),
         )
         self.prepare_certificate()
-        gaits = GaitReader(self)
-        network = self.new_network()
+        gaits = self.gaits
+        self._networks = self.new_networks()
+        network = self._networks.of(gaits.read(''))
         self._supervisor = GaitSupervisor(
             parameters, network, self.parameters_of(LegParameters).activity_rate
         )
@@ -119,15 +121,16 @@ class InhibitionNode(CertifiedNode):
         self._supervisor.parameters = self.parameters_of(InhibitionParameters)
         self._gate.parameters = self.parameters_of(ReferenceParameters)
         self._reference.parameters = self.parameters_of(ReferenceParameters)
-        acting = self._supervisor.network.gait
-        self._supervisor.network = self.new_network().with_cadence_of(acting)
+        self._networks = self.new_networks()
+        self._supervisor.network = self._networks.of(self._supervisor.network.gait)
         self._votes.follow()
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the state of the stop to the stamp of the canonical state."""
         self._x, x_dot, gait = values['canonical_state']
         self._r = values['reference']
-        self._supervisor.network = self._supervisor.network.with_cadence_of(gait)
+        if gait is not self._supervisor.network.gait:
+            self._supervisor.network = self._networks.of(gait)
         before = self._state
         self._body_mode = values['body_mode'] or self._body_mode
         ballot = self._votes.count(stamp_ns, values, self._supervisor.network, before.word)
@@ -146,6 +149,12 @@ class InhibitionNode(CertifiedNode):
             self._predict(self._acting)
         if self._lock_step or self._news() != self._told:
             self._publish()
+
+    def _certificate_in_force(self) -> Certificate:
+        return self.certificate_in(self._supervisor.network.gait)
+
+    def _words(self) -> str:
+        return certificate_words(self._certificate_in_force())
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop."""
@@ -198,7 +207,7 @@ class InhibitionNode(CertifiedNode):
         self._predict(self._acting)
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
         response.message = (
-            f'{verb} {when}, at most {self._bound:.3f} s; {certificate_words(self.certificate)}'
+            f'{verb} {when}, at most {self._bound:.3f} s; {self._words()}'
         )
         return response
 
@@ -216,7 +225,7 @@ class InhibitionNode(CertifiedNode):
             tick_s,
             body_mode=self._body_mode,
         )
-        certificate = self.certificate
+        certificate = self._certificate_in_force()
         self._bound = (
             certificate.time_to_rest if self._state.requested else certificate.time_to_walking
         )
@@ -239,7 +248,7 @@ class InhibitionNode(CertifiedNode):
             predicted_s=self._predicted,
             bound_s=self._bound,
             measured_s=state.measured_s,
-            grade=certificate_words(self.certificate),
+            grade=self._words(),
             **self._votes.told(state),
         )
         self._publisher.publish(self._writer.fill(state.time_ns, state.word, values))

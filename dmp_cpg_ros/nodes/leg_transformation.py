@@ -23,7 +23,7 @@ from dmp_cpg_ros.nodes.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import GaitReader, description_of
+from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import Array, header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
@@ -52,8 +52,8 @@ class LegTransformation(ManagedNode):
         self._joints = slice(
             len(JOINTS_OF_LEG) * self._place, len(JOINTS_OF_LEG) * (self._place + 1)
         )
-        gaits, description = GaitReader(self), description_of(self)
-        self._primitive = LegPrimitive(leg, description, gaits.gait, parameters)
+        gaits, description = gait_reader(self), description_of(self)
+        self._primitive = LegPrimitive(leg, description, gaits.read(''), parameters)
         self._motion = LegMotion(
             self._joints, Movements(description), self._primitive.transformation
         )

@@ -23,7 +23,7 @@ from dmp_cpg_ros.nodes.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import GaitReader, description_of
+from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
@@ -44,10 +44,10 @@ class PostureControl(ManagedNode):
 
     def configure(self) -> None:
         """Build the controller and its topics."""
-        gaits, canonical = GaitReader(self), CanonicalStateReader()
+        gaits, canonical = gait_reader(self), CanonicalStateReader()
         description = description_of(self)
         self._controller = PostureController(
-            description, gaits.gait, self.parameters_of(PostureParameters)
+            description, gaits.read(''), self.parameters_of(PostureParameters)
         )
         self._body = BodyState(self, description)
         self._memory, self._last_ns = self._controller.initial_state(), -1

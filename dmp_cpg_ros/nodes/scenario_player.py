@@ -9,9 +9,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, WrenchStamped
-from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -99,11 +97,10 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             what: self.create_client(Trigger, interface(what).name) for what in REQUESTS
         }
         self.mode = ''
-        self._gait = self.create_client(SetParameters, f'{GAIT_OWNER}/set_parameters')
         self._deliver: dict[str, Callable[[Any], None]] = {
             'command': self._send,
             'inhibit': self._call_inhibit,
-            'gait': self._set_gait,
+            'gait': lambda name: self._set({'gait': name}),
             'push': self._push,
             'set': self._set,
             'votes': self._vote,
@@ -121,7 +118,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     def connected(self) -> bool:
         """Whether the gate, the readers of commands and the service are there."""
-        services = (self._inhibit, self._gait, *self._modes.values())
+        services = (self._inhibit, *self._modes.values())
         return (
             self._gate.get_subscription_count() > 0
             and all(client.service_is_ready() for client in services)
@@ -264,22 +261,6 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             known, self.mode = self.mode, mode
             if known or mode != 'standing':
                 self._say(header_ns(message) * 1e-9, mode)
-
-    def _set_gait(self, name: str) -> None:
-        """Set the parameter as ``ros2 param set`` does; a change that was accepted acts at the
-        held tick.
-        """
-        change = Parameter('gait', value=name).to_parameter_msg()
-        request = SetParameters.Request(parameters=[change])
-        self._gait.call_async(request).add_done_callback(self._gait_set)
-
-    def _gait_set(self, future: Future) -> None:
-        answer = future.result()
-        results = [] if answer is None else answer.results
-        if not results or not results[0].successful:
-            self._fail(f'gait: {results[0].reason if results else "no answer"}')
-            return
-        self._delivered()
 
     def _set(self, values: dict[str, Any]) -> None:
         """Ask the owner for a change; the robot walks on when it is refused."""

@@ -10,13 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.analysis import gait_in_force
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import RUNNING, episodes, gait_period, steady_segments
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.motion import held, stretches
+from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.leg_primitive import body_scale
-from dmp_cpg_ros.core.phase import phase
 from dmp_cpg_ros.core.robot_state import LEGS
 
 CAPTION = (
@@ -59,17 +58,10 @@ def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool
 
     While a stop or a start is under way every foot is planned where it is, and nothing is drawn.
     """
-    canonical, reference = recording.canonical, recording.reference
-    if (
-        context.gait is None
-        or context.robot is None
-        or not (canonical.time.size and reference.time.size)
-    ):
+    canonical = recording.canonical
+    stance, duty = gait_in_force.planned_stance(recording, context)
+    if not duty.size:
         return None
-    scale = body_scale(context.robot)
-    values = held(reference.time, reference.value, canonical.time)
-    duty = np.array([context.gait.duty(scale.foot_speed(*value), scale) for value in values])
-    stance = np.abs(context.gait.cycle_position(phase(canonical.x))) >= 0.5 * (1.0 - duty[:, None])
     running = np.zeros(len(canonical.time), dtype=bool)
     for episode in episodes(recording, RUNNING):
         running |= (canonical.time >= episode.start) & (canonical.time < episode.end)

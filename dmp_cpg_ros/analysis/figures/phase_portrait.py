@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, Patch
 
+from dmp_cpg_ros.analysis import gait_in_force
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import STOPPING, Episode, episodes
 from dmp_cpg_ros.analysis.figures import style
@@ -66,6 +67,18 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     return figure
 
 
+def _place_at(recording: Recording, context: RunContext, time: float, leg: int
+              ) -> tuple[float, float]:
+    """x_d of a leg in the gait in force at a time."""
+    offsets = gait_in_force.phase_offsets(recording, context)
+    if offsets is None:
+        x_1, x_2 = _places(context)[leg]
+        return float(x_1), float(x_2)
+    row = min(int(np.searchsorted(recording.canonical.time, time)), len(offsets)) - 1
+    x_1, x_2 = state_at(offsets[max(row, 0), leg], context.radius)
+    return float(x_1), float(x_2)
+
+
 def _places(context: RunContext) -> np.ndarray:
     offsets = context.phase_offsets
     return state_at(np.zeros(len(LEGS)) if offsets is None else offsets, context.radius)
@@ -89,7 +102,7 @@ def _inhibited(
     axes: Axes, recording: Recording, context: RunContext, stop: Episode, held: int
 ) -> None:
     time, x = recording.canonical.time, recording.canonical.x[:, held]
-    target = _places(context)[held]
+    target = _place_at(recording, context, stop.end, held)
     _limit_cycle(axes, context)
     axes.add_patch(
         Circle(

@@ -60,7 +60,9 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
         'm',
         'root mean square of estimated minus true height over the ground, once per second',
     ),
-    'gait.name': ('', 'gait that was walked'),
+    'gait.name': ('', 'gait that the walk began with'),
+    'gait.names': ('', 'gaits that were walked, in order'),
+    'gait.changes': ('s', 'intervals in which gaits changed'),
     'gait.phase_error_rad_max': (
         'rad',
         'largest deviation of a leg from its place in the gait, walking freely and settled',

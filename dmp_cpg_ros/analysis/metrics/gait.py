@@ -13,13 +13,14 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import (
     MOVING,
     SETTLING,
+    changing_intervals,
     gait_period,
     running_intervals,
     steady_segments,
 )
+from dmp_cpg_ros.analysis.gait_in_force import gaits_walked, phase_offsets, planned_stance
 from dmp_cpg_ros.analysis.motion import held, mean_between
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.leg_primitive import body_scale
 from dmp_cpg_ros.core.phase import phase, wrapped
 from dmp_cpg_ros.core.robot_state import LEGS
 
@@ -32,6 +33,7 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     Returns
     -------
     dict
+        ``name`` of the gait at the start, ``names`` of all in order and their ``changes``;
         ``phase_error_rad_max``, the largest deviation of a leg from its place in the gait while
         walking freely and settled; ``duty_factor``, the measured share of the cycle on the ground,
         mean of the legs, with ``duty_factor_of_leg`` and the planned ``duty_factor_planned``;
@@ -42,6 +44,11 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     duty = duty_factors(recording, context)
     return {
         'name': None if context.gait is None else context.gait.name,
+        'names': gaits_walked(recording) or None,
+        'changes': [
+            {'start_s': start, 'end_s': end} for start, end in changing_intervals(recording)
+        ]
+        or None,
         'phase_error_rad_max': float(np.abs(errors[settled]).max()) if settled.any() else None,
         'duty_factor': None if duty is None else float(duty.mean()),
         'duty_factor_of_leg': None
@@ -60,10 +67,11 @@ def phase_errors(recording: Recording, context: RunContext) -> tuple[Array, Arra
     time : ndarray (n,)
         [s]
     error : ndarray (n, 4)
-        [rad]; where the gait is not known its offsets are the circular means of the settled walk.
+        [rad]; from the places in the gait in force, which move while gaits change. Where the gait
+        is not known its offsets are the circular means of the settled walk.
     """
     time, phi = recording.canonical.time, phase(recording.canonical.x)
-    offsets = context.phase_offsets
+    offsets = phase_offsets(recording, context)
     if offsets is None:
         relative = (phi - phi[:, :1])[settled_rows(recording, time)]
         offsets = np.arctan2(np.sin(relative).sum(axis=0), np.cos(relative).sum(axis=0))
@@ -96,16 +104,9 @@ def duty_factors(recording: Recording, context: RunContext) -> Array | None:
 def planned_duty_factor(recording: Recording, context: RunContext) -> float | None:
     """Duty factor that the gait plans, averaged over the same stretches."""
     segments = steady_segments(recording)
-    if context.gait is None or context.robot is None or not segments:
+    _, duty = planned_stance(recording, context)
+    if not duty.size or not segments:
         return None
-    scale = body_scale(context.robot)
-    planned = [
-        context.gait.duty(
-            scale.foot_speed(
-                *held(recording.reference.time, recording.reference.value, np.array([start]))[0]
-            ),
-            scale,
-        )
-        for start, _ in segments
-    ]
+    time = recording.canonical.time
+    planned = [duty[(time >= start) & (time <= end)].mean() for start, end in segments]
     return float(np.average(planned, weights=[end - start for start, end in segments]))
