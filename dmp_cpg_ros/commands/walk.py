@@ -52,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
                 'proposes gains that hold; --set allow_uncertified:=true walks all the same)'
             )
+        if options.video:
+            film_path(options.video, Path())
         folder = make_run_folder(options.out)
     except DmpCpgError as error:
         print(f'walk: {error}', file=sys.stderr)
@@ -71,6 +73,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     status = _run(scenario, suite, overrides, folder, options)
     if (folder / 'bag').is_dir():
         status = max(status, _analyze(scenario, suite, certificate, overrides, folder, options))
+    if options.video is not None and (folder / 'bag').is_dir():
+        _film(folder, film_path(options.video, folder))
     print(f'{folder.name}: {time.monotonic() - begin:.0f} s in all')
     return status
 
@@ -178,6 +182,28 @@ def _check_votes(scenario: Scenario, suite: Suite) -> None:
         raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
 
 
+def film_path(given: str, folder: Path) -> Path:
+    """Return the film's file, by default in the run's folder; raises ParameterError before the
+    run when it could not be written after it.
+    """
+    from dmp_cpg_ros.commands.film_files import checked_film_path, has_encoder
+
+    return checked_film_path(
+        Path(given) if given else folder / f'walk.{"mp4" if has_encoder() else "gif"}'
+    )
+
+
+def _film(folder: Path, path: Path) -> None:
+    """Film the run; one that cannot be drawn here is no failure of the run."""
+    from dmp_cpg_ros.commands.film import film_run
+
+    try:
+        frames = film_run(folder, path)
+        print(f'video: {os.path.relpath(path)}, {frames} frames')
+    except (DmpCpgError, OSError) as error:
+        print(f'walk: no video: {error}', file=sys.stderr)
+
+
 def _certificate(suite: Suite) -> Certificate:
     """Certificate of the parameters that the nodes will run with."""
     p = suite.parameters
@@ -240,6 +266,14 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument('--rate', metavar='HZ', type=float, help='control rate (default: 250)')
     parser.add_argument(
         '--out', metavar='DIR', type=Path, help="the run's folder (default: a new one in runs)"
+    )
+    parser.add_argument(
+        '--video',
+        metavar='FILE',
+        nargs='?',
+        const='',
+        help='draw the run as FILE.gif or, with imageio-ffmpeg, FILE.mp4, after its end (default: '
+        "walk.mp4 or walk.gif in the run's folder)",
     )
     parser.add_argument('--no-report', action='store_true', help='write metrics and manifest only')
     return parser

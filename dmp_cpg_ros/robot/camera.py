@@ -26,6 +26,7 @@ Mark = Callable[[mujoco.MjData, mujoco.MjvScene], None]
 
 AZIMUTH, ELEVATION = 140.0, -16.0  # [deg] onto the robot's right side and face
 DISTANCE_OVER_HEIGHT = 3.6  # distance of the camera over the robot's stance height
+PLAIN_SHADOW = 2048  # texels along a side of the shadow map
 FAR_CLIPPING = 400.0  # in units of the model's extent
 
 _log = logging.getLogger(__name__)
@@ -42,6 +43,8 @@ class Camera:
         Size of the pictures [pixels].
     world : World, optional
         What it walks on; the flat floor without.
+    plain : bool
+        Whether to leave out what is costly to draw: reflections, the finest shadows.
 
     Attributes
     ----------
@@ -57,14 +60,16 @@ class Camera:
     """
 
     def __init__(self, robot_file: RobotFile | Path | str | None = None, width: int = 1280,
-                 height: int = 720, world: World | None = None) -> None:
+                 height: int = 720, world: World | None = None, plain: bool = False) -> None:
         if not isinstance(robot_file, RobotFile):
             robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
         self._world = world or World()
         self.model = load_model(robot_file.model, robot_file.base, self._world)
         self._ids = find_ids(self.model, robot_file)
-        height_of_base = read_description(self.model, robot_file).stance_height
-        self._distance = DISTANCE_OVER_HEIGHT * height_of_base
+        self._height = read_description(self.model, robot_file).stance_height
+        self._distance = DISTANCE_OVER_HEIGHT * self._height
+        if plain:
+            _simplify(self.model)
         self._data = mujoco.MjData(self.model)
         self._renderer, self.reason = _renderer(self.model, width, height)
 
@@ -98,7 +103,8 @@ class Camera:
 
     def drawn(self, base_position_in_world: ArrayLike, base_quaternion: ArrayLike,
               joint_position: ArrayLike, azimuth: float = AZIMUTH, elevation: float = ELEVATION,
-              distance: float | None = None, mark: Mark | None = None) -> Picture:
+              distance: float | None = None, mark: Mark | None = None,
+              look_at: ArrayLike | None = None) -> Picture:
         """Draw one pose as :meth:`picture` does, or raise.
 
         Parameters
@@ -107,6 +113,8 @@ class Camera:
             See :meth:`picture`.
         mark : callable (data, scene), optional
             Adds shapes of its own to the scene.
+        look_at : array_like (3,), optional
+            Place of the base at which the camera looks [m]; by default the one it draws.
 
         Raises
         ------
@@ -126,8 +134,9 @@ class Camera:
         mujoco.mj_camlight(model, data)
         view = mujoco.MjvCamera()
         view.type = mujoco.mjtCamera.mjCAMERA_FREE
-        ground = float(self._world.height_at(place[0], place[1]))
-        view.lookat[:] = (place[0], place[1], ground + 0.62 * (place[2] - ground))
+        x, y, z = place if look_at is None else np.asarray(look_at, dtype=float)
+        ground = float(self._world.height_at(x, y))
+        view.lookat[:] = (x, y, z - 0.38 * (self._height if look_at is not None else z - ground))
         view.azimuth, view.elevation = azimuth, elevation
         view.distance = self._distance if distance is None else distance
         self._renderer.update_scene(data, view)
@@ -206,6 +215,12 @@ def open_viewer(model: mujoco.MjModel, data: mujoco.MjData) -> Any | None:
     except Exception as error:  # noqa: BLE001 (what a broken OpenGL raises varies)
         _log.warning('no window: %s', error)
         return None
+
+
+def _simplify(model: mujoco.MjModel) -> None:
+    model.vis.quality.shadowsize = min(model.vis.quality.shadowsize, PLAIN_SHADOW)
+    model.vis.quality.offsamples = min(model.vis.quality.offsamples, 2)
+    model.mat_reflectance[:] = 0.0
 
 
 def _renderer(model: mujoco.MjModel, width: int, height: int) -> tuple[Any | None, str | None]:

@@ -1,0 +1,194 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``film``: the robot's way as a film, drawn from a recording after the run."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.analysis.motion import held, smoothed, velocity_in_heading
+from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.commands.analyze import read_json
+from dmp_cpg_ros.commands.film_files import Frame, checked_film_path, write_film
+from dmp_cpg_ros.commands.run_knowledge import run_context
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError
+from dmp_cpg_ros.robot.camera import Camera
+
+Array = NDArray[np.float64]
+
+BAD_INPUT = 2
+"""Exit status for a bad recording or file, or where nothing can be drawn."""
+
+LOOK_WINDOW, SPEED_WINDOW = 1.2, 0.8
+"""The camera follows the path, and the speed is shown, averaged over this [s]."""
+
+INK, OUTLINE = (255, 255, 255), (30, 40, 55)
+"""Colours of the words."""
+
+PALETTE_FRAMES = 6
+"""Frames from which a GIF takes its colours."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """What to film.
+
+    Attributes
+    ----------
+    start, end : float or None
+        On the robot's clock [s]; None: from the beginning, to the end.
+    fps : float
+        Frames per second, at the robot's own pace.
+    width, height : int
+        [pixels]
+    """
+
+    start: float | None = None
+    end: float | None = None
+    fps: float = 20.0
+    width: int = 640
+    height: int = 360
+
+
+def film(recording: Recording, context: RunContext, robot_file: Path | None, path: Path,
+         shot: Shot | None = None) -> int:
+    """Draw a recording and write it; returns the number of frames.
+
+    Parameters
+    ----------
+    recording : Recording
+        Needs joints and odometry.
+    context : RunContext
+        The world that was walked in.
+    robot_file : Path or None
+        The robot; None is the package's own.
+    path : Path
+        ``.gif`` or ``.mp4``.
+    shot : Shot, optional
+        What to film; all of it without.
+
+    Raises
+    ------
+    DataError
+        If nothing was recorded in the time.
+    RobotError
+        If OpenGL cannot draw here.
+    ParameterError
+        If the file cannot be written in this format here.
+    """
+    shot = shot or Shot()
+    checked_film_path(path)
+    odometry, joints = recording.odometry, recording.joints
+    if not (odometry.time.size and joints.time.size):
+        raise DataError('a film needs recorded joint_states and odom')
+    first = max(odometry.time[0], joints.time[0], -np.inf if shot.start is None else shot.start)
+    last = min(odometry.time[-1], joints.time[-1], np.inf if shot.end is None else shot.end)
+    times = np.arange(first, last + 1e-9, 1.0 / shot.fps)
+    if not times.size:
+        raise DataError(f'nothing was recorded between {shot.start} s and {shot.end} s; the '
+                        f'recording is from {odometry.time[0]:g} s to {odometry.time[-1]:g} s')
+    with Camera(robot_file, shot.width, shot.height, context.world, plain=True) as camera:
+        draw = _Painter(recording, camera, shot)
+        sample = [draw(t) for t in np.linspace(first, last, min(PALETTE_FRAMES, len(times)))]
+        write_film(path, _painted(draw, times), sample, shot.fps)
+    return len(times)
+
+
+def _painted(draw: _Painter, times: Array) -> Iterator[Frame]:
+    for time in times:
+        yield draw(float(time))
+
+
+class _Painter:
+    """Draws the recording at a time, with its state and speed written on it."""
+
+    def __init__(self, recording: Recording, camera: Camera, shot: Shot) -> None:
+        self._recording, self._camera = recording, camera
+        odometry = recording.odometry
+        self._look = smoothed(odometry.time, odometry.position_in_world, LOOK_WINDOW)
+        self._speed = smoothed(odometry.time, velocity_in_heading(odometry)[:, :1], SPEED_WINDOW)
+        font = Path(matplotlib.get_data_path()) / 'fonts' / 'ttf' / 'DejaVuSans-Bold.ttf'
+        self._font = ImageFont.truetype(str(font), max(shot.height // 18, 11))
+        self._margin = shot.height // 24
+
+    def __call__(self, time: float) -> Frame:
+        """Frame at a time [s]."""
+        odometry, at = self._recording.odometry, np.array([time])
+        place, quaternion, look, speed = (
+            held(odometry.time, values, at)[0]
+            for values in (odometry.position_in_world, odometry.quaternion, self._look,
+                           self._speed))
+        joints = held(self._recording.joints.time, self._recording.joints.position, at)[0]
+        picture = Image.fromarray(
+            self._camera.drawn(place, quaternion, joints, look_at=look))
+        words = [event.message for event in self._recording.inhibition if event.time <= time]
+        self._write(picture, (words[-1] if words else '').replace('_', ' '),
+                    f'{round(float(speed[0]), 2) + 0.0:.2f} m/s   {time:.1f} s')
+        return np.asarray(picture, dtype=np.uint8)
+
+    def _write(self, picture: Image.Image, left: str, right: str) -> None:
+        pen, margin = ImageDraw.Draw(picture), self._margin
+        width = pen.textlength(right, font=self._font)
+        for x, text in ((margin, left), (picture.width - margin - width, right)):
+            pen.text((x, margin), text, font=self._font, fill=INK, stroke_width=2,
+                     stroke_fill=OUTLINE)
+
+
+def film_run(run: Path, path: Path, shot: Shot | None = None) -> int:
+    """Film a run's folder, with the robot and the world that its manifest names; see :func:`film`.
+
+    Raises
+    ------
+    DmpCpgError
+        If there is no readable bag, or as :func:`film`.
+    """
+    parameters = read_json(run / 'manifest.json').get('parameters')
+    context, robot_file = run_context(parameters)
+    return film(load_recording(run), context, robot_file, path, shot)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    height = 2 * round(options.width * 9 / 32)
+    shot = Shot(options.start, options.end, options.fps, options.width, height)
+    try:
+        frames = film_run(options.run, options.film, shot)
+    except DmpCpgError as error:
+        print(f'film: {error}', file=sys.stderr)
+        return BAD_INPUT
+    except OSError as error:
+        print(f"film: cannot write '{error.filename}': {error.strerror}", file=sys.stderr)
+        return BAD_INPUT
+    print(f'{options.film}: {frames} frames, {options.film.stat().st_size / 1e6:.2f} MB')
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='film', description="Draw a recorded run as a film, from the run's folder.")
+    parser.add_argument('run', metavar='RUN', type=Path, help="a run's folder, with bag/ inside")
+    parser.add_argument('film', metavar='FILE', type=Path,
+                        help='FILE.gif, or FILE.mp4 when imageio-ffmpeg is installed')
+    parser.add_argument('--start', metavar='S', type=float, help="begin, on the robot's clock")
+    parser.add_argument('--end', metavar='S', type=float, help='end')
+    parser.add_argument('--fps', metavar='HZ', type=float, default=Shot.fps,
+                        help=f'frames per second (default: {Shot.fps:g})')
+    parser.add_argument('--width', metavar='PIXELS', type=int, default=Shot.width,
+                        help=f'width, of 16:9 (default: {Shot.width})')
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

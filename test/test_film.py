@@ -1,0 +1,108 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Films of recordings: as long as the run, following the robot, with its state written on it."""
+
+from __future__ import annotations
+
+import dataclasses
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
+from dmp_cpg_ros.commands.film import Shot, film, main
+from dmp_cpg_ros.commands.film_files import checked_film_path, has_encoder, write_film
+from dmp_cpg_ros.commands.loop_recording import recording_of
+from dmp_cpg_ros.commands.walk import main as walk
+from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.robot.camera import Camera
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+
+SMALL = Shot(fps=10.0, width=160, height=90)
+
+
+@pytest.fixture(scope='module')
+def glide():
+    """A robot that glides along x at 1 m/s for 0.6 s, then is at rest."""
+    with Camera(width=32, height=32) as camera:
+        if camera.reason:
+            pytest.skip(camera.reason)
+    start, states = MujocoRobot().reset(), []
+    for k in range(151):
+        place = start.base_position_in_world + (0.004 * k, 0.0, 0.0)
+        states.append(dataclasses.replace(start, time_ns=4_000_000 * k,
+                                          base_position_in_world=place))
+    words = (StatusEvent(0.0, 0, 'walking', {}), StatusEvent(0.3, 0, 'at_rest', {}))
+    return dataclasses.replace(recording_of(states), inhibition=words)
+
+
+def frames_of(path):
+    with Image.open(path) as image:
+        frames = []
+        for k in range(image.n_frames):
+            image.seek(k)
+            frames.append(np.asarray(image.convert('RGB')).astype(int))
+        return frames, image.info['duration']
+
+
+def test_a_gif_has_a_frame_for_every_moment_at_the_robots_pace(glide, tmp_path):
+    path = tmp_path / 'glide.gif'
+    assert film(glide, RunContext(), None, path, SMALL) == 7
+    frames, duration = frames_of(path)
+    assert duration == 100 and frames[0].shape == (90, 160, 3)
+    assert film(glide, RunContext(), None, path, dataclasses.replace(SMALL, start=0.2,
+                                                                     end=0.41)) == 3
+
+
+def test_the_camera_follows_and_the_words_change(glide, tmp_path):
+    path = tmp_path / 'glide.gif'
+    film(glide, RunContext(), None, path, SMALL)
+    frames, _ = frames_of(path)
+    orange = [(f[..., 0] - f[..., 2] > 90) & (f[..., 0] > 150) for f in frames]
+    columns = [np.median(np.nonzero(seen)[1]) for seen in orange]
+    assert np.ptp(columns) < 20 and all(seen.sum() > 5 for seen in orange)
+    left = [f[:14, :80] for f in frames]
+    assert np.abs(left[0] - left[1]).mean() < 3.0 < np.abs(left[0] - left[-1]).mean()
+
+
+def test_frames_arrive_in_order_and_in_colour(tmp_path):
+    colours = [(200, 30, 30), (30, 200, 30), (30, 30, 200)]
+    frames = [np.full((48, 64, 3), colour, dtype=np.uint8) for colour in colours]
+    write_film(tmp_path / 'colours.gif', iter(frames), frames, 5.0)
+    read, duration = frames_of(tmp_path / 'colours.gif')
+    assert duration == 200
+    np.testing.assert_allclose([frame.mean(axis=(0, 1)) for frame in read], colours, atol=6)
+
+
+@pytest.mark.skipif(not has_encoder(), reason='imageio-ffmpeg is not installed')
+def test_an_mp4_is_written_where_there_is_an_encoder(tmp_path):
+    frames = [np.full((48, 64, 3), value, dtype=np.uint8) for value in (0, 120, 240)]
+    write_film(tmp_path / 'film.mp4', iter(frames), [], 10.0)
+    assert (tmp_path / 'film.mp4').read_bytes()[4:8] == b'ftyp'
+
+
+def test_what_cannot_be_written_is_refused_before_the_run(tmp_path, capsys, monkeypatch):
+    with pytest.raises(ParameterError, match='must end in .gif or .mp4'):
+        checked_film_path(tmp_path / 'film.avi')
+    monkeypatch.setattr('dmp_cpg_ros.commands.film_files.find_spec', lambda name: None)
+    with pytest.raises(ParameterError, match='pip install imageio-ffmpeg; a .gif needs none'):
+        checked_film_path(tmp_path / 'film.mp4')
+    if find_spec('rclpy') is not None:
+        assert walk(['--video', 'film.mp4', '--out', str(tmp_path / 'run')]) == 2
+        assert 'imageio-ffmpeg' in capsys.readouterr().err
+        assert not (tmp_path / 'run').exists()
+
+
+def test_an_empty_recording_or_time_has_no_film(glide, tmp_path):
+    with pytest.raises(DataError, match='needs recorded joint_states and odom'):
+        film(Recording(), RunContext(), None, tmp_path / 'film.gif')
+    with pytest.raises(DataError, match='nothing was recorded between 5.0 s'):
+        film(glide, RunContext(), None, tmp_path / 'film.gif', Shot(start=5.0))
+
+
+def test_a_missing_run_is_named(tmp_path, capsys):
+    assert main([str(tmp_path / 'no_run'), str(tmp_path / 'film.gif')]) == 2
+    assert 'no_run' in capsys.readouterr().err
