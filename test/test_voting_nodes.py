@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
 
@@ -14,21 +15,27 @@ import pytest
 pytest.importorskip('rclpy')
 
 import ros_processes
-from ros_processes import Processes
+from core_examples import TICK_NS, network, quadruped, standing_state
+from ros_processes import Processes, Ros
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario, main
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.inhibition import Inhibition
 from dmp_cpg_ros.core.scenario import play
 from dmp_cpg_ros.core.vote_box import VoteBox
 from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
+from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, ReferenceWriter
+from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
+from dmp_cpg_ros.nodes.interfaces import interface
+from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
 from dmp_cpg_ros.nodes.vote_messages import read_votes
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.suite import load_suite
 
-processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
+processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
 SCENARIO = """\
 name: votes
@@ -100,6 +107,56 @@ def test_a_scenario_that_votes_needs_voting(tmp_path: Path,
     scenario.write_text(SCENARIO.replace('voting: true, ', ''), encoding='utf-8')
     assert main([str(scenario), '--out', str(tmp_path / 'run')]) == 2
     assert 'needs voting:=true' in capsys.readouterr().err
+
+
+def test_sensors_that_fall_silent_by_their_stamps_stop_the_gait(
+        processes: Processes, ros: Ros) -> None:
+    """Real time; contacts are told, the IMU dies, and later a user votes what is no vote."""
+    node = processes.node('inhibition', voting=True, start_inhibited=False, auto_inhibit=False)
+    state = interface('inhibition_state')
+    told = ros.collect(state.type, state.name, state.reader_qos)
+    names = ('canonical_state', 'reference', 'foot_contacts', 'imu', 'votes')
+    say = {name: ros.node.create_publisher(
+        interface(name).type, name, interface(name).publisher_qos) for name in names}
+    ros.spin_until(lambda: all(end.get_subscription_count() == 1 for end in say.values()),
+                   what=lambda: str(node))
+    gait = network()
+    x, oscillators, reference = gait.locked_state(), CanonicalStateWriter(), ReferenceWriter()
+    rate = gait.rate(x, np.zeros(3), Inhibition(False, np.zeros(4), 0.3))
+    robot = RobotStateWriter()
+    at = {'ns': 0}
+
+    def tick(imu: bool) -> None:
+        at['ns'] += 5 * TICK_NS
+        robot.fill(standing_state(quadruped(), at['ns']))
+        say['foot_contacts'].publish(robot.foot_contacts)
+        if imu:
+            say['imu'].publish(robot.imu)
+        say['reference'].publish(reference.fill(at['ns'], np.zeros(3)))
+        say['canonical_state'].publish(oscillators.fill(at['ns'], x, rate))
+
+    def last() -> dict[str, str]:
+        return read_inhibition_state(told[-1]).values if told else {}
+
+    def until(wanted: Callable[[], bool], imu: bool) -> None:
+        def ticked() -> bool:
+            tick(imu)
+            return wanted()
+
+        ros.spin_until(ticked, what=lambda: f'{last()} {node}')
+
+    until(lambda: at['ns'] > 1_000_000_000 and bool(told), True)
+    assert last()['cause'] == 'none' and last()['requested'] == 'false'
+    alive_ns = at['ns']
+    until(lambda: last()['requested'] == 'true', False)
+    assert last()['cause'] == 'fl silence, fr silence, rl silence, rr silence'
+    assert float(last()['request_stamp']) * 1e9 - alive_ns == pytest.approx(500_000_000, abs=5e7)
+    until(lambda: last()['cause'] == 'none', True)
+    assert last()['voted'] == 'true'
+    say['votes'].publish(JointState(name=['fl'], effort=[math.nan]))
+    say['votes'].publish(JointState(name=['rl'], effort=[1.0]))
+    until(lambda: last()['cause'] == 'rl user', True)
+    assert 'must be finite and at least 0' in node.output
 
 
 # Messages --------------------------------------------------------------------------------------
