@@ -62,6 +62,13 @@ def test_a_crossing_ends_at_the_finish_or_on_the_ground() -> None:
     assert not wall.crossed and wall.distance < 2.0
 
 
+def test_parameters_of_a_case_reach_the_walk() -> None:
+    case = CrossingCase('trot', 'flat', (), 0, values=(('contact_feedback', True),))
+    run = Walk(case.gait, values=case.values)
+    assert run.loop.parameters.canonical.contact_feedback
+    assert not Walk(case.gait).loop.parameters.canonical.contact_feedback
+
+
 def test_tables_are_even() -> None:
     lines = markdown_table(('a', 'bb'), (('1', '2'), ('333', '4'))).splitlines()
     assert len({len(line) for line in lines}) == 1 and len(lines) == 4

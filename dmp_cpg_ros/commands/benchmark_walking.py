@@ -3,9 +3,10 @@
 """Measures how the robot walks, from fixed seeds, and prints the tables of the README.
 
 speeds: steady velocities against the commanded ones. pushes: largest speed change survived, in
-eight directions at every phase. rough: share of seeds that cross 5 m of rough ground. gaits: every
-ordered pair of gaits changed while moving. robots: other robots, with their files alone; those of
-the extra `robots` are left out where it is not installed.
+eight directions at every phase. rough: share of seeds that cross 5 m of rough ground. contacts:
+the same with and without what listens to early and late touchdown. gaits: every ordered pair of
+gaits changed while moving. robots: other robots, with their files alone; those of the extra
+`robots` are left out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """
@@ -22,10 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.analysis.strict_json import write_json
-from dmp_cpg_ros.commands import benchmark_tables
+from dmp_cpg_ros.commands import benchmark_contacts, benchmark_tables
 from dmp_cpg_ros.core.errors import DmpCpgError
 
-TABLES = ('speeds', 'pushes', 'rough', 'gaits', 'robots')
+TABLES = ('speeds', 'pushes', 'rough', 'contacts', 'gaits', 'robots')
 """What can be measured."""
 
 
@@ -35,7 +36,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     results: dict[str, Any] = {}
     with Pool(options.jobs) as pool:
         for name in options.tables:
-            make: Callable[..., benchmark_tables.Table] = getattr(benchmark_tables, name)
+            maker = benchmark_contacts if name == 'contacts' else benchmark_tables
+            make: Callable[..., benchmark_tables.Table] = getattr(maker, name)
             try:
                 table = make(pool, options.seeds, options.phases)
             except DmpCpgError as error:

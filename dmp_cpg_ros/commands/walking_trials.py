@@ -13,6 +13,7 @@ from copy import deepcopy
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, cos, hypot, isnan, nan, pi, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from dmp_cpg_ros.suite import Suite, load_gait, load_suite
 
 Array = NDArray[np.float64]
 Velocity = tuple[float, float, float]
+Values = tuple[tuple[str, Any], ...]
 
 STANDING, RAMP = 0.5, 1.0
 """Time before the start [s]; rate at which commands rise [m/s^2], and three times that for
@@ -51,9 +53,10 @@ FINISH, CROSSING_TIME = 5.0, 30.0
 
 
 @lru_cache
-def suite_of(robot: str | None, gait: str, file: str | None = None) -> Suite:
+def suite_of(robot: str | None, gait: str, file: str | None = None,
+             values: Values = ()) -> Suite:
     """Parameter file with a robot and gait, and a command that needs no repetition."""
-    overrides = {'gait': gait, 'cmd_vel_timeout': 0.0, 'auto_inhibit': False}
+    overrides = {'gait': gait, 'cmd_vel_timeout': 0.0, 'auto_inhibit': False, **dict(values)}
     return load_suite(file, overrides if robot is None else overrides | {'robot': robot})
 
 
@@ -72,11 +75,13 @@ class Walk(LoopRun[WalkingLoop]):
         Seed of the joints' initial spread of ±0.03 rad; none with 0.
     file : str, optional
         Parameter file; the package's own without.
+    values : tuple of (str, value)
+        Parameters that differ from the file.
     """
 
     def __init__(self, gait: str, robot: str | None = None, world: World | None = None,
-                 seed: int = 0, file: str | None = None) -> None:
-        suite = suite_of(robot, gait, file)
+                 seed: int = 0, file: str | None = None, values: Values = ()) -> None:
+        suite = suite_of(robot, gait, file, values)
         body = MujocoRobot(suite.robot_file, suite.tick_ns, seed, 0.03 if seed else 0.0,
                            world=world or suite.world, sensors=suite.sensors)
         super().__init__(body, WalkingLoop(body.description, load_gait(gait), suite.parameters))
@@ -225,6 +230,8 @@ class CrossingCase:
         Seed of the start, the speed and, where it has one, the world.
     speed : float
         Mean of the commanded speed [m/s]; each seed draws its own within a tenth of it.
+    values : tuple of (str, value)
+        Parameters that differ from the parameter file.
     """
 
     gait: str
@@ -232,16 +239,20 @@ class CrossingCase:
     numbers: tuple[tuple[str, float], ...]
     seed: int
     speed: float = 0.5
+    values: Values = ()
 
 
 @dataclass(frozen=True)
 class CrossingOutcome:
-    """Whether the robot crossed, and how far and in what time it came [m], [s]."""
+    """Whether the robot crossed, how far and in what time it came [m], [s], and the root mean
+    square of its tilt on the way [deg].
+    """
 
     crossed: bool
     fell: bool
     distance: float
     time: float
+    tilt: float
 
 
 def cross(case: CrossingCase, robot: str | None = None) -> CrossingOutcome:
@@ -251,17 +262,25 @@ def cross(case: CrossingCase, robot: str | None = None) -> CrossingOutcome:
         numbers = {**numbers, 'seed': case.seed}
     world = WORLDS[case.kind](**numbers)
     speed = case.speed * float(np.random.default_rng(case.seed).uniform(0.9, 1.1))
-    run = Walk(case.gait, robot, world, seed=case.seed + 1)
+    run = Walk(case.gait, robot, world, seed=case.seed + 1, values=case.values)
     run.loop.command(speed)
-    begin = run.state.time_ns
+    begin, tilt = run.state.time_ns, []
+    run.states.clear()
     while run.walk(0.1):
+        tilt.append(_mean_squared_tilt(run.states))
         run.states.clear()
         elapsed = (run.state.time_ns - begin) * 1e-9
         if _distance(run.state) >= FINISH or elapsed >= CROSSING_TIME:
             break
     distance = _distance(run.state)
     return CrossingOutcome(distance >= FINISH and not run.fell(), run.fell(), distance,
-                           (run.state.time_ns - begin) * 1e-9)
+                           (run.state.time_ns - begin) * 1e-9,
+                           float(np.rad2deg(np.sqrt(np.mean(tilt)))) if tilt else nan)
+
+
+def _mean_squared_tilt(states: list[RobotState]) -> float:
+    quaternions = np.array([state.base_quaternion for state in states])
+    return float(np.mean(np.sum(roll_pitch_yaw(quaternions)[:, :2] ** 2, axis=1)))
 
 
 def _distance(state: RobotState) -> float:
