@@ -22,6 +22,7 @@ from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.core.canonical import CanonicalSystem
 from dmp_cpg_ros.core.graph import CouplingGraph, Edges, graph_from_edges, topology
 from dmp_cpg_ros.core.hopf import AndronovHopf
+from dmp_cpg_ros.core.leg_primitive import LegFeedback
 from dmp_cpg_ros.core.networks.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
 from dmp_cpg_ros.core.networks.hopf_oscillators import HopfOscillators
 from dmp_cpg_ros.core.networks.network import OscillatorNetwork
@@ -118,6 +119,7 @@ def parts_of_a_tick() -> list[Row]:
     x_dot = loop.network.rate(x, r, loop.inhibition)
     stopping = loop.supervisor.request(loop.stop, True)
     leg, command = loop.legs[0], (0.5, 0.0, 0.0)
+    asked = LegFeedback(state.joint_position[:3], zero, zero[:2], zero)
 
     def tick() -> None:
         nonlocal state
@@ -131,7 +133,7 @@ def parts_of_a_tick() -> list[Row]:
         ('state of the stop', lambda: loop.supervisor.step(
             loop.stop, loop.stop.time_ns, x, x_dot, r, command)),
         ('balance', lambda: loop.posture.step(loop.posture_state, state, x, x_dot, r, dt)),
-        ('one leg', lambda: leg.step(loop.leg_states[0], x[0], x_dot[0], r, zero[:2], zero, dt)),
+        ('one leg', lambda: leg.step(loop.leg_states[0], x[0], x_dot[0], r, asked, dt)),
         ('prediction of a stop', lambda: predict(
             loop.supervisor, loop.reference, stopping, loop.inhibition, x, r, command, dt)),
     ])

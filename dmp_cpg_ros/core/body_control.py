@@ -87,5 +87,6 @@ class BodyControl:
         torque = self._sense.carrying_torque(state, self.modes.carried(mode))
         text = self.modes.command(mode).text
         return PostureFeedback(
-            torque, np.zeros((4, 2)), np.zeros(3), text, state.joint_position.copy()
+            torque, np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3), text,
+            state.joint_position.copy(),
         )

@@ -6,7 +6,7 @@ In stance the foot stays where it is in the world while the base moves with (v, 
 frame it follows ṗ = −v − γ ẑ × p exactly, turning included. A round foot rolls while it stands:
 its centre needs only the share ``rolling`` of the way that the contact point makes
 (:func:`rolling_share`). In swing a cubic Hermite curve carries it back with matching velocities at
-both ends, under a bump of height. The whole path is C¹ in the phase.
+both ends, lifted by :func:`swing_height`. The whole path is C¹ in the phase.
 """
 
 from __future__ import annotations
@@ -20,6 +20,11 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 
 Array = NDArray[np.float64]
+
+LIFTING, LOWERING = 0.35, 0.5
+"""Shares of the swing in which the foot rises and comes down. It rises sooner, so that it is clear
+of the ground before it is moved along it.
+"""
 
 
 @dataclass(frozen=True)
@@ -80,9 +85,7 @@ class FootPath:
         s, scale = cycle_position / swing + 0.5, swing * period
         x, x_slope = _hermite(s, x0, x1, dx0 * scale, dx1 * scale)
         y, y_slope = _hermite(s, y0, y1, dy0 * scale, dy1 * scale)
-        rest = 1.0 - s
-        bump = 16.0 * s * s * rest * rest
-        bump_slope = 32.0 * s * rest * (rest - s)
+        bump, bump_slope = swing_height(s)
         return (
             np.array((x, y, height + self.clearance * bump)),
             np.array((x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing)),
@@ -106,6 +109,27 @@ class FootPath:
             share_x * (-self.v_x + self.gamma * y),
             share_y * (-self.v_y - self.gamma * x),
         )
+
+
+def swing_height(s: float) -> tuple[float, float]:
+    """Relative height of a swinging foot, in [0, 1], and its slope: up, along, down.
+
+    Parameters
+    ----------
+    s : float
+        Share of the swing that has passed, in [0, 1].
+
+    Returns
+    -------
+    height, slope : float
+    """
+    if s < LIFTING:
+        u, scale = s / LIFTING, 1.0 / LIFTING
+    elif s > 1.0 - LOWERING:
+        u, scale = (1.0 - s) / LOWERING, -1.0 / LOWERING
+    else:
+        return 1.0, 0.0
+    return u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) * scale
 
 
 def rolling_share(kinematics: LegKinematics, foothold_in_base: Array) -> tuple[float, float]:

@@ -20,7 +20,8 @@ feet well posed.
 """
 
 
-def distribute(wrench: Array, feet: Array, load: Array, friction: float, largest: float) -> Array:
+def distribute(wrench: Array, feet: Array, load: Array, friction: float, largest: float,
+               importance: Array | None = None) -> Array:
     """Forces of the ground on the feet.
 
     Parameters
@@ -35,6 +36,9 @@ def distribute(wrench: Array, feet: Array, load: Array, friction: float, largest
         μ of the cones.
     largest : float
         Largest normal force of a fully loaded foot [N]; scaled by ``load``.
+    importance : ndarray (6,), optional
+        Weights of the wrench's components, where not all of them can be met: one or two feet
+        cannot turn the body about the line through them but by a horizontal force.
 
     Returns
     -------
@@ -48,6 +52,8 @@ def distribute(wrench: Array, feet: Array, load: Array, friction: float, largest
     grasp[3, 1::3], grasp[3, 2::3] = -z, y
     grasp[4, 0::3], grasp[4, 2::3] = z, -x
     grasp[5, 0::3], grasp[5, 1::3] = -y, x
+    if importance is not None:
+        grasp, wrench = grasp * importance[:, None], wrench * importance
     weights = np.repeat(np.maximum(load, 0.0), 3)
     weighted = grasp * weights
     normal = weighted @ grasp.T

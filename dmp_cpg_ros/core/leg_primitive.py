@@ -9,12 +9,13 @@ Jacobian.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, pi
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.foot_path import FootPath, rolling_share
+from dmp_cpg_ros.core.foot_path import FootPath, rolling_share, swing_height
+from dmp_cpg_ros.core.foot_shift import ShiftRates
 from dmp_cpg_ros.core.gait import BodyScale
 from dmp_cpg_ros.core.gait_transition import GaitInForce
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
@@ -54,8 +55,22 @@ class LegParameters(Parameters):
         maximum=1e3,
     )
     placement_rate: float = parameter(
-        25.0,
+        40.0,
         'rate at which a swinging foot follows its placement shift',
+        unit='1/s',
+        minimum=0.1,
+        maximum=1e3,
+    )
+    yielding_rate: float = parameter(
+        20.0,
+        'rate at which the target of a standing foot goes to where the foot is',
+        unit='1/s',
+        minimum=0.0,
+        maximum=1e3,
+    )
+    levelling_rate: float = parameter(
+        10.0,
+        'rate at which a standing foot gives up the height that made up for the tilt',
         unit='1/s',
         minimum=0.1,
         maximum=1e3,
@@ -72,13 +87,36 @@ class LegState:
         θ, θ̇ of the kinematic reading, (3,) each.
     activity : float
         Swing activity a in [0, 1].
-    shift_in_base : ndarray (2,)
-        Foot placement shift that acts now [m].
+    shift_in_base : ndarray (3,)
+        Shift of the foot's path that acts now [m].
     """
 
     joints: TransformationState
     activity: float
     shift_in_base: Array
+
+
+@dataclass(frozen=True)
+class LegFeedback:
+    """The part of the body's feedback that one leg's path takes.
+
+    Attributes
+    ----------
+    joint_position : ndarray (3,)
+        Measured angles [rad].
+    shift_in_base : ndarray (3,)
+        Wanted foot placement shift, for a swinging foot [m].
+    drift_in_base : ndarray (2,)
+        Added to the velocity of a standing foot [m/s].
+    correction : ndarray (3,)
+        Added to the reference for the stance velocity, not for the cadence: v_x, v_y [m/s],
+        γ [rad/s].
+    """
+
+    joint_position: Array
+    shift_in_base: Array
+    drift_in_base: Array
+    correction: Array
 
 
 class LegPrimitive:
@@ -106,6 +144,8 @@ class LegPrimitive:
         self.scale = body_scale(description)
         self.foothold_in_base = nominal_foothold(description, leg)
         self.rolling = rolling_share(self.kinematics, self.foothold_in_base)
+        self.shift_rates = ShiftRates(
+            parameters.placement_rate, parameters.yielding_rate, parameters.levelling_rate)
         self.clearance = parameters.clearance * description.stance_height
         self.transformation = TransformationSystem(
             parameters.stiffness,
@@ -116,7 +156,7 @@ class LegPrimitive:
     def initial_state(self) -> LegState:
         """State of a leg that stands at its foothold."""
         q = self.kinematics.inverse(self.foothold_in_base)
-        return LegState(TransformationState(q, np.zeros(3)), 0.0, np.zeros(2))
+        return LegState(TransformationState(q, np.zeros(3)), 0.0, np.zeros(3))
 
     def step(
         self,
@@ -124,8 +164,7 @@ class LegPrimitive:
         x: Array,
         x_dot: Array,
         r: Array,
-        shift_in_base: Array,
-        correction: Array,
+        feedback: LegFeedback,
         dt: float,
     ) -> tuple[LegState, Array, Array]:
         """Advance the leg to the time at which the inputs hold.
@@ -138,10 +177,8 @@ class LegPrimitive:
             The leg's oscillator state and its derivative [1/s].
         r : ndarray (3,)
             Reference v_x, v_y [m/s], γ [rad/s].
-        shift_in_base : ndarray (2,)
-            Wanted foot placement shift [m].
-        correction : ndarray (3,)
-            Added to the reference for the stance velocity, not for the cadence.
+        feedback : LegFeedback
+            What the body's feedback asks of this leg.
         dt : float
             Time since the last tick [s].
 
@@ -161,10 +198,19 @@ class LegPrimitive:
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
         swinging = abs(position) < 0.5 * (1.0 - duty)
-        share = 1.0 - exp(-p.placement_rate * activity * dt) if swinging else 0.0
-        shift_rate = (shift_in_base - state.shift_in_base) * (share / dt if dt > 0.0 else 0.0)
+        if dt <= 0.0:
+            shift_rate = np.zeros(3)
+        elif swinging:
+            height, _ = swing_height(position / (1.0 - duty) + 0.5)
+            shift_rate = self.shift_rates.in_swing(
+                state.shift_in_base, feedback.shift_in_base, height, activity, dt)
+        else:
+            place = self.kinematics.foot_in_base
+            away = place(feedback.joint_position) - place(state.joints.position)
+            shift_rate = self.shift_rates.in_stance(
+                state.shift_in_base, feedback.drift_in_base, away, activity, dt)
         shift = state.shift_in_base + shift_rate * dt
-        more_x, more_y, more_gamma = correction.tolist()
+        more_x, more_y, more_gamma = feedback.correction.tolist()
         path = FootPath(
             self.foothold_in_base,
             v_x + more_x,
@@ -177,8 +223,8 @@ class LegPrimitive:
         )
         foot, slope = path.at(position)
         velocity = slope * (rate / (2.0 * pi))
-        foot[:2] += shift
-        velocity[:2] += shift_rate
+        foot += shift
+        velocity += shift_rate
         goal = self.kinematics.inverse(foot)
         goal_velocity = _joint_velocity(self.kinematics.jacobian_in_base(goal), velocity)
         joints = self.transformation.step(state.joints, goal, goal_velocity, dt)

@@ -125,7 +125,7 @@ class LegMotion:
             motion = None
         if command.mode != 'damped' and dt > 0.0:
             joints = self._transformation.step(joints, goal, goal_velocity, dt)
-        return motion, LegState(joints, 0.0, np.zeros(2)), goal, goal_velocity
+        return motion, LegState(joints, 0.0, np.zeros(3)), goal, goal_velocity
 
     def _moved(
         self, motion: MotionState | None, joints: TransformationState, command: BodyCommand,

@@ -384,8 +384,7 @@ class WalkingLoop:
             self.x[i],
             x_dot[i],
             self.r,
-            feedback.shift_in_base[i],
-            feedback.correction,
+            feedback.of_leg(i),
             dt,
         )
         return self._targets(i, state, goal, goal_velocity, feedback)

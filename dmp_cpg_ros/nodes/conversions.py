@@ -29,8 +29,12 @@ from dmp_cpg_ros.nodes.message_values import (
 from dmp_cpg_ros.nodes.robot_state_messages import BASE_FRAME
 
 CANONICAL_NAMES = tuple(f'{leg}_x{i}' for leg in LEGS for i in (1, 2))
-SHIFT_NAMES = tuple(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xy')
+SHIFT_NAMES = tuple(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xyz')
 CORRECTION_NAMES = ('base_x', 'base_y', 'base_yaw')
+
+_JOINTS = slice(0, len(JOINT_NAMES))
+_FEET = slice(len(JOINT_NAMES), len(JOINT_NAMES) + len(SHIFT_NAMES))
+_BASE = slice(len(JOINT_NAMES) + len(SHIFT_NAMES), None)
 
 
 def read_twist(message: Twist) -> tuple[float, float, float]:
@@ -134,9 +138,10 @@ class JointTargetsReader:
 
 
 class PostureFeedbackWriter:
-    """Writes ``posture_feedback``: torques, a shift in x and y per foot, a velocity correction.
+    """Writes ``posture_feedback``: torques and measured angles of the joints, shift and drift of
+    the feet, a velocity correction.
 
-    The body's mode is in ``frame_id``, and with it measured angles in the joints' positions.
+    The body's mode is in ``frame_id``.
     """
 
     def __init__(self) -> None:
@@ -148,11 +153,11 @@ class PostureFeedbackWriter:
 
     def fill(self, time_ns: int, feedback: PostureFeedback) -> JointState:
         """Refill with a feedback; raises DataError when it is not finite."""
-        shift = feedback.shift_in_base.reshape(-1)
-        self._position[len(JOINT_NAMES):-len(CORRECTION_NAMES)] = shift
-        self._velocity[-len(CORRECTION_NAMES):] = feedback.correction
-        self._position[:len(JOINT_NAMES)] = feedback.measured
-        self._effort[:len(JOINT_NAMES)] = feedback.torque
+        self._position[_JOINTS] = feedback.measured
+        self._position[_FEET] = feedback.shift_in_base.reshape(-1)
+        self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
+        self._velocity[_BASE] = feedback.correction
+        self._effort[_JOINTS] = feedback.torque
         self._message.header.frame_id = feedback.mode
         return self._writer.fill(time_ns, self._position, self._velocity, self._effort)
 
@@ -167,6 +172,7 @@ class PostureFeedbackReader:
     def read(self, message: JointState) -> PostureFeedback:
         """Read the feedback; raises DataError."""
         position, velocity, effort = self._reader.read(message)
-        shift = position[len(JOINT_NAMES):-len(CORRECTION_NAMES)].reshape(len(LEGS), 2)
-        return PostureFeedback(effort[:len(JOINT_NAMES)], shift, velocity[-len(CORRECTION_NAMES):],
-                               message.header.frame_id, position[:len(JOINT_NAMES)])
+        return PostureFeedback(
+            effort[_JOINTS], position[_FEET].reshape(len(LEGS), 3),
+            velocity[_FEET].reshape(len(LEGS), 3)[:, :2], velocity[_BASE],
+            message.header.frame_id, position[_JOINTS])

@@ -128,8 +128,7 @@ class LegTransformation(ManagedNode):
             x[self._place],
             x_dot[self._place],
             values['reference'],
-            feedback.shift_in_base[self._place],
-            feedback.correction,
+            feedback.of_leg(self._place),
             dt,
         )
         return goal, goal_velocity

@@ -1,0 +1,106 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Gains of the body's feedback, in dimensionless form.
+
+Rates are given in units of sqrt(g / l) and times in sqrt(l / g), with l the standing height of the
+hips (dynamic similarity; Alexander & Jayes 1983), and act per unit of mass or inertia. One set
+therefore serves robots of any size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+
+
+@dataclass(frozen=True)
+class PostureParameters(Parameters):
+    """Gains of virtual model, force distribution, foot placement and speed keeping."""
+
+    height_stiffness: float = parameter(
+        2.3, 'virtual spring of the height, per mass, in g/l', minimum=0.0, maximum=100.0
+    )
+    height_damping: float = parameter(
+        2.0, 'virtual damper of the height, per mass, in sqrt(g/l)', minimum=0.0, maximum=100.0
+    )
+    attitude_stiffness: float = parameter(
+        4.3,
+        'virtual spring of roll and pitch, per inertia, in g/l',
+        minimum=0.0,
+        maximum=100.0,
+    )
+    attitude_damping: float = parameter(
+        2.5,
+        'virtual damper of roll and pitch, per inertia, in sqrt(g/l)',
+        minimum=0.0,
+        maximum=100.0,
+    )
+    velocity_gain: float = parameter(
+        0.7,
+        'force per mass and error of horizontal velocity, in sqrt(g/l)',
+        minimum=0.0,
+        maximum=100.0,
+    )
+    yaw_rate_gain: float = parameter(
+        1.35,
+        'moment per inertia and error of the turn rate, in sqrt(g/l)',
+        minimum=0.0,
+        maximum=100.0,
+    )
+    friction: float = parameter(
+        0.6, 'friction coefficient that the forces respect', minimum=0.05, maximum=2.0
+    )
+    load_transfer: float = parameter(
+        0.08,
+        'fraction of the cycle over which a foot takes and gives load',
+        minimum=0.001,
+        maximum=0.3,
+    )
+    placement_gain: float = parameter(
+        0.7,
+        'foot placement per error of the velocity over the foot, in sqrt(l/g)',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    reach: float = parameter(
+        0.95, 'share of the straight leg within which feet are placed', minimum=0.1, maximum=1.0
+    )
+    yielding: float = parameter(
+        0.5,
+        'share of the error of velocity with which the standing feet go along',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    levelling: float = parameter(
+        1.0,
+        'share of the tilt for which the height of swinging feet makes up',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    speed_integral: float = parameter(
+        0.135,
+        'rate at which the stance velocity is corrected by the velocity error, in sqrt(g/l)',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    speed_correction_limit: float = parameter(
+        0.2,
+        'largest correction of the stance velocity, as a fraction of '
+        'the speed, at least of 0.3 sqrt(g l)',
+        minimum=0.0,
+        maximum=1.0,
+    )
+    heading_gain: float = parameter(
+        0.25, 'turn rate per error of heading, in sqrt(g/l)', minimum=0.0, maximum=20.0
+    )
+    heading_limit: float = parameter(
+        0.3, 'largest error of heading that is remembered', unit='rad', minimum=0.0, maximum=1.5
+    )
+    activity_rate: float = parameter(
+        12.0,
+        'rate at which planned swings fade when the phase stops',
+        unit='1/s',
+        minimum=0.1,
+        maximum=1e3,
+    )
