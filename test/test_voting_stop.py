@@ -8,10 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from core_examples import TICK, TICK_NS, network
+from core_examples import GAITS, TICK, TICK_NS, network
 from test_core_supervisor import Run, walking
 
 from dmp_cpg_ros.core.certificate import Certificate, certify
+from dmp_cpg_ros.core.certificate_change import certify_changes
 from dmp_cpg_ros.core.certificate_range import operating_range
 from dmp_cpg_ros.core.certificate_suggest import suggest_gains
 from dmp_cpg_ros.core.certificate_votes import vote_bound, votes_needed
@@ -183,6 +184,18 @@ def test_the_computed_clamp_is_certified(gait: str, graph: str) -> None:
     found = certificate(voters(), gait, coupling_graph=graph)
     assert found.holds, found.explained()
     assert 'votes_needed' in found.sampled
+
+
+def test_votes_are_certified_in_every_gait_of_a_change() -> None:
+    def failing(**changes: object) -> list[str]:
+        p = SuiteParameters(inhibition=voters(**changes))
+        found = certify_changes(p, [GAITS['amble'], GAITS['trot']], network().scale, TICK)
+        return [entry.name for entry in found.failing]
+
+    assert failing() == []
+    fits_amble = {'vote_limit': 0.12}
+    assert certificate(voters(**fits_amble), 'amble').holds
+    assert 'votes_suffice' in failing(**fits_amble)
 
 
 def test_weak_couplings_are_certified_with_several_inhibited_legs() -> None:

@@ -18,6 +18,7 @@ from itertools import combinations
 from dmp_cpg_ros.core.certificate import Certificate, certify
 from dmp_cpg_ros.core.certificate_inequality import Inequality
 from dmp_cpg_ros.core.certificate_range import OperatingRange, operating_range
+from dmp_cpg_ros.core.certificate_votes import vote_inequalities
 from dmp_cpg_ros.core.contraction.finding import PROVED
 from dmp_cpg_ros.core.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait_network import GaitNetwork
@@ -57,10 +58,12 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     ways = [GaitTransition(one, other) for one, other in combinations(gaits, 2)]
     share = max((way.fastest(rate) for way in ways), default=0.0)
     span = _widened([operating_range(one, p.inhibition, p.reference) for one in networks], share)
-    whole = certify(networks[0], p.inhibition, p.reference, p.leg, p.posture, tick_s, span)
+    unvoted = replace(p.inhibition, voting=False)
+    whole = certify(networks[0], unvoted, p.reference, p.leg, p.posture, tick_s, span)
     pause = math.log(span.omega[1] / (STANDING * span.omega[0])) / SETTLING_RATE + tick_s
     bound = whole.time_to_rest + pause
     rows = [_changed(row, bound, p.leg) for row in whole.inequalities]
+    rows += _votes(p, networks, tick_s)
     rows.append(Inequality(
         'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
         'fastest offset', 'tolerated mismatch', PROVED,
@@ -88,6 +91,22 @@ def refused_change(parameters: SuiteParameters, gaits: Sequence[Gait], scale: Bo
         return ''
     return (f'changes among {", ".join(gait.name for gait in different)} are not certified: '
             f'{certificate.explained()}')
+
+
+def _votes(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: float
+           ) -> list[Inequality]:
+    """What votes can do in the gaits, of each inequality the worst: their clamp follows the
+    cadence, and a stop waits until a change of gait is over.
+    """
+    worst: dict[str, Inequality] = {}
+    for network in networks:
+        for row in vote_inequalities(
+                network, p.inhibition, operating_range(network, p.inhibition, p.reference),
+                p.reference.alpha_r, p.leg.activity_rate, tick_s):
+            known = worst.get(row.name)
+            if known is None or not row.margin > known.margin:
+                worst[row.name] = replace(row, sentence=f'{row.sentence}, in {network.gait.name}')
+    return list(worst.values())
 
 
 def _changed(row: Inequality, bound: float, leg: LegParameters) -> Inequality:
