@@ -30,7 +30,7 @@ from dmp_cpg_ros.core.phase import phase, phase_rotation, wrapped
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
-from dmp_cpg_ros.suite import Suite, load_gait, load_suite
+from dmp_cpg_ros.suite import Suite, load_gait, load_gaits, load_suite
 
 TICK = 0.004
 QUARTER = 20.0
@@ -222,3 +222,25 @@ def test_stop_and_start_keep_bound_and_prediction_under_random_contacts(
     assert loop.stop.measured_s == pytest.approx(predicted, abs=2.5 * TICK)
     walk(0.5)
     assert loop.stop.word == 'at_rest'
+
+
+def test_legs_keep_their_places_while_a_gait_changes_under_random_contacts() -> None:
+    suite, random = suite_with(gait='amble', contact_gain=300.0), np.random.default_rng(5)
+    robot = PerfectTrackingRobot(load_description(suite.robot_file), suite.tick_ns)
+    loop = WalkingLoop(robot.description, load_gait('amble'), suite.parameters, load_gaits())
+    state, force = robot.reset(), np.zeros(4)
+    loop.tick(state)
+    loop.request(False)
+    loop.command(0.4)
+    words = set()
+    for k in range(900):
+        if k % 7 == 0:
+            force = random.choice((0.0, 50.0), 4)
+        if k == 250:
+            loop.change_gait('trot')
+        tick = loop.tick(replace(state, foot_force=force))
+        state = robot.step(tick.targets)
+        words.add(loop.network.gait.word)
+        if k > 100:
+            assert np.abs(loop.network.phase_errors(loop.x)).max() <= LOCKED_PHASE_ERROR
+    assert {'amble', 'trot'} < words

@@ -18,7 +18,8 @@ legs' frequencies, bounded by what the certificate leaves free:
 - While a stop is requested, and after a release until the legs are certified to be in their
   places, there is no feedback: capture, rest and start, their bounds and their predictions are
   those without it. A stop begins with legs that are as far from their places as δ̄ allows, and one
-  tick late.
+  tick late. While a gait changes, which takes the frequencies up to their limits, there is none
+  either.
 
 For the theorems the contacts are a bounded input; nothing is assumed of the body that makes them.
 The hierarchy of Theorem 4 holds for each given sequence of contacts.
@@ -34,6 +35,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.foot_contact import standing
 from dmp_cpg_ros.core.gait_network import GaitNetwork
+from dmp_cpg_ros.core.gait_transition import BlendedGait
 from dmp_cpg_ros.core.inhibition import Inhibition
 from dmp_cpg_ros.core.phase import phase
 from dmp_cpg_ros.core.robot_state import LEGS
@@ -140,8 +142,8 @@ class ContactPhase:
         free = not (inhibition.requested or np.any(inhibition.gains))
         released = state.released + dt if free else 0.0
         state = ContactState(standing(state.stands, force, self.quarter), released)
-        limits = self.limits
-        if limits is None or not (free and released > limits.after):
+        limits, changing = self.limits, isinstance(network.gait, BlendedGait)
+        if limits is None or changing or not (free and released > limits.after):
             return state, np.zeros(len(LEGS))
         p, gait, scale = network.parameters, network.gait, network.scale
         omega = network.omega(r)
