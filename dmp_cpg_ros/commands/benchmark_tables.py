@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.commands.benchmark_robots import ROBOTS, RobotCase, run_robot
+from dmp_cpg_ros.commands.gait_change_trials import SPEEDS, change_cases, run_changes
 from dmp_cpg_ros.commands.markdown_table import markdown_table
 from dmp_cpg_ros.commands.walking_trials import (
     CrossingCase,
@@ -162,6 +163,26 @@ def rough(pool: Pool, seeds: int, phases: int) -> Table:
     columns = ('ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s')
     return Table('Rough ground, blind, at 0.5 m/s within a tenth', markdown_table(columns, rows),
                  results)
+
+
+def gaits(pool: Pool, seeds: int, phases: int) -> Table:
+    """Every ordered pair of gaits changed while moving, at a quarter of the phases."""
+    cases = change_cases(max(1, phases // 4))
+    outcomes = pool.map(run_changes, cases, chunksize=1)
+    results = [(case, one) for case, of in zip(cases, outcomes, strict=True) for one in of]
+    rows = []
+    for before, after in sorted({(case.before, one.after) for case, one in results}):
+        of = [one for case, one in results if (case.before, one.after) == (before, after)]
+        upright = [one for one in of if not one.fell]
+        worst = [f'{max(values):{form}}' if upright else '-' for values, form in (
+            ([one.duration for one in upright], '.2f'), ([one.cycles for one in upright], '.1f'),
+            ([one.phase_error for one in upright], '.1e'), ([one.sway for one in upright], '.0f'))]
+        rows.append((f'{before} to {after}', str(len(of)), str(len(of) - len(upright)),
+                     str(sum(one.in_time for one in upright)), *worst))
+    columns = ('change', 'cases', 'fell', 'phase error in bound 3 cycles after', 'longest s',
+               'in cycles', 'largest phase error rad', 'largest roll or pitch deg')
+    return Table(f'Gaits changed while walking, at {" and ".join(map(str, SPEEDS))} m/s',
+                 markdown_table(columns, rows), results)
 
 
 def robots(pool: Pool, seeds: int, phases: int) -> Table:

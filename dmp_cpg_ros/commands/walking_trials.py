@@ -28,7 +28,7 @@ from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.core.world import World
 from dmp_cpg_ros.core.world_choice import WORLDS
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.suite import Suite, load_gait, load_suite
+from dmp_cpg_ros.suite import Suite, load_gait, load_gaits, load_suite
 
 Array = NDArray[np.float64]
 Velocity = tuple[float, float, float]
@@ -84,7 +84,8 @@ class Walk(LoopRun[WalkingLoop]):
         suite = suite_of(robot, gait, file, values)
         body = MujocoRobot(suite.robot_file, suite.tick_ns, seed, 0.03 if seed else 0.0,
                            world=world or suite.world, sensors=suite.sensors)
-        super().__init__(body, WalkingLoop(body.description, load_gait(gait), suite.parameters))
+        super().__init__(body, WalkingLoop(
+            body.description, load_gait(gait), suite.parameters, load_gaits()))
         self.asked: Velocity = (0.0, 0.0, 0.0)
         self.walk(STANDING)
         self.loop.request(False)
