@@ -33,7 +33,7 @@ from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
 ROBOT = quadruped()
 STANDING = standing_state(ROBOT)
 NO_TARGETS = JointTargets(np.zeros(3), np.zeros(3), np.zeros(3))
-NO_FEEDBACK = PostureFeedback(np.zeros(12), np.zeros((4, 2)), np.zeros(3))
+NO_FEEDBACK = PostureFeedback(np.zeros(12), np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3))
 TICK = TICK_NS * 1e-9
 
 
