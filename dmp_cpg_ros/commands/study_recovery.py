@@ -1,0 +1,162 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Stands robots up, lays them down, and lets them recover from many falls; tabulates the outcome.
+
+A fall is any orientation and any joint angles within the limits, drawn from a seed, dropped and
+come to rest. The robot is the MuJoCo one with noisy sensors in the plain loop, which is identical
+to the nodes in lock-step. Exit status 1 when the first robot failed anywhere, 2 when the arguments
+cannot be used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from multiprocessing import Pool
+from pathlib import Path
+
+import numpy as np
+
+from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.commands.loop_run import LoopRun
+from dmp_cpg_ros.commands.markdown_table import markdown_table
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.walking_loop import WalkingLoop
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.suite import load_suite
+
+OWN_ROBOT = 'robots/mini_quadruped.yaml'
+
+SETTLING_S, STANDING_S, LONGEST_S = 0.1, 0.5, 60.0
+"""Time before a request, after it has ended well, and until it has failed [s]."""
+
+COLUMNS = ('robot', 'stood up', 'lay down', 'falls', 'recovered', 'rolls 0 / 1 / 2 / more',
+           'seconds, median / worst')
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """What became of one fall.
+
+    Attributes
+    ----------
+    seed : int
+        Of the fall.
+    stands : bool
+        Whether the robot stood in the end.
+    tries : int
+        How often it rolled.
+    seconds : float
+        From the request to standing, or to giving up [s].
+    reason : str
+        Why it is as it is.
+    """
+
+    seed: int
+    stands: bool
+    tries: int
+    seconds: float
+    reason: str
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the study and print its table; returns the exit status."""
+    options = _parser().parse_args(arguments)
+    rows, outcomes, fine = [], {}, []
+    try:
+        with Pool(options.jobs) as pool:
+            for robot in options.robots:
+                up, down = up_and_down(robot)
+                falls = pool.map(partial(recovery, robot), range(options.seeds), chunksize=1)
+                rows.append(row(robot, up, down, falls))
+                outcomes[robot] = [asdict(fall) for fall in falls]
+                fine.append(up and down and all(fall.stands for fall in falls))
+    except DmpCpgError as error:
+        print(f'study_recovery: {error}', file=sys.stderr)
+        return 2
+    print(markdown_table(COLUMNS, rows))
+    if options.json:
+        write_json(options.json, outcomes)
+        print(f'\nwrote {options.json}')
+    return int(not fine[0])
+
+
+def run_of(robot: str, start_pose: str, start_mode: str, seed: int = 0) -> LoopRun[WalkingLoop]:
+    """Make a robot that lies or has fallen, and its loop."""
+    suite = load_suite(None, {'robot': robot, 'start_mode': start_mode})
+    body = MujocoRobot(
+        suite.robot_file, suite.tick_ns, seed, sensors=suite.sensors, start_pose=start_pose)
+    return LoopRun(body, WalkingLoop(body.description, suite.gait, suite.parameters))
+
+
+def up_and_down(robot: str) -> tuple[bool, bool]:
+    """Whether a robot stands up from its belly, and lies down again."""
+    run = run_of(robot, 'lying', 'lying')
+    _tick(run, SETTLING_S)
+    run.loop.request_mode('stand_up')
+    stands = _until(run, 'standing')
+    if stands:
+        run.loop.request_mode('lie_down')
+    return stands, stands and _until(run, 'lying')
+
+
+def recovery(robot: str, seed: int) -> Recovery:
+    """Let a robot fall by a seed, and recover."""
+    run = run_of(robot, 'fallen', 'damped', seed)
+    _tick(run, SETTLING_S)
+    run.loop.request_mode('recover')
+    begin = run.state.time_ns
+    stands = _until(run, 'standing')
+    mode = run.loop.mode
+    seconds = (run.state.time_ns - begin) * 1e-9
+    return Recovery(seed, stands, mode.tries, seconds, mode.reason)
+
+
+def _until(run: LoopRun[WalkingLoop], mode: str) -> bool:
+    """Tick until a mode lasts; return whether it does, and whether what stands has not fallen."""
+    end = run.state.time_ns + round(LONGEST_S * 1e9)
+    _tick(run, run.tick_s)
+    while run.loop.mode.mode not in (mode, 'damped') and run.state.time_ns < end:
+        _tick(run, run.tick_s)
+    if run.loop.mode.mode == mode:
+        _tick(run, STANDING_S)
+    return run.loop.mode.mode == mode and (mode != 'standing' or not run.fell())
+
+
+def _tick(run: LoopRun[WalkingLoop], seconds: float) -> None:
+    for _ in range(round(seconds / run.tick_s)):
+        run.state = run.robot.step(run.loop.tick(run.state).targets)
+
+
+def row(robot: str, up: bool, down: bool, falls: Sequence[Recovery]) -> tuple[str, ...]:
+    """Cells of one robot's row."""
+    stood = [fall for fall in falls if fall.stands]
+    rolls = [sum(fall.tries == n for fall in stood) for n in range(3)]
+    rolls.append(sum(fall.tries > 2 for fall in stood))
+    seconds = [fall.seconds for fall in stood]
+    times = f'{np.median(seconds):.1f} / {max(seconds):.1f}' if seconds else '-'
+    yes = ('no', 'yes')
+    return (Path(robot).stem, yes[up], yes[down], str(len(falls)),
+            f'{len(stood)} ({100.0 * len(stood) / max(len(falls), 1):.0f} %)',
+            ' / '.join(map(str, rolls)), times)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog='study_recovery', description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('robots', nargs='*', default=[OWN_ROBOT], metavar='ROBOT',
+                        help=f'robot files (default: {OWN_ROBOT})')
+    parser.add_argument('--seeds', type=int, default=50, metavar='N',
+                        help='falls of each robot (default: 50)')
+    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
+                        help='processes (default: one per processor)')
+    parser.add_argument('--json', type=Path, metavar='FILE', help='write every fall and outcome')
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())
