@@ -67,4 +67,5 @@ def estimated_state(readings: SensorReadings, estimate: BodyEstimate) -> RobotSt
         readings.specific_force_in_base,
         readings.foot_force,
         readings.rate_in_base,
+        estimate.normal_in_world,
     )

@@ -41,6 +41,8 @@ class RobotState:
         Normal contact force of each foot [N].
     gyro_in_base : ndarray (3,), optional
         Gyroscope reading [rad/s].
+    ground_normal_in_world : ndarray (3,), optional
+        Of the ground under the feet, upwards, as far as an estimator knows it.
 
     Joints, efforts, gyroscope, accelerometer and forces are measured; position, orientation and
     velocities of the base are the truth in a simulator's state and an estimate in a controller's.
@@ -57,6 +59,7 @@ class RobotState:
     acceleration_in_base: NDArray[np.float64]
     foot_force: NDArray[np.float64]
     gyro_in_base: NDArray[np.float64] | None = None
+    ground_normal_in_world: NDArray[np.float64] | None = None
 
     @property
     def measured_rate_in_base(self) -> NDArray[np.float64]:

@@ -1,0 +1,81 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The frame of the ground: at the base, with its heading, z along the normal of the ground.
+
+A controller that works in this frame holds the body parallel to a slope, keeps its height along
+the normal, and its friction cones stand on the ground. On level ground, or without an estimate of
+it, the frame is level.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.rotations import rotation_matrix
+
+Array = NDArray[np.float64]
+
+UPWARD = np.array((0.0, 0.0, 1.0))
+
+
+def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Array, Array]:
+    """Rotation from ``base_link`` to the frame of the ground, and the vertical in that frame.
+
+    Parameters
+    ----------
+    state : RobotState
+        Orientation of the base, and the normal of the ground where it is known.
+    following : float
+        Share of the ground's slope that the frame takes; 0 is level.
+
+    Returns
+    -------
+    R_ground_base : ndarray (3, 3)
+        Its third row is the frame's z axis in the base.
+    upward_in_ground : ndarray (3,)
+        Direction away from gravity.
+    """
+    R_world_base = rotation_matrix(state.base_quaternion)
+    normal, vertical = state.ground_normal_in_world, R_world_base[2]
+    if normal is None or following == 0.0:
+        return frame_of(vertical), UPWARD.copy()
+    leaning = UPWARD + following * (normal / normal[2] - UPWARD)
+    leaning /= np.sqrt(leaning @ leaning)
+    R_ground_base = frame_of(leaning @ R_world_base)
+    return R_ground_base, R_ground_base @ vertical
+
+
+def frame_of(z_in_base: Array) -> Array:
+    """Rotation (3, 3) from the base to the frame with a given z axis and the base's heading."""
+    forward = np.array((1.0, 0.0, 0.0)) - z_in_base[0] * z_in_base
+    forward /= np.sqrt(forward @ forward) + 1e-12
+    left = np.array(
+        (
+            z_in_base[1] * forward[2] - z_in_base[2] * forward[1],
+            z_in_base[2] * forward[0] - z_in_base[0] * forward[2],
+            z_in_base[0] * forward[1] - z_in_base[1] * forward[0],
+        )
+    )
+    return np.stack((forward, left, z_in_base))
+
+
+def lean(upward_in_ground: Array, height: float) -> Array:
+    """Where the vertical through a point at a height meets the ground, relative to its foot.
+
+    Feet that stand around this place carry the body evenly: on a slope it lies downhill.
+
+    Parameters
+    ----------
+    upward_in_ground : ndarray (3,)
+        As from :func:`ground_from_base`.
+    height : float
+        Of the centre of mass over the ground, along its normal [m].
+
+    Returns
+    -------
+    ndarray (2,)
+        In the frame of the ground [m].
+    """
+    return -height * upward_in_ground[:2] / max(float(upward_in_ground[2]), 0.3)

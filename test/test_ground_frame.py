@@ -1,0 +1,61 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The frame of the ground is level without slope and stands on the slope with one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_examples import quadruped, standing_state
+
+from dmp_cpg_ros.core.ground_frame import ground_from_base, lean
+from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.rotations import rotation_matrix, turned
+from dmp_cpg_ros.core.terrain_plane import normal_in_world
+
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def state_on(slope: tuple[float, float] | None, turn: tuple[float, float, float]) -> RobotState:
+    normal = None if slope is None else normal_in_world(np.array(slope))
+    return standing_state(quadruped(), base_quaternion=turned(LEVEL, np.array(turn)),
+                          ground_normal_in_world=normal)
+
+
+@pytest.mark.parametrize('turn', [(0.0, 0.0, 0.0), (0.1, -0.2, 0.0), (0.1, 0.2, 2.0)])
+def test_without_slope_it_is_level(turn: tuple[float, float, float]) -> None:
+    known, upward = ground_from_base(state_on((0.0, 0.0), turn))
+    unknown, _ = ground_from_base(state_on(None, turn))
+    level, _ = ground_from_base(state_on((0.3, 0.1), turn), following=0.0)
+    np.testing.assert_allclose(known, unknown, atol=1e-12)
+    np.testing.assert_allclose(known, level, atol=1e-12)
+    np.testing.assert_allclose(upward, (0.0, 0.0, 1.0), atol=1e-12)
+    R = rotation_matrix(turned(LEVEL, np.array(turn)))
+    np.testing.assert_allclose(known[2], R[2], atol=1e-12)  # its z axis is the vertical
+
+
+@pytest.mark.parametrize('turn', [(0.0, 0.0, 0.0), (0.1, -0.2, 0.0), (0.1, 0.2, 2.0)])
+@pytest.mark.parametrize('slope', [(0.25, 0.0), (-0.1, 0.2)])
+def test_on_a_slope_its_z_axis_is_the_normal(slope: tuple[float, float],
+                                             turn: tuple[float, float, float]) -> None:
+    state = state_on(slope, turn)
+    R, upward = ground_from_base(state)
+    R_world_base = rotation_matrix(state.base_quaternion)
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+    np.testing.assert_allclose(R_world_base @ R[2], normal_in_world(np.array(slope)), atol=1e-12)
+    np.testing.assert_allclose(R_world_base @ R.T @ upward, (0.0, 0.0, 1.0), atol=1e-12)
+    assert R[0, 0] > 0.9 and abs(R[0, 1]) < 0.1  # the heading is the base's
+
+
+def test_half_of_a_slope_is_half_as_steep() -> None:
+    R, _ = ground_from_base(state_on((0.2, -0.1), (0.0, 0.0, 0.0)), following=0.5)
+    np.testing.assert_allclose(R[2] / R[2, 2], (-0.1, 0.05, 1.0), atol=1e-12)
+
+
+def test_the_vertical_through_the_body_meets_the_ground_downhill() -> None:
+    angle = 0.2
+    _, upward = ground_from_base(state_on((np.tan(angle), 0.0), (0.0, -angle, 0.0)))
+    shift = lean(upward, 0.3)
+    assert shift[0] == pytest.approx(-0.3 * np.tan(angle))  # uphill is ahead
+    assert shift[1] == pytest.approx(0.0, abs=1e-12)
