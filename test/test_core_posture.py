@@ -15,6 +15,8 @@ from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.leg_primitive import nominal_foothold
 from dmp_cpg_ros.core.levelling import level_from_base
 from dmp_cpg_ros.core.posture import PostureController, PostureParameters
+from dmp_cpg_ros.core.rotations import rotation_matrix, turned
+from dmp_cpg_ros.core.terrain_plane import normal_in_world
 
 ROBOT = quadruped()
 FEET = np.array([nominal_foothold(ROBOT, leg.name) for leg in ROBOT.legs])
@@ -103,6 +105,29 @@ def test_errors_are_answered_by_the_opposite_wrench(
     R = level_from_base(state.base_quaternion)
     wrench = wrench_of(forces_of(feedback.torque) @ R.T, FEET @ R.T)
     assert sign * (wrench - at_rest)[component] > 0.1
+
+
+@pytest.mark.parametrize('slope', [(0.25, 0.0), (-0.2, 0.0), (0.0, 0.2)])
+def test_on_a_slope_parallel_to_it_the_feet_carry_the_weight(slope: tuple[float, float]) -> None:
+    """The forces are vertical (their sum along the slope too), and nothing turns the body."""
+    of, x = controller(), network().locked_state()
+    normal = normal_in_world(np.array(slope))
+    axis = np.cross((0.0, 0.0, 1.0), normal)
+    turn = axis / np.linalg.norm(axis) * np.arccos(normal[2])
+    state = standing_state(ROBOT, base_quaternion=turned(np.array([0.0, 0.0, 0.0, 1.0]), turn),
+                           ground_normal_in_world=normal)
+    feedback = of.step(of.initial_state(), state, x, 0.0 * x, np.zeros(3), TICK)[1]
+    R_world_base = rotation_matrix(state.base_quaternion)
+    forces = forces_of(feedback.torque)
+    weight = ROBOT.mass * GRAVITY
+    np.testing.assert_allclose(
+        forces.sum(axis=0) @ R_world_base.T, (0.0, 0.0, weight), atol=0.02 * weight)
+    np.testing.assert_allclose(wrench_of(forces, FEET)[3:], 0.0, atol=0.02 * weight)
+    tangential = np.hypot(forces[:, 0], forces[:, 1])  # the base is parallel to the ground
+    assert (tangential <= of.parameters.friction * forces[:, 2] + 1e-9).all()
+    # Swinging feet are placed downhill: slope times height of the centre of mass.
+    downhill = -np.array(slope) / np.hypot(*slope)
+    assert ((feedback.shift_in_base[:, :2] @ downhill) > 0.15 * 0.2).all()
 
 
 @given(seed=st.integers(0, 10_000), size=st.floats(0.0, 20.0), gait=st.sampled_from(list(GAITS)))

@@ -17,6 +17,7 @@ from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.rotations import roll_pitch_yaw
 from dmp_cpg_ros.core.sensor_parameters import SensorParameters
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
+from dmp_cpg_ros.core.world import Slope
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -92,6 +93,18 @@ def test_it_walks_as_it_is_told(gait: str, command: tuple[float, ...]) -> None:
     assert speed == pytest.approx(command[0], rel=0.1, abs=0.01)
     yaw = [roll_pitch_yaw(state.base_quaternion)[2] for state in states]
     assert abs(yaw[-1] - yaw[0]) < 0.03
+
+
+@pytest.mark.parametrize('degrees', [12.0, -12.0])
+def test_it_walks_on_a_slope_parallel_to_the_ground_that_it_found(degrees: float) -> None:
+    robot = MujocoRobot(sensors=SensorParameters(), seed=2, world=Slope(degrees=degrees))
+    on_slope = walk(robot, 'trot', (0.4,), 8.0)
+    last = on_slope.states[-1]
+    assert last.base_position_in_world[0] > 0.4 * 6.0 * 0.8
+    normal = np.mean([e.normal_in_world for e in on_slope.estimates[-250:]], axis=0)
+    assert np.rad2deg(np.arctan2(-normal[0], normal[2])) == pytest.approx(degrees, abs=1.5)
+    pitch = np.mean([roll_pitch_yaw(s.base_quaternion)[1] for s in on_slope.states[-250:]])
+    assert np.rad2deg(pitch) == pytest.approx(-degrees, abs=2.5)
 
 
 def test_the_filter_is_not_surer_than_it_may_be() -> None:

@@ -122,8 +122,8 @@ class FootPlacement:
         down[:, 1] = self._side * np.maximum(self._side * (across + down[:, 1]), 0.0) - across
         return down - half_stance * self.over_feet(planned)
 
-    def raised(self, p: PostureParameters, shift: Array, R_level_base: Array) -> Array:
-        """Change of the feet's height in the base that keeps them level over flat ground.
+    def raised(self, p: PostureParameters, shift: Array, R_ground_base: Array) -> Array:
+        """Change of the feet's height in the base that keeps them level over the ground.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class FootPlacement:
             Gains.
         shift : ndarray (4, 2)
             Shift of the footholds [m].
-        R_level_base : ndarray (3, 3)
+        R_ground_base : ndarray (3, 3)
             Attitude.
 
         Returns
@@ -141,7 +141,7 @@ class FootPlacement:
         """
         foot = self.footholds_in_base.copy()
         foot[:, :2] += shift
-        upward = R_level_base[2]
+        upward = R_ground_base[2]
         lost = foot[:, 2] - foot @ upward
         limit = LARGEST_RAISE * self._leg_length
         return np.clip(p.levelling * lost / max(float(upward[2]), 0.3), -limit, limit)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.levelling import frame_of
 from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.rotations import rotation_matrix
 
@@ -45,20 +46,6 @@ def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Array, 
     leaning /= np.sqrt(leaning @ leaning)
     R_ground_base = frame_of(leaning @ R_world_base)
     return R_ground_base, R_ground_base @ vertical
-
-
-def frame_of(z_in_base: Array) -> Array:
-    """Rotation (3, 3) from the base to the frame with a given z axis and the base's heading."""
-    forward = np.array((1.0, 0.0, 0.0)) - z_in_base[0] * z_in_base
-    forward /= np.sqrt(forward @ forward) + 1e-12
-    left = np.array(
-        (
-            z_in_base[1] * forward[2] - z_in_base[2] * forward[1],
-            z_in_base[2] * forward[0] - z_in_base[0] * forward[2],
-            z_in_base[0] * forward[1] - z_in_base[1] * forward[0],
-        )
-    )
-    return np.stack((forward, left, z_in_base))
 
 
 def lean(upward_in_ground: Array, height: float) -> Array:

@@ -25,13 +25,18 @@ def level_from_base(quaternion: Array) -> Array:
     """
     x, y, z, w = quaternion.tolist()
     z_world = np.array((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))
-    forward = np.array((1.0, 0.0, 0.0)) - z_world[0] * z_world
+    return frame_of(z_world)
+
+
+def frame_of(z_in_base: Array) -> Array:
+    """Rotation (3, 3) from the base to the frame of a z axis (3,) with the base's heading."""
+    forward = np.array((1.0, 0.0, 0.0)) - z_in_base[0] * z_in_base
     forward /= np.sqrt(forward @ forward) + 1e-12
     left = np.array(
         (
-            z_world[1] * forward[2] - z_world[2] * forward[1],
-            z_world[2] * forward[0] - z_world[0] * forward[2],
-            z_world[0] * forward[1] - z_world[1] * forward[0],
+            z_in_base[1] * forward[2] - z_in_base[2] * forward[1],
+            z_in_base[2] * forward[0] - z_in_base[0] * forward[2],
+            z_in_base[0] * forward[1] - z_in_base[1] * forward[0],
         )
     )
-    return np.stack((forward, left, z_world))
+    return np.stack((forward, left, z_in_base))

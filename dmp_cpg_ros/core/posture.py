@@ -20,9 +20,9 @@ from dmp_cpg_ros.core.foot_placement import FootPlacement
 from dmp_cpg_ros.core.force_distribution import distribute
 from dmp_cpg_ros.core.gait import GRAVITY
 from dmp_cpg_ros.core.gait_transition import GaitInForce
+from dmp_cpg_ros.core.ground_frame import ground_from_base, lean
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.leg_primitive import LegFeedback, body_scale, nominal_foothold
-from dmp_cpg_ros.core.levelling import level_from_base
 from dmp_cpg_ros.core.phase import phase, phase_rate
 from dmp_cpg_ros.core.posture_parameters import PostureParameters
 from dmp_cpg_ros.core.robot_description import RobotDescription
@@ -156,17 +156,18 @@ class PostureController:
         activity = activity_step(
             memory.activity, rates, gait.own_omegas(omega), p.activity_rate, dt)
         load = planned_load(gait.cycle_position(phase(x)), duty, activity, p.load_transfer)
-        R_level_base = level_from_base(state.base_quaternion)
-        velocity = R_level_base @ state.base_velocity_in_base
-        rate = R_level_base @ state.base_rate_in_base
+        R_ground_base, upward = ground_from_base(state, p.slope_following)
+        velocity = R_ground_base @ state.base_velocity_in_base
+        rate = R_ground_base @ state.base_rate_in_base
         moving = float(activity.mean())
         keeping = memory.keeping.following(
             p, leg_length, moving, state.base_quaternion, velocity, r, dt)
         correction = keeping.acting(p, leg_length, moving)
         measured = np.array((velocity[0], velocity[1], rate[2]))
         shift = self.placement.shift(p, measured, r, r + correction, np.pi * duty / omega)
-        raised = self.placement.raised(p, shift, R_level_base)
-        body = BodyMotion(R_level_base, velocity, rate, 0.0)
+        shift = shift + p.slope_lean * lean(upward, self.model.height)
+        raised = self.placement.raised(p, shift, R_ground_base)
+        body = BodyMotion(R_ground_base, upward, velocity, rate, 0.0)
         return replace(memory, activity=activity, keeping=keeping), PostureFeedback(
             self._torque(state, body, load, r),
             np.column_stack([shift, raised]),
@@ -180,8 +181,8 @@ class PostureController:
         q = state.joint_position.reshape(4, 3).tolist()
         feet_in_base = np.array(
             [leg.foot_in_base(angles) for leg, angles in zip(self.kinematics, q, strict=True)])
-        # from the centre of mass, levelled
-        feet = (feet_in_base - self.description.com_in_base) @ body.R_level_base.T
+        # from the centre of mass, in the frame of the ground
+        feet = (feet_in_base - self.description.com_in_base) @ body.R_ground_base.T
         total = float(load.sum())
         ground = float(load @ feet[:, 2]) / total if total > 1e-6 else float(feet[:, 2].min())
         body = replace(body, height=self.foot_radius - ground)
@@ -190,5 +191,5 @@ class PostureController:
             LARGEST_LOAD * self.description.mass * GRAVITY, self.importance)
         J = np.array(
             [leg.jacobian_in_base(angles) for leg, angles in zip(self.kinematics, q, strict=True)])
-        torque = -np.einsum('lij,li->lj', J, forces @ body.R_level_base)
+        torque = -np.einsum('lij,li->lj', J, forces @ body.R_ground_base)
         return np.clip(torque, -self.torque_limit, self.torque_limit).ravel()

@@ -63,6 +63,18 @@ class PostureParameters(Parameters):
         minimum=0.0,
         maximum=10.0,
     )
+    slope_following: float = parameter(
+        1.0,
+        "share of the ground's estimated slope by which the body leans with it; 0: it stays level",
+        minimum=0.0,
+        maximum=1.0,
+    )
+    slope_lean: float = parameter(
+        1.0,
+        'share of the way downhill by which feet are placed so that the body is over them',
+        minimum=0.0,
+        maximum=1.5,
+    )
     reach: float = parameter(
         0.95, 'share of the straight leg within which feet are placed', minimum=0.1, maximum=1.0
     )

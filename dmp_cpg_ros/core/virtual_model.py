@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Virtual model of the body: springs and dampers that hold it at its height, level, and at speed.
 
-    f = m (a_ref + g ẑ),    M = I (−k_a (roll, pitch) − b_a ω,  b_ψ (γ_ref − ω_z))
+    f = m (a_ref + g u),    M = I (−k_a (roll, pitch) − b_a ω,  b_ψ (γ_ref − ω_z))
 
-(Pratt et al. 2001; Ajallooeian et al. 2013, as the paper's experiment.)
+(Pratt et al. 2001; Ajallooeian et al. 2013, as the paper's experiment), in the frame of the
+ground, where u is the direction away from gravity.
 """
 
 from __future__ import annotations
@@ -23,19 +24,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BodyMotion:
-    """What the virtual model takes of the body, in the levelled frame.
+    """What the virtual model takes of the body, in the frame of the ground.
 
     Attributes
     ----------
-    R_level_base : ndarray (3, 3)
-        Its third row holds the tilt.
+    R_ground_base : ndarray (3, 3)
+        Its third row holds the tilt against the ground.
+    upward_in_ground : ndarray (3,)
+        Direction away from gravity; (0, 0, 1) on level ground.
     velocity, rate : ndarray (3,)
         Linear [m/s] and angular [rad/s].
     height : float
         Of the centre of mass over the stance feet's ground [m].
     """
 
-    R_level_base: Array
+    R_ground_base: Array
+    upward_in_ground: Array
     velocity: Array
     rate: Array
     height: float
@@ -56,10 +60,10 @@ class VirtualModel:
         """Keep the scales."""
         self._mass, self._rate = description.mass, (GRAVITY / leg_length) ** 0.5
         self._inertia = np.diag(description.base_inertia).copy()
-        self._height = description.stance_height + float(description.com_in_base[2])
+        self.height = description.stance_height + float(description.com_in_base[2])
 
     def wrench(self, p: PostureParameters, body: BodyMotion, r: Array) -> Array:
-        """Force [N] and moment [N m] about the centre of mass in the levelled frame.
+        """Force [N] and moment [N m] about the centre of mass in the frame of the ground.
 
         Parameters
         ----------
@@ -75,11 +79,10 @@ class VirtualModel:
         ndarray (6,)
         """
         rate, squared = self._rate, self._rate * self._rate
-        roll, pitch = body.R_level_base[2, 1], -body.R_level_base[2, 0]  # for small angles
+        roll, pitch = body.R_ground_base[2, 1], -body.R_ground_base[2, 0]  # for small angles
         push = rate * p.velocity_gain * (r[:2] - body.velocity[:2])
         lift = (
-            GRAVITY
-            + squared * p.height_stiffness * (self._height - body.height)
+            squared * p.height_stiffness * (self.height - body.height)
             - rate * p.height_damping * body.velocity[2]
         )
         turn = (
@@ -87,5 +90,7 @@ class VirtualModel:
             -squared * p.attitude_stiffness * pitch - rate * p.attitude_damping * body.rate[1],
             rate * p.yaw_rate_gain * (r[2] - body.rate[2]),
         )
-        force = self._mass * np.array((push[0], push[1], lift))
+        force = self._mass * (
+            np.array((push[0], push[1], lift)) + GRAVITY * body.upward_in_ground
+        )
         return np.concatenate([force, self._inertia * np.array(turn)])
