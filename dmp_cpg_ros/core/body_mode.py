@@ -207,9 +207,8 @@ class BodyModes:
         if condition.tilt <= UPRIGHT_TILT:
             return ()
         side = SIDES[0] if condition.down_in_base[1] > 0.0 else SIDES[1]
-        names = ('push', 'over')
-        if condition.down_in_base[2] > ON_ITS_BACK:
-            names = ('turn', 'tip', *names)  # type: ignore[assignment]
+        on_its_back = condition.down_in_base[2] > ON_ITS_BACK
+        names = ('turn', 'tip', 'over') if on_its_back else ('push', 'over')
         return tuple(f'{name}_{side}' for name in names)
 
     # Inside ------------------------------------------------------------------------------------

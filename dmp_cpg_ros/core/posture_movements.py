@@ -3,12 +3,14 @@
 """The whole-body movements: goal postures, durations, and how much weight the legs then carry.
 
 Standing up and lying down follow :func:`~dmp_cpg_ros.core.postures.raised_posture`. A robot on its
-side or back rolls over in four movements. *Lower* is the side on which (or over which) it rolls:
+side or back rolls over. *Lower* is the side on which it lies, or over which it rolls:
 
-1. ``turn``, from the back: thighs of the upper side swing up to the ground behind the back and
-   push that side up; ``tip`` swings them on until the body falls onto its lower side.
-2. ``push``: the legs of the lower side do the same, which turns the belly to the ground.
-3. ``over``: the upper legs fold away, and the body falls onto its belly.
+- from the back, ``turn``: the thighs of the upper side swing up to the ground behind the back and
+  press that side up, the lower legs fold out of the way; ``tip``: the upper legs stretch on to the
+  far side, the lower ones away from the body, which falls over its lower side,
+- from the side, ``push``: the legs of the lower side swing to the ground behind the back and turn
+  the belly to the ground,
+- ``over``: the upper legs fold away, and the body falls onto its belly.
 
 Durations scale with √(l/g), l the standing height of the hips (dynamic similarity), so that one
 table serves robots of any size.
@@ -36,15 +38,18 @@ SIDES = ('left', 'right')
 TUCKED: LegPosture = (0.0, 1.3, 2.6)
 HANGING: LegPosture = (0.0, 0.0, 0.9)
 """Counterweight on the belly's side."""
-BEHIND: LegPosture = (0.0, 2.7, 0.5)
-"""Over the back."""
-BEHIND_INWARDS: LegPosture = (0.8, 2.7, 0.4)
+BEHIND: LegPosture = (-0.76, 2.77, 1.65)
+BEHIND_FAR: LegPosture = (0.95, 3.4, 0.5)
+"""Over the back: bent against the ground, and stretched on to the far side."""
+FORWARDS: LegPosture = (-0.9, -0.5, 2.65)
+AWAY: LegPosture = (-0.73, 0.0, 0.4)
+"""Folded out of the way of the rolling body, and stretched away from it."""
 BEHIND_OUTWARDS: LegPosture = (-0.9, 2.7, 0.9)
 """Over the back, and there swung down to the ground; outwards for a leg that points upwards."""
 
 ROLLING: dict[str, tuple[LegPosture, LegPosture, float]] = {
-    'turn': (BEHIND, TUCKED, 3.0),
-    'tip': (BEHIND_INWARDS, TUCKED, 3.0),
+    'turn': (BEHIND, FORWARDS, 3.0),
+    'tip': (BEHIND_FAR, AWAY, 3.0),
     'push': (HANGING, BEHIND_OUTWARDS, 3.0),
     'over': (TUCKED, BEHIND_OUTWARDS, 2.4),
 }
