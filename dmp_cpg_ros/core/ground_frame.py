@@ -4,7 +4,7 @@
 
 A controller that works in this frame holds the body parallel to a slope, keeps its height along
 the normal, and its friction cones stand on the ground. On level ground, or without an estimate of
-it, the frame is level.
+it, the frame is level; of a slight slope it takes a part only.
 """
 
 from __future__ import annotations
@@ -18,6 +18,11 @@ from dmp_cpg_ros.core.rotations import rotation_matrix
 
 Array = NDArray[np.float64]
 
+SLIGHT = 0.03
+"""Slope of which half is followed, more of steeper ones and little of the few tenths of a degree
+that soft ground and compliant feet feign.
+"""
+
 UPWARD = np.array((0.0, 0.0, 1.0))
 
 
@@ -29,7 +34,8 @@ def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Array, 
     state : RobotState
         Orientation of the base, and the normal of the ground where it is known.
     following : float
-        Share of the ground's slope that the frame takes; 0 is level.
+        Share of a steep slope that the frame takes; 0 is level. Of a slope s it takes this times
+        s²/(s² + ``SLIGHT``²).
 
     Returns
     -------
@@ -42,7 +48,9 @@ def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Array, 
     normal, vertical = state.ground_normal_in_world, R_world_base[2]
     if normal is None or following == 0.0:
         return frame_of(vertical), UPWARD.copy()
-    leaning = UPWARD + following * (normal / normal[2] - UPWARD)
+    slope = normal / normal[2] - UPWARD
+    squared = float(slope @ slope)
+    leaning = UPWARD + following * squared / (squared + SLIGHT**2) * slope
     leaning /= np.sqrt(leaning @ leaning)
     R_ground_base = frame_of(leaning @ R_world_base)
     return R_ground_base, R_ground_base @ vertical
