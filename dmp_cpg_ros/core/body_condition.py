@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import acos
+from math import acos, inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import RobotState
 
 Array = NDArray[np.float64]
+
+CERTAIN_SUPPORT = 0.5
+"""Share of the weight on the contact sensors from which the joint torques need not be asked."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +34,8 @@ class BodyCondition:
     height : float
         Height of ``base_link`` over the sole of the lowest foot [m].
     support : float
-        Share of the weight that the feet carry, by the joint torques or by the contact sensors,
-        whichever say more.
+        Share of the weight that the feet carry, by the contact sensors, or by the joint torques
+        where these say more and the sensors little.
     """
 
     down_in_base: Array
@@ -53,34 +56,36 @@ class BodySense:
     def __init__(self, description: RobotDescription) -> None:
         """Prepare the legs."""
         self._legs = [LegKinematics(leg) for leg in description.legs]
-        self._radius = np.array([leg.foot_radius for leg in description.legs])
+        self._radius = [leg.foot_radius for leg in description.legs]
         self._com_in_base = description.com_in_base
         self._weight = description.mass * GRAVITY
         self._limit = np.concatenate([leg.torque_limit for leg in description.legs])
 
     def condition(self, state: RobotState) -> BodyCondition:
-        """Condition in a measured state.
+        """Condition in a measured state."""
+        x, y, z, w = state.base_quaternion.tolist()
+        down_x, down_y = 2.0 * (w * y - x * z), -2.0 * (y * z + w * x)
+        down_z = 2.0 * (x * x + y * y) - 1.0
+        q, height = state.joint_position.tolist(), -inf
+        for i, (leg, radius) in enumerate(zip(self._legs, self._radius, strict=True)):
+            foot_x, foot_y, foot_z = leg.foot_in_base(q[3 * i : 3 * i + 3]).tolist()
+            height = max(height, down_x * foot_x + down_y * foot_y + down_z * foot_z + radius)
+        down = np.array((down_x, down_y, down_z))
+        support = float(state.foot_force.sum()) / self._weight
+        if support < CERTAIN_SUPPORT:
+            support = max(support, self._pressed(state, q, down))
+        return BodyCondition(down, acos(min(max(-down_z, -1.0), 1.0)), height, support)
+
+    def _pressed(self, state: RobotState, q: list[float], down: Array) -> float:
+        """Share of the weight that the joint torques press onto the ground.
 
         Forces are those of statics, f = −J⁻ᵀ τ at each foot, damped near singular postures.
         """
-        x, y, z, w = state.base_quaternion.tolist()
-        down = np.array(
-            (2.0 * (w * y - x * z), -2.0 * (y * z + w * x), 2.0 * (x * x + y * y) - 1.0)
-        )
-        q = state.joint_position.reshape(4, 3).tolist()
-        feet = np.array([leg.foot_in_base(a) for leg, a in zip(self._legs, q, strict=True)])
-        J = self._jacobians(q)
+        J = self._jacobians([q[3 * i : 3 * i + 3] for i in range(4)])
         tau = state.joint_effort.reshape(4, 3, 1)
-        J_T = J.transpose(0, 2, 1)
-        damped = J @ J_T + 1e-4 * np.eye(3)
+        damped = J @ J.transpose(0, 2, 1) + 1e-4 * np.eye(3)
         forces = -np.linalg.solve(damped, J @ tau)[:, :, 0]
-        pressed = float(np.maximum(-(forces @ down), 0.0).sum())
-        return BodyCondition(
-            down,
-            acos(min(max(-float(down[2]), -1.0), 1.0)),
-            float((feet @ down + self._radius).max()),
-            max(pressed, float(state.foot_force.sum())) / self._weight,
-        )
+        return float(np.maximum(-(forces @ down), 0.0).sum()) / self._weight
 
     def carrying_torque(self, state: RobotState, share: float) -> Array:
         """Joint torques (12,) with which the feet carry a share of the weight [N m].

@@ -65,14 +65,16 @@ class BodyControl:
         activity : ndarray (4,)
             Swing activity of the legs at the tick before.
         """
-        speed = self._scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
-        at_rest = (
-            speed <= REST_SPEED
+        at_rest = mode.mode == 'stopping' and self._rests(x, x_dot, r, activity)
+        return self.modes.step(mode, self._sense.condition(state), state.time_ns, at_rest)
+
+    def _rests(self, x: Array, x_dot: Array, r: Array, activity: Array) -> bool:
+        """Whether phases, reference and swings rest."""
+        return (
+            self._scale.foot_speed(float(r[0]), float(r[1]), float(r[2])) <= REST_SPEED
             and float(np.abs(phase_rate(x, x_dot)).max()) <= REST_PHASE_RATE
             and float(activity.max()) <= REST_ACTIVITY
         )
-        condition = self._sense.condition(state)
-        return self.modes.step(mode, condition, state.time_ns, at_rest)
 
     def balances(self, mode: ModeState) -> bool:
         """Whether the posture controller balances in a mode."""
