@@ -4,14 +4,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from dmp_cpg_ros.commands.walk import load_scenario
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.scenario import COMMAND_PERIOD_NS, Scenario, play
 from dmp_cpg_ros.core.scenario_events import EVENT_KINDS
+from dmp_cpg_ros.suite import load_gaits
 
+SCENARIOS = Path(__file__).resolve().parent.parent / 'config' / 'scenarios'
 TICK_NS = 4_000_000
 
 
@@ -49,6 +53,13 @@ def test_play_gives_each_kind_to_its_taker_before_the_tick() -> None:
     del takers['gait']
     with pytest.raises(DataError, match='nobody takes gait; taken are'):
         play(played, TICK_NS, lambda: None, takers)
+
+
+@pytest.mark.parametrize('file', sorted(SCENARIOS.glob('*.yaml')), ids=lambda path: path.stem)
+def test_the_scenarios_of_the_package_can_be_played(file: Path) -> None:
+    played = load_scenario(file)
+    assert played.name == file.stem and played.timeline(TICK_NS) is not None
+    assert {event.value for event in played.events if event.kind == 'gait'} <= set(load_gaits())
 
 
 @pytest.mark.parametrize(('event', 'text'), [
