@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.core.body_estimation import BodyEstimator
 from dmp_cpg_ros.core.canonical import CanonicalSystem
 from dmp_cpg_ros.core.graph import CouplingGraph, Edges, graph_from_edges, topology
 from dmp_cpg_ros.core.hopf import AndronovHopf
@@ -27,6 +28,7 @@ from dmp_cpg_ros.core.networks.coupling import Coupling, EdgeCoupling, MeanField
 from dmp_cpg_ros.core.networks.hopf_oscillators import HopfOscillators
 from dmp_cpg_ros.core.networks.network import OscillatorNetwork
 from dmp_cpg_ros.core.phase import state_at
+from dmp_cpg_ros.core.sensor_readings import readings_of
 from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -119,6 +121,8 @@ def parts_of_a_tick() -> list[Row]:
     x_dot = loop.network.rate(x, r, loop.inhibition)
     stopping = loop.supervisor.request(loop.stop, True)
     leg, command = loop.legs[0], (0.5, 0.0, 0.0)
+    estimator = BodyEstimator(robot.description, suite.parameters.estimation)
+    known, readings = loop.estimator_state, readings_of(state)
     asked = LegFeedback(state.joint_position[:3], zero, zero[:2], zero)
 
     def tick() -> None:
@@ -132,6 +136,7 @@ def parts_of_a_tick() -> list[Row]:
         ('oscillators', lambda: loop.network.step(x, r, loop.inhibition, dt)),
         ('state of the stop', lambda: loop.supervisor.step(
             loop.stop, loop.stop.time_ns, x, x_dot, r, command)),
+        ('estimate of the body', lambda: estimator.step(known, readings)),
         ('balance', lambda: loop.posture.step(loop.posture_state, state, x, x_dot, r, dt)),
         ('one leg', lambda: leg.step(loop.leg_states[0], x[0], x_dot[0], r, asked, dt)),
         ('prediction of a stop', lambda: predict(
