@@ -67,10 +67,28 @@ def test_torque_is_inertia_times_acceleration_plus_feedback(
 @given(alpha=st.floats(0.1, 50.0), r=vectors, r_ext=vectors, a=durations, b=durations)
 def test_reference_steps_add_up_exactly(
         alpha: float, r: np.ndarray, r_ext: np.ndarray, a: float, b: float) -> None:
-    of = ReferenceSystem(ReferenceParameters(alpha_r=alpha))
+    of = ReferenceSystem(ReferenceParameters(alpha_r=alpha, max_acceleration=1e3))
     assert np.allclose(of.step(of.step(r, r_ext, a), r_ext, b), of.step(r, r_ext, a + b))
     slope = (of.step(r, r_ext, 1e-7) - r) / 1e-7
     assert np.allclose(slope, alpha * (r_ext - r), rtol=1e-4, atol=1e-4 * alpha)
+
+
+@given(r=vectors, r_ext=vectors, dt=durations, most=st.floats(0.5, 10.0))
+def test_the_reference_speeds_up_within_its_acceleration_and_stops_as_a_plain_filter(
+        r: np.ndarray, r_ext: np.ndarray, dt: float, most: float) -> None:
+    of = ReferenceSystem(ReferenceParameters(max_acceleration=most))
+    after = of.step(r, r_ext, dt)
+    if np.hypot(*after[:2]) > np.hypot(*r[:2]) + 1e-9:
+        assert np.hypot(*(after - r)[:2]) <= most * dt * (1.0 + 1e-9)
+    assert np.allclose(of.step(r, np.zeros(3), dt), r * np.exp(-of.parameters.alpha_r * dt))
+
+
+@given(r_ext=vectors)
+def test_a_limited_reference_arrives(r_ext: np.ndarray) -> None:
+    of, r = ReferenceSystem(ReferenceParameters(alpha_r=6.0)), -np.ones(3)
+    for _ in range(1500):
+        r = of.step(r, r_ext, 0.004)
+    assert np.allclose(r, r_ext, atol=1e-6)
 
 
 @given(commands=st.tuples(*[st.floats(-100.0, 100.0)] * 3))

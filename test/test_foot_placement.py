@@ -29,7 +29,7 @@ half_stances = st.floats(0.03, 0.3)
 @given(velocity=velocities, half_stance=half_stances)
 def test_a_body_that_moves_as_planned_needs_no_shift_within_reach(
         velocity: np.ndarray, half_stance: float) -> None:
-    shift = PLACEMENT.shift(P, velocity, velocity, velocity, half_stance)
+    shift = PLACEMENT.shift(P, velocity, velocity, half_stance)
     way = half_stance * PLACEMENT.over_feet(velocity)
     inside = (PLACEMENT.within_reach(way, P.reach) == way).all(axis=1)
     own_side = (FEET[:, 1] + way[:, 1]) * FEET[:, 1] > 0.0
@@ -39,7 +39,7 @@ def test_a_body_that_moves_as_planned_needs_no_shift_within_reach(
 @given(measured=velocities, reference=velocities, half_stance=half_stances)
 def test_feet_are_placed_where_the_legs_reach_and_on_their_own_side(
         measured: np.ndarray, reference: np.ndarray, half_stance: float) -> None:
-    shift = PLACEMENT.shift(P, measured, reference, reference, half_stance)
+    shift = PLACEMENT.shift(P, measured, reference, half_stance)
     down = FEET[:, :2] + half_stance * PLACEMENT.over_feet(reference) + shift
     assert np.all(down[:, 1] * np.sign(FEET[:, 1]) >= -1e-12)
     for kinematics, x, y in zip(KINEMATICS, *down.T, strict=True):
@@ -50,8 +50,8 @@ def test_feet_are_placed_where_the_legs_reach_and_on_their_own_side(
 @given(measured=velocities)
 def test_left_and_right_are_mirrored(measured: np.ndarray) -> None:
     mirror, zero = np.array([1.0, -1.0, -1.0]), np.zeros(3)
-    here = PLACEMENT.shift(P, measured, zero, zero, 0.1)
-    there = PLACEMENT.shift(P, mirror * measured, zero, zero, 0.1)
+    here = PLACEMENT.shift(P, measured, zero, 0.1)
+    there = PLACEMENT.shift(P, mirror * measured, zero, 0.1)
     assert np.allclose(there, here[[1, 0, 3, 2]] * [1.0, -1.0], atol=1e-12)
 
 
@@ -63,7 +63,7 @@ def test_a_pendulum_comes_to_rest_on_its_footholds(gain: float) -> None:
     speeds = [velocity]
     for _ in range(12):
         measured = np.array([velocity, 0.0, 0.0])
-        d = float(place.shift(p, measured, zero, zero, 0.5 * stance)[0, 0])
+        d = float(place.shift(p, measured, zero, 0.5 * stance)[0, 0])
         c, s = np.cosh(rate * stance), np.sinh(rate * stance)
         velocity = velocity * c - d * rate * s
         speeds.append(velocity)

@@ -84,7 +84,8 @@ def hierarchy_inequalities(reference: ReferenceParameters, leg: LegParameters,
         [Part('swing filters', CONTRACTING, filters), Part('joints', CONTRACTING, spring)])
     return [
         Inequality('reference', 0.0, reference.alpha_r, '1/s', 'zero', 'alpha_r', PROVED,
-                   'the reference forgets how it was commanded before'),
+                   'the reference forgets how it was commanded before, but while its acceleration '
+                   'is limited'),
         Inequality('transformation', 0.0, spring, '1/s', 'zero', 'rate of the joints', PROVED,
                    'the joints converge to what the oscillators and the reference ask for'),
         Inequality('hierarchy', 0.0, whole.rate, '1/s', 'zero', 'smallest rate of all', PROVED,

@@ -4,7 +4,7 @@
 
 A foot comes down at
 
-    d = v T_s / 2 + k sqrt(l / g) (v − v_ref)
+    d = v T_s / 2 + k sqrt(l / g) (v − v_plan)
 
 from its neutral place, with v the velocity of the body over that foot and T_s the duration of
 stance: the neutral point of Raibert (1986), in the middle of the way that the body makes while
@@ -95,8 +95,7 @@ class FootPlacement:
         return down * np.minimum(1.0, share)[:, None]
 
     def shift(
-        self, p: PostureParameters, measured: Array, reference: Array, planned: Array,
-        half_stance: float,
+        self, p: PostureParameters, measured: Array, planned: Array, half_stance: float
     ) -> Array:
         """Shift of the footholds.
 
@@ -104,8 +103,8 @@ class FootPlacement:
         ----------
         p : PostureParameters
             Gains.
-        measured, reference, planned : ndarray (3,)
-            Velocity of the body, v_ref and v_plan: v_x, v_y [m/s], γ [rad/s].
+        measured, planned : ndarray (3,)
+            Velocity of the body, and v_plan: v_x, v_y [m/s], γ [rad/s].
         half_stance : float
             T_s / 2 [s].
 
@@ -116,7 +115,7 @@ class FootPlacement:
         """
         over = self.over_feet(measured)
         capture = p.placement_gain * (self._leg_length / GRAVITY) ** 0.5
-        down = half_stance * over + capture * (over - self.over_feet(reference))
+        down = half_stance * over + capture * (over - self.over_feet(planned))
         down = self.within_reach(down, p.reach)
         across = self.footholds_in_base[:, 1]
         down[:, 1] = self._side * np.maximum(self._side * (across + down[:, 1]), 0.0) - across
@@ -152,7 +151,8 @@ class FootPlacement:
         """Velocity that standing feet add to their paths so as to go along with the ground.
 
         Without it the joint drive would hold the body to its planned velocity, with a force that
-        knows nothing of balance and slips or topples it.
+        knows nothing of balance and slips or topples it. They do not go along with a turn: what
+        holds the heading does not topple.
 
         Parameters
         ----------
@@ -168,4 +168,4 @@ class FootPlacement:
         ndarray (4, 2)
             [m/s]
         """
-        return -p.yielding * activity[:, None] * self.over_feet(measured - planned)
+        return -p.yielding * activity[:, None] * (measured - planned)[:2]

@@ -29,6 +29,10 @@ GRAVITY = 9.81
 """Standard gravity used to scale speeds and to carry the body [m/s^2]."""
 
 
+LATERAL_WEIGHT = 2.0
+"""Weight of speed across the body in the speed by which a gait chooses its cadence."""
+
+
 @dataclass(frozen=True)
 class BodyScale:
     """Lengths by which a robot's speeds are made dimensionless.
@@ -46,8 +50,16 @@ class BodyScale:
     hip_radius: float
 
     def foot_speed(self, v_x: float, v_y: float, gamma: float) -> float:
-        """Bound on the speed of any stance foot relative to the base [m/s]."""
-        return float((v_x * v_x + v_y * v_y) ** 0.5 + abs(gamma) * self.hip_radius)
+        """Speed by which a gait chooses its cadence: a bound on that of any stance foot [m/s].
+
+        Speed sideways and from turning counts ``LATERAL_WEIGHT`` times: across the body the feet
+        have about half the room, so that the steps must be shorter.
+        """
+        across = LATERAL_WEIGHT * v_y
+        return float(
+            (v_x * v_x + across * across) ** 0.5
+            + LATERAL_WEIGHT * abs(gamma) * self.hip_radius
+        )
 
 
 @dataclass(frozen=True)

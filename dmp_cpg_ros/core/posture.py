@@ -164,14 +164,15 @@ class PostureController:
             p, leg_length, moving, state.base_quaternion, velocity, r, dt)
         correction = keeping.acting(p, leg_length, moving)
         measured = np.array((velocity[0], velocity[1], rate[2]))
-        shift = self.placement.shift(p, measured, r, r + correction, np.pi * duty / omega)
+        planned = r + correction
+        shift = self.placement.shift(p, measured, planned, np.pi * duty / omega)
         shift = shift + p.slope_lean * lean(upward, self.model.height)
         raised = self.placement.raised(p, shift, R_ground_base)
         body = BodyMotion(R_ground_base, upward, velocity, rate, 0.0)
         return replace(memory, activity=activity, keeping=keeping), PostureFeedback(
-            self._torque(state, body, load, r),
+            self._torque(state, body, load, planned),
             np.column_stack([shift, raised]),
-            self.placement.drift(p, measured, r + correction, activity),
+            self.placement.drift(p, measured, planned, activity),
             correction,
             measured=state.joint_position,
         )

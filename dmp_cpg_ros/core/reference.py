@@ -4,6 +4,9 @@
 Section 5).
 
 v̇ = α_r (v_ext − v),   γ̇ = α_r (γ_ext − γ)
+
+While |v| grows, |v̇| is limited: no foot can push the body harder. It is not limited while |v|
+falls, so that stops are those of the plain filter.
 """
 
 from __future__ import annotations
@@ -27,13 +30,20 @@ class ReferenceParameters(Parameters):
         3.0, 'rate of the reference filters', unit='1/s', minimum=0.05, maximum=50.0
     )
     max_speed: float = parameter(
-        1.0, 'largest forward speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
+        3.5, 'largest forward speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
     )
     max_lateral_speed: float = parameter(
-        0.4, 'largest sideways speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
+        0.6, 'largest sideways speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
     )
     max_turn_rate: float = parameter(
-        1.2, 'largest turn rate that is accepted', unit='rad/s', minimum=0.0, maximum=10.0
+        2.2, 'largest turn rate that is accepted', unit='rad/s', minimum=0.0, maximum=10.0
+    )
+    max_acceleration: float = parameter(
+        4.0,
+        'largest acceleration of the reference while it speeds up',
+        unit='m/s^2',
+        minimum=0.1,
+        maximum=1e3,
     )
     cmd_vel_timeout: float = parameter(
         0.5,
@@ -108,7 +118,7 @@ class ReferenceSystem:
         self.parameters = parameters
 
     def step(self, r: Array, r_ext: Array, dt: float) -> Array:
-        """Advance: r(t + dt) = r_ext + (r − r_ext) exp(−α_r dt).
+        """Advance: r(t + dt) = r_ext + (r − r_ext) exp(−α_r dt), less where v grows too fast.
 
         Parameters
         ----------
@@ -123,7 +133,11 @@ class ReferenceSystem:
         -------
         ndarray (3,)
         """
-        return r_ext + (r - r_ext) * np.exp(-self.parameters.alpha_r * dt)
+        following = r_ext + (r - r_ext) * np.exp(-self.parameters.alpha_r * dt)
+        change, most = following[:2] - r[:2], self.parameters.max_acceleration * dt
+        if change @ change > most * most and following[:2] @ following[:2] > r[:2] @ r[:2]:
+            following[:2] = r[:2] + change * (most / float(np.sqrt(change @ change)))
+        return following
 
 
 def _limited(value: float, limit: float) -> float:
