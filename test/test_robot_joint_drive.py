@@ -45,6 +45,28 @@ def test_small_errors_give_the_pd_law(position, velocity):
                                0.02 * kp - 0.5 * kd + 0.7, atol=1e-9)
 
 
+@given(velocity=arrays(float, 12, elements=st.floats(-1, 1)))
+def test_friction_is_made_up_for_at_the_target_velocity_and_never_at_the_measured_one(velocity):
+    damping = np.linspace(0.1, 1.0, 12)
+    with_it, without = JointDrive(DESCRIPTION, STEPS, STEP_S, damping), drive()
+    told = JointTargets(ZERO, velocity, ZERO)
+    with_it.accept(told)
+    without.accept(told)
+    more = with_it.torque(0, ZERO, velocity) - without.torque(0, ZERO, velocity)
+    np.testing.assert_allclose(more, damping * velocity, atol=1e-9)
+    with_it.accept(JointTargets(ZERO, ZERO, ZERO))
+    without.accept(JointTargets(ZERO, ZERO, ZERO))
+    np.testing.assert_array_equal(with_it.torque(0, ZERO, velocity),
+                                  without.torque(0, ZERO, velocity))
+
+
+def test_a_drive_without_gains_passes_torques_on_as_they_come():
+    torques_only = JointDrive(replace(DESCRIPTION, kp=np.zeros(3), kd=np.zeros(3)), STEPS, STEP_S,
+                              np.ones(12))
+    torques_only.accept(targets(0.3, 2.0, 1.5))
+    np.testing.assert_array_equal(torques_only.torque(0, ZERO, ZERO), np.full(12, 1.5))
+
+
 @given(torque=torques, velocity=speeds)
 def test_torque_never_exceeds_its_limit_and_never_drives_beyond_the_speed_limit(torque, velocity):
     limited = drive().limited(torque, velocity)

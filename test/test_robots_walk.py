@@ -52,8 +52,8 @@ def test_it_walks_takes_a_push_stops_and_walks_on(robot):
     walk.go(0.3)
     walk.loop.request(False)
     walk.loop.command(speed)
-    walk.go(1.5)
-    assert walk.go(1.0) == pytest.approx(speed, rel=0.06)
+    walk.go(3.0)
+    assert walk.go(1.0) == pytest.approx(speed, rel=0.08)
     force = 0.5 * robot.description.mass / PUSH_DURATION
     robot.apply_push(np.array((0.0, force, 0.0)), round(PUSH_DURATION * 1e9))
     walk.go(0.8)
@@ -63,8 +63,8 @@ def test_it_walks_takes_a_push_stops_and_walks_on(robot):
     assert np.abs(walk.state.base_velocity_in_base).max() < 0.01
     assert (walk.state.foot_force > 0.05 * robot.description.mass * 9.81).all()
     walk.loop.request(False)
-    walk.go(1.2)
-    assert walk.go(0.6) == pytest.approx(speed, rel=0.1)
+    walk.go(1.5)
+    assert walk.go(0.6) == pytest.approx(speed, rel=0.25)
 
 
 def test_its_feet_touch_where_the_description_says_when_it_stands(robot):

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_description import RobotDescription
@@ -18,7 +18,7 @@ ROLL_OFF_FROM = 0.7
 
 
 class JointDrive:
-    """τ = kp (q_d − q) + kd (q̇_d − q̇) + τ_ff for twelve joints, within torque and speed limits.
+    """τ = kp (q_d − q) + kd (q̇_d − q̇) + b q̇_d + τ_ff of twelve joints, within their limits.
 
     Between two arrivals of targets q_d moves on with q̇_d, for one tick at most; then it stands
     still. A joint whose targets are the same numbers as before has received nothing new.
@@ -31,15 +31,21 @@ class JointDrive:
         Physics steps per control tick.
     step_s : float
         Physics step [s].
+    damping : array_like (12,), optional
+        Viscous friction of the joints [N m s/rad], which the drive makes up for at the target
+        velocity (the measured one would feed on itself). Without gains it makes up for nothing:
+        then torques go to the joints as they come.
     """
 
-    def __init__(self, description: RobotDescription, steps: int, step_s: float) -> None:
+    def __init__(self, description: RobotDescription, steps: int, step_s: float,
+                 damping: ArrayLike = 0.0) -> None:
         self._kp = np.tile(description.kp, 4)
         self._kd = np.tile(description.kd, 4)
         self._limit = np.concatenate([leg.torque_limit for leg in description.legs])
         speed = np.concatenate([leg.velocity_limit for leg in description.legs])
         self._slope = self._limit / (speed * (1.0 - ROLL_OFF_FROM))  # [N m s/rad]
         self._stall = self._limit / (1.0 - ROLL_OFF_FROM)  # the falling line at zero speed
+        self._forward = self._kd + (self._kp > 0.0) * np.asarray(damping, dtype=float)
         self._steps, self._step_s = steps, step_s
         self.reset()
 
@@ -70,7 +76,7 @@ class JointDrive:
         age = self._age + np.arange(self._steps)[:, None]  # (steps, 12)
         moving = velocity * (age < self._steps)
         reference = position + velocity * (np.minimum(age, self._steps) * self._step_s)
-        self._command = self._kp * reference + self._kd * moving + effort
+        self._command = self._kp * reference + self._forward * moving + effort
 
     def torque(self, step: int, position: Vector, velocity: Vector) -> Vector:
         """Return the joint torques of one physics step.

@@ -94,7 +94,9 @@ class MujocoRobot:
         self._base_qpos = int(model.jnt_qposadr[self._ids.free_joint])
         self._base_dof = int(model.jnt_dofadr[self._ids.free_joint])
         self._actuators = JointActuators(model, self._ids.joints)
-        self._drive = JointDrive(self.description, self._steps, model.opt.timestep)
+        self._drive = JointDrive(
+            self.description, self._steps, model.opt.timestep,
+            model.dof_damping[self._dof])
         self._contacts = ContactReader(model, self._ids)
         self._home = home_joint_position(self.description)
         self._hips_in_base = np.array([leg.hip_in_base for leg in self.description.legs])
