@@ -44,11 +44,11 @@ def test_the_gait_is_set_through_the_nodes_own_service(processes: Processes, ros
     elsewhere = set_parameter(ros, FOLLOWER, 'gait', 'walk')
     assert not elsewhere.successful and f'param set /{OWNER} gait walk' in elsewhere.reason
 
-    assert set_parameter(ros, FOLLOWER, 'inhibition_gain', 250.0).successful
-    ros.spin_until(lambda: get_parameter(ros, OWNER, 'inhibition_gain') == 250.0)
+    assert set_parameter(ros, FOLLOWER, 'inhibition_gain', 280.0).successful
+    ros.spin_until(lambda: get_parameter(ros, OWNER, 'inhibition_gain') == 280.0)
     refused = set_parameter(ros, OWNER, 'gait', 'pronk')
     assert not refused.successful
-    assert 'capture: ' in refused.reason and 'is not < k_inh = 250 1/s' in refused.reason
+    assert 'capture: ' in refused.reason and 'is not < k_inh = 280 1/s' in refused.reason
     assert get_parameter(ros, OWNER, 'gait') == 'trot'
 
     assert set_parameter(ros, FOLLOWER, 'inhibition_gain', 400.0).successful

@@ -10,6 +10,9 @@ from core_examples import GAITS, TICK, network
 
 from dmp_cpg_ros.core.certificate_network import EXPECTED_MISMATCH
 from dmp_cpg_ros.core.gait_network import GaitNetwork
+from dmp_cpg_ros.core.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.phase import state_at
 from dmp_cpg_ros.core.phase_lock_watch import DISTURBED, LOCKED, LOST, PhaseLock, PhaseLockWatch
@@ -120,16 +123,19 @@ def test_places_that_move_are_followed_without_an_alarm() -> None:
 
 
 def test_changed_couplings_are_watched_with_their_own_rate() -> None:
-    changing = RunningNetwork(network().parameters, GAITS['amble'], network().scale)
+    start = network()
+    networks = GaitNetworks(
+        start.parameters, start.scale, GaitChangeParameters(), GaitReader(GAITS))
+    changing = RunningNetwork(networks, GAITS['amble'])
     watcher = PhaseLockWatch()
     x, bounds = changing.network.locked_state(), []
     for gain in (100.0, 25.0):
         changing.change(type(network().parameters)(coupling_gain=gain))
         lock = None
         for _ in range(200):
-            running = changing.advance(TICK)
-            x = running.step(x, R, FREE, TICK)
-            lock = watcher.step(lock, running, R, x, True, TICK)
+            x = changing.begin_tick(x, R, FREE, TICK)
+            x = changing.advance(x, R, FREE, TICK)
+            lock = watcher.step(lock, changing.network, R, x, True, TICK)
         assert lock is not None
         bounds.append(lock.bound)
     assert bounds[1] > 3.0 * bounds[0]
