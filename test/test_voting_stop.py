@@ -193,7 +193,7 @@ def test_votes_are_certified_in_every_gait_of_a_change() -> None:
         return [entry.name for entry in found.failing]
 
     assert failing() == []
-    fits_amble = {'vote_limit': 0.12}
+    fits_amble = {'vote_limit': 0.13}
     assert certificate(voters(**fits_amble), 'amble').holds
     assert 'votes_suffice' in failing(**fits_amble)
 
@@ -206,7 +206,7 @@ def test_weak_couplings_are_certified_with_several_inhibited_legs() -> None:
 @pytest.mark.parametrize(('name', 'changes'), [
     ('votes_suffice', {'vote_limit': 0.08}),
     ('votes_contraction', {'vote_limit': 1e-3}),
-    ('votes_needed', {'vote_limit': 0.16}),
+    ('votes_needed', {'vote_limit': 0.18}),
     ('votes_needed', {'vote_majority': 4, 'vote_limit': 0.12}),
     ('votes_time_to_rest', {'vote_limit': 0.08}),
 ])
