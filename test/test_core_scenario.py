@@ -9,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from dmp_cpg_ros.commands.walk import load_scenario
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.scenario import COMMAND_PERIOD_NS, Scenario, play
 from dmp_cpg_ros.core.scenario_events import EVENT_KINDS
@@ -57,6 +56,9 @@ def test_play_gives_each_kind_to_its_taker_before_the_tick() -> None:
 
 @pytest.mark.parametrize('file', sorted(SCENARIOS.glob('*.yaml')), ids=lambda path: path.stem)
 def test_the_scenarios_of_the_package_can_be_played(file: Path) -> None:
+    pytest.importorskip('rosbags')
+    from dmp_cpg_ros.commands.walk import load_scenario
+
     played = load_scenario(file)
     assert played.name == file.stem and played.timeline(TICK_NS) is not None
     assert {event.value for event in played.events if event.kind == 'gait'} <= set(load_gaits())
