@@ -50,11 +50,11 @@ def test_readings_of_one_stamp_belong_together() -> None:
 def test_an_old_or_absent_reading_is_missing(old: Any) -> None:
     readings = sensor_readings(
         8, {'joint_states': JOINTS, 'imu': old, 'foot_contacts': (8, FORCE)})
-    assert not readings.imu_is_usable and readings.usable_contacts.all()
+    assert not readings.imu_is_usable and all(readings.usable_contacts)
     force = None if old is None else (4, FORCE)
     readings = sensor_readings(
         8, {'joint_states': JOINTS, 'imu': (8, IMU), 'foot_contacts': force})
-    assert readings.imu_is_usable and not readings.usable_contacts.any()
+    assert readings.imu_is_usable and not any(readings.usable_contacts)
 
 
 @pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf, 1e300])
@@ -67,7 +67,7 @@ def test_numbers_that_are_not_finite_reach_the_estimators_judgement(bad: float) 
     readings = sensor_readings(0, {'joint_states': JOINTS, 'imu': (0, read_imu(writer.imu)),
                                    'foot_contacts': (0, contacts)})
     assert not readings.imu_is_usable
-    assert readings.usable_contacts.tolist() == [True, True, False, True]
+    assert readings.usable_contacts == (True, True, False, True)
 
 
 def test_the_estimate_passes_bit_for_bit() -> None:

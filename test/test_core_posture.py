@@ -111,7 +111,7 @@ def test_errors_are_answered_by_the_opposite_wrench(
 def test_on_a_slope_parallel_to_it_the_feet_carry_the_weight(slope: tuple[float, float]) -> None:
     """The forces are vertical (their sum along the slope too), and nothing turns the body."""
     of, x = controller(), network().locked_state()
-    normal = normal_in_world(np.array(slope))
+    normal = np.array(normal_in_world(slope))
     axis = np.cross((0.0, 0.0, 1.0), normal)
     turn = axis / np.linalg.norm(axis) * np.arccos(normal[2])
     state = standing_state(ROBOT, base_quaternion=turned(np.array([0.0, 0.0, 0.0, 1.0]), turn),

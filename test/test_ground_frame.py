@@ -17,7 +17,7 @@ LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def state_on(slope: tuple[float, float] | None, turn: tuple[float, float, float]) -> RobotState:
-    normal = None if slope is None else normal_in_world(np.array(slope))
+    normal = None if slope is None else np.array(normal_in_world(slope))
     return standing_state(quadruped(), base_quaternion=turned(LEVEL, np.array(turn)),
                           ground_normal_in_world=normal)
 
@@ -44,7 +44,7 @@ def test_on_a_slope_its_z_axis_is_the_normal(slope: tuple[float, float],
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(R) == pytest.approx(1.0)
     # The frame falls short of the slope by (SLIGHT / slope)² of it.
-    np.testing.assert_allclose(R_world_base @ R[2], normal_in_world(np.array(slope)),
+    np.testing.assert_allclose(R_world_base @ R[2], normal_in_world(slope),
                                atol=1.1 * SLIGHT**2 / np.hypot(*slope))
     np.testing.assert_allclose(R_world_base @ R.T @ upward, (0.0, 0.0, 1.0), atol=1e-12)
     assert R[0, 0] > 0.9 and abs(R[0, 1]) < 0.1  # the heading is the base's

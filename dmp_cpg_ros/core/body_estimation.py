@@ -16,7 +16,7 @@ judged by its joint torques, and without IMU the standing feet tell how the body
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,13 +32,22 @@ from dmp_cpg_ros.core.leg_odometry import (
 )
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.rotations import levelled, rotation_matrix
+from dmp_cpg_ros.core.rotations import levelled
 from dmp_cpg_ros.core.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.terrain_plane import (
     TerrainState,
     initial_terrain,
     normal_in_world,
     terrain_step,
+)
+from dmp_cpg_ros.core.triples import (
+    Triple,
+    dot,
+    rotation,
+    times,
+    transposed_times,
+    triple,
+    upward,
 )
 from dmp_cpg_ros.core.velocity_filter import FilterNoise, FilterState, predict, settle, update
 
@@ -116,6 +125,22 @@ class BodyEstimator:
         self.odometry = LegOdometry(description)
         self._weight = description.mass * GRAVITY
 
+    @property
+    def parameters(self) -> EstimationParameters:
+        """Noise and thresholds; may be set while the estimator runs."""
+        return self._parameters
+
+    @parameters.setter
+    def parameters(self, parameters: EstimationParameters) -> None:
+        self._parameters = p = parameters
+        self._seeing_noise, self._blind_noise = (
+            FilterNoise(
+                gyro, accelerometer, p.gyro_bias_walk, p.accelerometer_bias_walk, p.foot_noise,
+                p.foot_freedom,
+            )
+            for gyro, accelerometer in ((p.gyro_noise, p.accelerometer_noise), BLIND_NOISE)
+        )
+
     def step(
         self, memory: EstimatorState | None, readings: SensorReadings
     ) -> tuple[EstimatorState, BodyEstimate]:
@@ -142,32 +167,28 @@ class BodyEstimator:
             readings.imu_is_usable,
         )
         blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
-        noise = self._noise(blind)
+        noise = self._blind_noise if blind else self._seeing_noise
         if seeing:
             rate, force = readings.rate_in_base, readings.specific_force_in_base
         else:
             rate, force = self._guessed(memory, readings, legs, blind)
-        predicted = predict(memory.filter, 0.5 * (memory.rate + rate), force, dt, noise)
-        motion, normal = self._motion(memory.terrain, predicted, readings, legs)
-        trust = self._trust(readings, contacts, motion, normal)
-        trust = np.minimum(trust, memory.estimate.trust + dt / self.parameters.contact_settling)
-        trust[~legs] = 0.0
-        state, stands = predicted, trust > 0.0
-        if stands.any():
-            state, _ = update(
-                predicted,
-                rate,
-                motion.contact_in_base[stands],
-                motion.velocity_in_base[stands],
-                trust[stands],
-                noise,
-            )
-        rests = seeing and bool(stands.all()) and _is_still(readings, state)
+        state = predict(memory.filter, 0.5 * (memory.rate + rate), force, dt, noise)
+        motion, normal = self._motion(memory.terrain, state, readings, legs)
+        more = dt / self.parameters.contact_settling
+        trust = [
+            min(now, before + more)
+            for now, before in zip(
+                self._trust(readings, legs, contacts, motion, normal),
+                memory.estimate.trust.tolist(), strict=True)
+        ]
+        state, _ = update(
+            state, rate, motion.contact_in_base, motion.velocity_in_base, trust, noise)
+        rests = seeing and min(trust) > 0.0 and _is_still(readings, state)
         still = memory.still + dt if rests else 0.0
         if still > STILL_TIME:
             state = settle(state, rate, STILL_DEVIATION)
         problems = _problems(legs, contacts, seeing)
-        if not np.isfinite(state.covariance.sum() + state.velocity_in_base.sum()):
+        if not isfinite(float(state.covariance.sum() + state.velocity_in_base.sum())):
             problems = (*problems, 'filter')
             state = memory.filter
         terrain, estimate = self._finished(
@@ -178,32 +199,32 @@ class BodyEstimator:
     def _begin(self, readings: SensorReadings) -> tuple[EstimatorState, BodyEstimate]:
         """Start at rest: the accelerometer tells the vertical, the feet the ground."""
         seeing = readings.imu_is_usable
-        upward = readings.specific_force_in_base if seeing else np.array((0.0, 0.0, 1.0))
+        up = readings.specific_force_in_base if seeing else np.array((0.0, 0.0, 1.0))
         zero = np.zeros(3)
         covariance = np.diag(np.repeat(np.square(INITIAL_DEVIATION), 3))
-        state = FilterState(levelled(upward), zero, zero, zero, covariance)
+        state = FilterState(levelled(up), zero, zero, zero, covariance)
         legs, contacts = readings.usable_legs, readings.usable_contacts
-        R = rotation_matrix(state.quaternion)
-        flat = TerrainState(np.zeros((4, 3)), np.zeros(2))
+        R = rotation(state.quaternion.tolist())
+        flat = TerrainState(((0.0, 0.0, 0.0),) * len(LEGS), (0.0, 0.0))
         motion, normal = self._motion(flat, state, readings, legs)
-        trust = np.where(legs, self._trust(readings, contacts, motion, normal), 0.0)
-        contact = motion.contact_in_base @ R.T
-        height = -float(contact[legs, 2].mean()) if legs.any() else 0.0
-        place = np.array((0.0, 0.0, height))
-        contact = np.where(legs[:, None], contact + place, 0.0)
+        trust = self._trust(readings, legs, contacts, motion, normal)
+        contact = [times(R, place) for place in motion.contact_in_base]
+        depths = [z for (_, _, z), usable in zip(contact, legs, strict=True) if usable]
+        height = -sum(depths) / len(depths) if depths else 0.0
         estimate = BodyEstimate(
             readings.time_ns,
-            place,
+            np.array((0.0, 0.0, height)),
             state.quaternion,
             zero,
             readings.rate_in_base if seeing else zero,
             height,
-            normal_in_world(flat.slope),
-            trust,
+            np.array(normal_in_world(flat.slope)),
+            np.array(trust),
             covariance.diagonal()[3:6],
             _problems(legs, contacts, seeing),
         )
-        terrain = initial_terrain(contact) if legs.all() else flat
+        terrain = (
+            initial_terrain([(x, y, z + height) for x, y, z in contact]) if all(legs) else flat)
         rate = estimate.rate_in_base
         return EstimatorState(state, terrain, estimate, rate, 0.0, 0.0), estimate
 
@@ -211,63 +232,57 @@ class BodyEstimator:
         self,
         memory: EstimatorState,
         readings: SensorReadings,
-        legs: NDArray[np.bool_],
+        legs: tuple[bool, ...],
         blind: float,
     ) -> tuple[Array, Array]:
         """Guess what a silent IMU would read: the feet tell the turn rate, nothing accelerates."""
         state, trust = memory.filter, np.where(legs, memory.estimate.trust, 0.0)
-        upward = rotation_matrix(state.quaternion)[2]
+        up = np.array(upward(state.quaternion.tolist()))
         rate = memory.rate if blind <= BLIND else state.gyro_bias
         if trust.any():
             motion, _ = self._motion(memory.terrain, state, readings, legs)
             rate = state.gyro_bias + turn_rate_of_feet(
-                motion.contact_in_base, motion.velocity_in_base, trust
+                np.array(motion.contact_in_base), np.array(motion.velocity_in_base), trust
             )
-        return rate, GRAVITY * upward + state.accelerometer_bias
+        return rate, GRAVITY * up + state.accelerometer_bias
 
     def _motion(
         self,
         terrain: TerrainState,
         state: FilterState,
         readings: SensorReadings,
-        legs: NDArray[np.bool_],
-    ) -> tuple[FootMotion, Array]:
+        legs: tuple[bool, ...],
+    ) -> tuple[FootMotion, Triple]:
         """Motion of the feet, and the normal of the ground in the base."""
-        normal = normal_in_world(terrain.slope) @ rotation_matrix(state.quaternion)
+        R = rotation(state.quaternion.tolist())
+        normal = transposed_times(R, normal_in_world(terrain.slope))
         q, q_dot = readings.joint_position, readings.joint_velocity
-        if not legs.all():  # a placeholder for legs that are left out later
+        if not all(legs):  # a placeholder for legs that are left out later
             q, q_dot = (np.where(np.repeat(legs, 3), values, 0.0) for values in (q, q_dot))
-        return self.odometry.motion(q, q_dot, normal), normal
+        return self.odometry.motion(q.tolist(), q_dot.tolist(), normal), normal
 
     def _trust(
         self,
         readings: SensorReadings,
-        contacts: NDArray[np.bool_],
+        legs: tuple[bool, ...],
+        contacts: tuple[bool, ...],
         motion: FootMotion,
-        normal: Array,
-    ) -> Array:
-        """Trust in each foot from its force alone, (4,) in [0, 1]."""
-        force = readings.foot_force
-        if not contacts.all():
-            force = force.copy()
-            for i in np.flatnonzero(~contacts):
+        normal: Triple,
+    ) -> list[float]:
+        """Trust in each foot from its force alone, in [0, 1]; 0 for legs without joints."""
+        force = readings.foot_force.tolist()
+        if not all(contacts):
+            for i in np.flatnonzero(np.logical_not(contacts)).tolist():
                 torque = readings.joint_effort[3 * i : 3 * i + 3]
-                felt = force_from_torque(motion.jacobian_in_base[i], torque, normal)
-                force[i] = felt if np.isfinite(felt) else 0.0
+                felt = force_from_torque(
+                    np.array(motion.jacobian_in_base[i]), torque, np.array(normal))
+                force[i] = felt if isfinite(felt) else 0.0
         full = self.parameters.contact_share * self._weight
-        return np.clip((force / full - UNTRUSTED_SHARE) / (1.0 - UNTRUSTED_SHARE), 0.0, 1.0)
-
-    def _noise(self, blind: float) -> FilterNoise:
-        p = self.parameters
-        gyro, accelerometer = BLIND_NOISE if blind else (p.gyro_noise, p.accelerometer_noise)
-        return FilterNoise(
-            gyro,
-            accelerometer,
-            p.gyro_bias_walk,
-            p.accelerometer_bias_walk,
-            p.foot_noise,
-            p.foot_freedom,
-        )
+        return [
+            min(max((felt / full - UNTRUSTED_SHARE) / (1.0 - UNTRUSTED_SHARE), 0.0), 1.0)
+            if usable else 0.0
+            for felt, usable in zip(force, legs, strict=True)
+        ]
 
     def _finished(
         self,
@@ -276,34 +291,39 @@ class BodyEstimator:
         time_ns: int,
         rate: Array,
         motion: FootMotion,
-        trust: Array,
+        trust: list[float],
         problems: tuple[str, ...],
     ) -> tuple[TerrainState, BodyEstimate]:
         """Integrate the position, follow the ground, and put the estimate together."""
         last = memory.estimate
         dt = (time_ns - last.time_ns) * 1e-9
-        R, R_before = rotation_matrix(state.quaternion), rotation_matrix(last.quaternion)
-        velocity = 0.5 * (R @ state.velocity_in_base + R_before @ last.velocity_in_base)
-        position = last.position_in_world + velocity * dt
-        contact = motion.contact_in_base @ R.T
+        R, R_before = rotation(state.quaternion.tolist()), rotation(last.quaternion.tolist())
+        v_x, v_y, v_z = times(R, triple(state.velocity_in_base.tolist()))
+        u_x, u_y, u_z = times(R_before, triple(last.velocity_in_base.tolist()))
+        velocity = (0.5 * (v_x + u_x), 0.5 * (v_y + u_y), 0.5 * (v_z + u_z))
+        x, y, z = last.position_in_world.tolist()
+        x, y, z = x + velocity[0] * dt, y + velocity[1] * dt, z + velocity[2] * dt
+        contact = [times(R, place) for place in motion.contact_in_base]
         terrain = terrain_step(
-            memory.terrain, contact + position, trust, dt, self.parameters.terrain_time
+            memory.terrain, [(x + a, y + b, z + c) for a, b, c in contact], trust, dt,
+            self.parameters.terrain_time,
         )
         normal = normal_in_world(terrain.slope)
-        height, weight = last.height + float(normal @ velocity) * dt, float(trust.sum())
+        height, weight = last.height + dot(normal, velocity) * dt, sum(trust)
         if weight > 0.0:
-            measured = -float(trust @ (contact @ normal)) / weight
+            depths = zip(trust, contact, strict=True)
+            measured = -sum(share * dot(place, normal) for share, place in depths) / weight
             share = 1.0 - exp(-HEIGHT_RATE * min(weight, 1.0) * dt)
             height += share * (measured - height)
         estimate = BodyEstimate(
             time_ns,
-            position,
+            np.array((x, y, z)),
             state.quaternion,
             state.velocity_in_base,
             rate - state.gyro_bias,
             height,
-            normal,
-            trust,
+            np.array(normal),
+            np.array(trust),
             state.covariance.diagonal()[3:6],
             problems,
         )
@@ -312,17 +332,18 @@ class BodyEstimator:
 
 def _is_still(readings: SensorReadings, state: FilterState) -> bool:
     """Whether neither joints nor body move."""
-    turn = readings.rate_in_base - state.gyro_bias
-    return bool(
-        np.abs(readings.joint_velocity).max() < STILL_JOINT and turn @ turn < STILL_TURN**2
+    x, y, z = (readings.rate_in_base - state.gyro_bias).tolist()
+    return (
+        x * x + y * y + z * z < STILL_TURN**2
+        and float(np.abs(readings.joint_velocity).max()) < STILL_JOINT
     )
 
 
 def _problems(
-    legs: NDArray[np.bool_], contacts: NDArray[np.bool_], seeing: bool
+    legs: tuple[bool, ...], contacts: tuple[bool, ...], seeing: bool
 ) -> tuple[str, ...]:
     """Names of the sensors that could not be used."""
-    if seeing and legs.all() and contacts.all():
+    if seeing and all(legs) and all(contacts):
         return ()
     return (
         *(() if seeing else ('imu',)),

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.robot_description import LegGeometry
+from dmp_cpg_ros.core.triples import Matrix, Triple, triple
 
 Array = NDArray[np.float64]
 
@@ -33,11 +34,11 @@ class LegKinematics:
     def __init__(self, geometry: LegGeometry) -> None:
         """Reduce the geometry to a planar two-link chain that is swung about x."""
         self.geometry = geometry
-        self._hip = tuple(float(value) for value in geometry.hip_in_base)
-        self._o = tuple(float(value) for value in geometry.hip_offset)
-        self._t = tuple(float(value) for value in geometry.thigh)
-        self._c = tuple(float(value) for value in geometry.shank)
-        self._s = tuple(float(value) for value in geometry.axis_sign)
+        self._hip, self._o, self._t, self._c, self._s = (
+            triple([float(value) for value in vector])
+            for vector in (geometry.hip_in_base, geometry.hip_offset, geometry.thigh,
+                           geometry.shank, geometry.axis_sign)
+        )
         self._lateral = self._o[1] + self._t[1] + self._c[1]
         self.thigh_length = hypot(self._t[0], self._t[2])
         self.shank_length = hypot(self._c[0], self._c[2])
@@ -83,14 +84,13 @@ class LegKinematics:
 
     def foot_and_jacobian(
         self, q: Array | Sequence[float]
-    ) -> tuple[tuple[float, ...], tuple[tuple[float, ...], ...]]:
+    ) -> tuple[Triple, Matrix]:
         """:meth:`foot_in_base` and :meth:`jacobian_in_base` for the price of one, as tuples."""
         chain = self._chain(q)
-        x, y, z, *_ = chain
-        foot = (self._hip[0] + x, self._hip[1] + y, self._hip[2] + z)
-        return foot, self._jacobian(chain)
+        hip_x, hip_y, hip_z = self._hip
+        return (hip_x + chain[0], hip_y + chain[1], hip_z + chain[2]), self._jacobian(chain)
 
-    def _jacobian(self, chain: tuple[float, ...]) -> tuple[tuple[float, ...], ...]:
+    def _jacobian(self, chain: tuple[float, ...]) -> Matrix:
         _, y, z, reach_x, reach_z, shank_x, shank_z, s0, c0 = chain
         sign_0, sign_1, sign_2 = self._s
         return (
@@ -133,18 +133,19 @@ class LegKinematics:
 
     def _chain(self, q: Array | Sequence[float]) -> tuple[float, ...]:
         q0, q1, q2 = q.tolist() if isinstance(q, np.ndarray) else q
-        s0, c0 = sin(self._s[0] * q0), cos(self._s[0] * q0)
-        angle_1 = self._s[1] * q1
+        sign_0, sign_1, sign_2 = self._s
+        t_x, _, t_z = self._t
+        c_x, _, c_z = self._c
+        s0, c0 = sin(sign_0 * q0), cos(sign_0 * q0)
+        angle_1 = sign_1 * q1
         s1, c1 = sin(angle_1), cos(angle_1)
-        angle_2 = angle_1 + self._s[2] * q2
+        angle_2 = angle_1 + sign_2 * q2
         s2, c2 = sin(angle_2), cos(angle_2)
-        shank_x = c2 * self._c[0] + s2 * self._c[2]
-        shank_z = c2 * self._c[2] - s2 * self._c[0]
-        reach_x = c1 * self._t[0] + s1 * self._t[2] + shank_x
-        reach_z = c1 * self._t[2] - s1 * self._t[0] + shank_z
-        plane_x, plane_y, plane_z = self._o[0] + reach_x, self._lateral, self._o[2] + reach_z
+        shank_x, shank_z = c2 * c_x + s2 * c_z, c2 * c_z - s2 * c_x
+        reach_x, reach_z = c1 * t_x + s1 * t_z + shank_x, c1 * t_z - s1 * t_x + shank_z
+        plane_y, plane_z = self._lateral, self._o[2] + reach_z
         return (
-            plane_x,
+            self._o[0] + reach_x,
             c0 * plane_y - s0 * plane_z,
             s0 * plane_y + c0 * plane_z,
             reach_x,

@@ -13,6 +13,7 @@ joints alone. Without the rolling term the velocity of Mini Cheetah's legs would
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, sin
 
@@ -21,27 +22,28 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.triples import Matrix, Triple, cross, times, triple
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class FootMotion:
-    """Where the feet touch the ground, and the velocities that they measure.
+    """Where the feet touch the ground, and the velocities that they measure; a tuple per leg.
 
     Attributes
     ----------
-    contact_in_base : ndarray (4, 3)
+    contact_in_base : tuple of (float, float, float)
         Contact points r = p − ρ n [m].
-    velocity_in_base : ndarray (4, 3)
+    velocity_in_base : tuple of (float, float, float)
         s × ρ n − J q̇ [m/s]: v + ω × r of a body whose foot does not slide.
-    jacobian_in_base : ndarray (4, 3, 3)
+    jacobian_in_base : tuple of matrices
         Of the feet's centres [m/rad].
     """
 
-    contact_in_base: Array
-    velocity_in_base: Array
-    jacobian_in_base: Array
+    contact_in_base: tuple[Triple, ...]
+    velocity_in_base: tuple[Triple, ...]
+    jacobian_in_base: tuple[Matrix, ...]
 
 
 class LegOdometry:
@@ -56,54 +58,51 @@ class LegOdometry:
     def __init__(self, description: RobotDescription) -> None:
         """Build the legs."""
         self.kinematics = [LegKinematics(leg) for leg in description.legs]
-        self._signs = [tuple(leg.axis_sign.tolist()) for leg in description.legs]
-        self._radius = np.array([[leg.foot_radius] for leg in description.legs])
+        self._signs = [triple(leg.axis_sign.tolist()) for leg in description.legs]
+        self._radius = [leg.foot_radius for leg in description.legs]
 
-    def motion(self, q: Array, q_dot: Array, normal_in_base: Array) -> FootMotion:
+    def motion(
+        self, q: Sequence[float], q_dot: Sequence[float], normal_in_base: Triple
+    ) -> FootMotion:
         """Contact points and measured velocities of all feet.
 
         Parameters
         ----------
-        q, q_dot : ndarray (12,)
+        q, q_dot : sequence of 12 floats
             Joint angles [rad] and velocities [rad/s].
-        normal_in_base : ndarray (3,)
+        normal_in_base : tuple of float
             Normal n of the ground, upwards.
 
         Returns
         -------
         FootMotion
         """
-        angles, rates = q.reshape(4, 3).tolist(), q_dot.reshape(4, 3).tolist()
-        chains = [
-            leg.foot_and_jacobian(angle)
-            for leg, angle in zip(self.kinematics, angles, strict=True)
-        ]
-        feet, J = np.array([foot for foot, _ in chains]), np.array([leg for _, leg in chains])
-        shank = np.array(
-            [
-                shank_rate(sign, angle, rate)
-                for sign, angle, rate in zip(self._signs, angles, rates, strict=True)
-            ]
-        )
-        radius = self._radius * normal_in_base
-        moving = (J @ q_dot.reshape(4, 3, 1))[:, :, 0]
-        rolling = np.empty((4, 3))
-        rolling[:, 0] = shank[:, 1] * radius[:, 2] - shank[:, 2] * radius[:, 1]
-        rolling[:, 1] = shank[:, 2] * radius[:, 0] - shank[:, 0] * radius[:, 2]
-        rolling[:, 2] = shank[:, 0] * radius[:, 1] - shank[:, 1] * radius[:, 0]
-        return FootMotion(feet - radius, rolling - moving, J)
+        n_x, n_y, n_z = normal_in_base
+        contacts, velocities, jacobians = [], [], []
+        for i, (leg, sign, radius) in enumerate(
+            zip(self.kinematics, self._signs, self._radius, strict=True)
+        ):
+            angles, rates = q[3 * i : 3 * i + 3], triple(q_dot[3 * i : 3 * i + 3])
+            (x, y, z), J = leg.foot_and_jacobian(angles)
+            down = (radius * n_x, radius * n_y, radius * n_z)
+            rolling, moving = cross(shank_rate(sign, angles, rates), down), times(J, rates)
+            contacts.append((x - down[0], y - down[1], z - down[2]))
+            velocities.append(
+                (rolling[0] - moving[0], rolling[1] - moving[1], rolling[2] - moving[2]))
+            jacobians.append(J)
+        return FootMotion(tuple(contacts), tuple(velocities), tuple(jacobians))
 
 
 def shank_rate(
-    sign: tuple[float, ...], angle: list[float], rate: list[float]
-) -> tuple[float, float, float]:
+    sign: Sequence[float], angle: Sequence[float], rate: Sequence[float]
+) -> Triple:
     """Angular velocity of the shank relative to the base, in the base [rad/s].
 
     Parameters
     ----------
-    sign : tuple of float
+    sign : sequence of float
         The leg's ``axis_sign``.
-    angle, rate : list of float
+    angle, rate : sequence of float
         Joint angles [rad] and velocities [rad/s] of the leg.
     """
     pitching = sign[1] * rate[1] + sign[2] * rate[2]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.robot_state import LEGS, RobotState
+from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JOINTS_OF_LEG, RobotState
 
 Array = NDArray[np.float64]
 
@@ -18,6 +18,8 @@ FASTEST_TURN, HARDEST_BLOW = 100.0, 1000.0
 
 FASTEST_JOINT, LARGEST_FORCE = 200.0, 1e5
 """Readings beyond these are faults of joint and contact sensors [rad/s], [N]."""
+
+_FIRST_JOINT = range(0, len(JOINT_NAMES), len(JOINTS_OF_LEG))
 
 
 @dataclass(frozen=True)
@@ -47,24 +49,31 @@ class SensorReadings:
     @property
     def imu_is_usable(self) -> bool:
         """Whether gyroscope and accelerometer both say something possible."""
-        return bool(
-            (np.abs(self.rate_in_base) <= FASTEST_TURN).all()
-            and (np.abs(self.specific_force_in_base) <= HARDEST_BLOW).all()
+        return _within(self.rate_in_base.tolist(), FASTEST_TURN) and _within(
+            self.specific_force_in_base.tolist(), HARDEST_BLOW)
+
+    @property
+    def usable_legs(self) -> tuple[bool, ...]:
+        """Whether angles and velocities of each leg's joints are possible."""
+        q, q_dot = self.joint_position.tolist(), self.joint_velocity.tolist()
+        return tuple(
+            _within(q[i : i + 3], FASTEST_JOINT) and _within(q_dot[i : i + 3], FASTEST_JOINT)
+            for i in _FIRST_JOINT
         )
 
     @property
-    def usable_legs(self) -> NDArray[np.bool_]:
-        """Whether angles and velocities of each leg's joints are possible, (4,)."""
-        # NaN is neither smaller nor larger than anything.
-        fine = (np.abs(self.joint_position) <= FASTEST_JOINT) & (
-            np.abs(self.joint_velocity) <= FASTEST_JOINT
-        )
-        return np.asarray(fine.reshape(len(LEGS), 3).all(axis=1))
+    def usable_contacts(self) -> tuple[bool, ...]:
+        """Whether each foot's force is possible."""
+        limit = LARGEST_FORCE
+        return tuple(-limit <= force <= limit for force in self.foot_force.tolist())
 
-    @property
-    def usable_contacts(self) -> NDArray[np.bool_]:
-        """Whether each foot's force is possible, (4,)."""
-        return np.abs(self.foot_force) <= LARGEST_FORCE
+
+def _within(values: list[float], limit: float) -> bool:
+    """Whether no value is beyond a limit; NaN is neither smaller nor larger than anything."""
+    for value in values:
+        if not -limit <= value <= limit:
+            return False
+    return True
 
 
 def readings_of(state: RobotState) -> SensorReadings:

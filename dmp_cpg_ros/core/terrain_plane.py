@@ -9,13 +9,11 @@ over one stride leg odometry drifts by millimetres.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, hypot
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.triples import Triple
 
 STEEPEST = 0.7
 """Largest slope that is believed; 35 degrees."""
@@ -33,23 +31,24 @@ class TerrainState:
 
     Attributes
     ----------
-    foothold_in_world : ndarray (4, 3)
+    foothold_in_world : tuple of (float, float, float)
         Where each foot stood last [m].
-    slope : ndarray (2,)
+    slope : tuple of float
         ∂z/∂x and ∂z/∂y of the plane in ``odom``.
     """
 
-    foothold_in_world: Array
-    slope: Array
+    foothold_in_world: tuple[Triple, ...]
+    slope: tuple[float, float]
 
 
-def initial_terrain(contact_in_world: Array) -> TerrainState:
-    """Plane of a robot that stands on its four feet (4, 3)."""
-    return TerrainState(contact_in_world, fitted_slope(contact_in_world))
+def initial_terrain(contact_in_world: Sequence[Triple]) -> TerrainState:
+    """Plane of a robot that stands on its four feet."""
+    return TerrainState(tuple(contact_in_world), fitted_slope(contact_in_world))
 
 
 def terrain_step(
-    terrain: TerrainState, contact_in_world: Array, trust: Array, dt: float, time_constant: float
+    terrain: TerrainState, contact_in_world: Sequence[Triple], trust: Sequence[float], dt: float,
+    time_constant: float,
 ) -> TerrainState:
     """Take over new footholds and follow their plane.
 
@@ -57,9 +56,9 @@ def terrain_step(
     ----------
     terrain : TerrainState
         State one tick before.
-    contact_in_world : ndarray (4, 3)
+    contact_in_world : sequence of four tuples of float
         Contact points now, of swinging feet too [m].
-    trust : ndarray (4,)
+    trust : sequence of four floats
         How well each foot stands, in [0, 1].
     dt : float
         Time since the last tick [s].
@@ -70,29 +69,36 @@ def terrain_step(
     -------
     TerrainState
     """
-    stands = (trust >= STANDING)[:, None]
-    footholds = np.where(stands, contact_in_world, terrain.foothold_in_world)
+    footholds = tuple(
+        now if stands >= STANDING else before
+        for now, before, stands in zip(
+            contact_in_world, terrain.foothold_in_world, trust, strict=True)
+    )
     share = 1.0 - exp(-dt / time_constant)
-    slope = terrain.slope + share * (fitted_slope(footholds) - terrain.slope)
-    return TerrainState(footholds, slope)
+    (x, y), (x_now, y_now) = terrain.slope, fitted_slope(footholds)
+    return TerrainState(footholds, (x + share * (x_now - x), y + share * (y_now - y)))
 
 
-def fitted_slope(points: Array) -> Array:
-    """Slope (2,) of the least-squares plane z = a₀ + a₁ x + a₂ y through points (n, 3).
+def fitted_slope(points: Sequence[Sequence[float]]) -> tuple[float, float]:
+    """Slope of the least-squares plane z = a₀ + a₁ x + a₂ y through points x, y, z.
 
     Directions in which the points do not spread get no slope; slopes beyond ``STEEPEST`` are cut.
     """
-    centred = points - points.mean(axis=0)
-    (xx, xy, xz), (_, yy, yz), _ = (centred.T @ centred).tolist()
-    xx, yy = xx + NARROWEST, yy + NARROWEST
+    xs, ys, zs = zip(*points, strict=True)
+    x_mean, y_mean, z_mean = (sum(values) / len(xs) for values in (xs, ys, zs))
+    xx, yy, xy, xz, yz = NARROWEST, NARROWEST, 0.0, 0.0, 0.0
+    for x, y, z in zip(xs, ys, zs, strict=True):
+        x, y, z = x - x_mean, y - y_mean, z - z_mean
+        xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+        yy, yz = yy + y * y, yz + y * z
     determinant = xx * yy - xy * xy
     a, b = (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
     scale = min(1.0, STEEPEST / max(hypot(a, b), 1e-12))
-    return np.array((a * scale, b * scale))
+    return a * scale, b * scale
 
 
-def normal_in_world(slope: Array) -> Array:
-    """Unit normal (3,), upwards, of a plane with a slope (2,)."""
-    a, b = slope.tolist()
+def normal_in_world(slope: tuple[float, float]) -> Triple:
+    """Unit normal, upwards, of a plane with a slope."""
+    a, b = slope
     length = (1.0 + a * a + b * b) ** 0.5
-    return np.array((-a / length, -b / length, 1.0 / length))
+    return -a / length, -b / length, 1.0 / length

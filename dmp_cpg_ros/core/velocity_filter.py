@@ -16,24 +16,41 @@ are observable; yaw and position are not, whatever the sensors of this kind (Blo
 A foot that does not agree with the prediction is weighted down as under Student's t distribution
 (Roth, Özkan, Gustafsson 2013; one iteration): by (ν + 3)/(ν + d²), with d² the squares of its
 innovations over their variances.
+
+All feet measure the same three numbers, each with a noise of its own that has no direction. In
+the information form of the update they therefore add up to a single measurement: the mean of the
+feet's, weighted by the inverse variances w_i, with the variance 1/Σ w_i. A correction costs one
+inverse (3, 3), however many feet stand.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.gait import GRAVITY
-from dmp_cpg_ros.core.rotations import rotation_matrix, turned
+from dmp_cpg_ros.core.rotations import turned
+from dmp_cpg_ros.core.triples import Matrix, Triple, cross, inverse, triple, upward
 
 Array = NDArray[np.float64]
 
 TILT, VELOCITY, GYRO_BIAS, ACCELEROMETER_BIAS = (slice(3 * i, 3 * i + 3) for i in range(4))
 """Places in the error state."""
 
-_STAYING, _DIAGONAL = np.eye(12), np.arange(3)
+_STAYING = np.eye(12)
+
+_TURNING = (
+    *(12 * i + j for i in range(3) for j in range(3) if i != j),  # of the tilt
+    *(12 * (i + 3) + j + 3 for i in range(3) for j in range(3) if i != j),  # of the velocity
+    *(12 * (i + 3) + j for i in range(3) for j in range(3) if i != j),  # gravity
+    *(12 * (i + 3) + j + 6 for i in range(3) for j in range(3) if i != j),  # bias of gyroscope
+    *(12 * i + i + 6 for i in range(6)),  # biases
+)
+"""Places in the transition's matrix, read by rows, of what is neither 0 nor 1."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +76,12 @@ class FilterNoise:
     foot: float
     freedom: float
 
+    @cached_property
+    def spread(self) -> Array:
+        """Diagonal of the process noise per second (12,)."""
+        densities = (self.gyro, self.accelerometer, self.gyro_walk, self.accelerometer_walk)
+        return np.repeat(np.square(densities), 3)
+
 
 @dataclass(frozen=True)
 class FilterState:
@@ -83,16 +106,16 @@ class FilterState:
     covariance: Array
 
 
-def transition(state: FilterState, R: Array, rate: Array, dt: float) -> Array:
+def transition(velocity: Triple, up_in_base: Triple, rate: Triple, dt: float) -> Array:
     """Jacobian F of one prediction with respect to the error state.
 
     Parameters
     ----------
-    state : FilterState
-        State before.
-    R : ndarray (3, 3)
-        Its rotation.
-    rate : ndarray (3,)
+    velocity : tuple of float
+        Of the state before, in the base [m/s].
+    up_in_base : tuple of float
+        Its vertical, seen in the base.
+    rate : tuple of float
         ω̃ − b_ω [rad/s].
     dt : float
         [s]
@@ -102,14 +125,14 @@ def transition(state: FilterState, R: Array, rate: Array, dt: float) -> Array:
     ndarray (12, 12)
         I + A dt.
     """
-    a, b, c = (rate * dt).tolist()
-    d, e, f = (R[2] * (-GRAVITY * dt)).tolist()
-    g, h, i = (state.velocity_in_base * -dt).tolist()
+    a, b, c = rate[0] * dt, rate[1] * dt, rate[2] * dt
+    fall = -GRAVITY * dt
+    d, e, f = up_in_base[0] * fall, up_in_base[1] * fall, up_in_base[2] * fall
+    g, h, i = velocity[0] * -dt, velocity[1] * -dt, velocity[2] * -dt
     F = _STAYING.copy()
-    F[TILT, TILT] = F[VELOCITY, VELOCITY] = ((1.0, c, -b), (-c, 1.0, a), (b, -a, 1.0))
-    F[VELOCITY, TILT] = ((0.0, -f, e), (f, 0.0, -d), (-e, d, 0.0))
-    F[VELOCITY, GYRO_BIAS] = ((0.0, -i, h), (i, 0.0, -g), (-h, g, 0.0))
-    F[_DIAGONAL, _DIAGONAL + 6] = F[_DIAGONAL + 3, _DIAGONAL + 9] = -dt
+    F.put(_TURNING, (
+        c, -b, -c, a, b, -a, c, -b, -c, a, b, -a, -f, e, f, -d, -e, d, -i, h, i, -g, -h, g,
+        -dt, -dt, -dt, -dt, -dt, -dt))  # fmt: skip
     return F
 
 
@@ -133,44 +156,49 @@ def predict(
     -------
     FilterState
     """
-    R = rotation_matrix(state.quaternion)
-    rate = rate - state.gyro_bias
-    force = specific_force - state.accelerometer_bias
-    v = state.velocity_in_base
-    turn = rate * dt
-    upward = R[2] - 0.5 * _cross(turn, R[2])  # in the base half-way, as the mean force is
-    change = (force - GRAVITY * upward) * dt
-    # The new velocity is seen from the new orientation.
-    moved = v + change - _cross(turn, v + 0.5 * change) + 0.5 * _cross(turn, _cross(turn, v))
-    F = transition(state, R, rate, dt)
-    P = F @ state.covariance @ F.T
-    P.ravel()[::13] += _spread(noise) * dt
-    return FilterState(
-        turned(state.quaternion, turn), moved, state.gyro_bias, state.accelerometer_bias, P
+    up = upward(state.quaternion.tolist())
+    v = triple(state.velocity_in_base.tolist())
+    rate, specific_force = rate - state.gyro_bias, specific_force - state.accelerometer_bias
+    turning, force = triple(rate.tolist()), triple(specific_force.tolist())
+    turn = (turning[0] * dt, turning[1] * dt, turning[2] * dt)
+    # in the base half-way, as the mean force is
+    tilted, fallen = cross(turn, up), GRAVITY * dt
+    change = (
+        force[0] * dt - fallen * (up[0] - 0.5 * tilted[0]),
+        force[1] * dt - fallen * (up[1] - 0.5 * tilted[1]),
+        force[2] * dt - fallen * (up[2] - 0.5 * tilted[2]),
     )
-
-
-def foot_jacobian(contact_in_base: Array) -> Array:
-    """Jacobians H of v + (ω̃ − b_ω) × r with respect to the error state: (n, 3) → (n, 3, 12).
-
-    The derivative with respect to b_ω is left out on purpose: feet that pivot under load measure
-    a turn rate that is off by about one part in a hundred, which is no bias. (The biases of roll
-    and pitch are still seen, through gravity; that of yaw is seen in standing, :func:`settle`.)
-    """
-    H = np.zeros((len(contact_in_base), 3, 12))
-    H[:, (0, 1, 2), (3, 4, 5)] = 1.0
-    return H
+    # The new velocity is seen from the new orientation.
+    back = cross(turn, (v[0] + 0.5 * change[0], v[1] + 0.5 * change[1], v[2] + 0.5 * change[2]))
+    twice = cross(turn, cross(turn, v))
+    moved = np.array((
+        v[0] + change[0] - back[0] + 0.5 * twice[0],
+        v[1] + change[1] - back[1] + 0.5 * twice[1],
+        v[2] + change[2] - back[2] + 0.5 * twice[2],
+    ))
+    F = transition(v, up, turning, dt)
+    P = F.dot(state.covariance).dot(F.T)
+    P.ravel()[::13] += noise.spread * dt
+    return FilterState(
+        turned(state.quaternion, np.array(turn)), moved, state.gyro_bias,
+        state.accelerometer_bias, P,
+    )
 
 
 def update(
     state: FilterState,
     rate: Array,
-    contact_in_base: Array,
-    velocity_in_base: Array,
-    trust: Array,
+    contact_in_base: Sequence[Triple],
+    velocity_in_base: Sequence[Triple],
+    trust: Sequence[float],
     noise: FilterNoise,
-) -> tuple[FilterState, Array]:
+) -> tuple[FilterState, tuple[float, ...]]:
     """Correct by the velocities that standing feet measure.
+
+    A foot measures v + (ω̃ − b_ω) × r, of which the derivative with respect to b_ω is left out on
+    purpose: feet that pivot under load measure a turn rate that is off by about one part in a
+    hundred, which is no bias. (The biases of roll and pitch are still seen, through gravity; that
+    of yaw is seen in standing, :func:`settle`.)
 
     Parameters
     ----------
@@ -178,33 +206,49 @@ def update(
         Predicted state.
     rate : ndarray (3,)
         ω̃ at the time of the state [rad/s].
-    contact_in_base, velocity_in_base : ndarray (n, 3)
-        Contact points r [m] and measured v + ω × r [m/s] of the feet that stand.
-    trust : ndarray (n,)
-        In (0, 1]: the deviation of a foot is ``noise.foot / trust``.
+    contact_in_base, velocity_in_base : sequence of n tuples of float
+        Contact points r [m] and measured v + ω × r [m/s] of the feet.
+    trust : sequence of n floats
+        In [0, 1]: the deviation of a foot is ``noise.foot / trust``; one of no trust measures
+        nothing.
     noise : FilterNoise
         Noise.
 
     Returns
     -------
     state : FilterState
-    distance_squared : ndarray (n,)
-        Of the feet before their weights.
+    distance_squared : tuple of n floats
+        Of the feet before their weights; 0 for those without trust.
     """
-    n = len(trust)
-    H = foot_jacobian(contact_in_base).reshape(3 * n, 12)
     P = state.covariance
-    y = velocity_in_base - state.velocity_in_base - _cross(rate - state.gyro_bias, contact_in_base)
-    HP = H @ P
-    S = HP @ H.T
-    variance = (noise.foot / trust) ** 2
-    spread = S.diagonal().reshape(n, 3) + variance[:, None]
-    distance_squared = (y * y / spread).sum(axis=1)
-    nu = noise.freedom
-    variance *= np.maximum((nu + distance_squared) / (nu + 3.0), 1.0)
-    S.ravel()[:: 3 * n + 1] += np.repeat(variance, 3)
-    gain = np.linalg.solve(S, HP)  # (3n, 12), the transpose of K
-    return _corrected(state, y.ravel() @ gain, P - HP.T @ gain), distance_squared
+    predicted = P[VELOCITY, VELOCITY].tolist()
+    turning = triple((rate - state.gyro_bias).tolist())
+    v_x, v_y, v_z = state.velocity_in_base.tolist()
+    nu, total, x, y, z = noise.freedom, 0.0, 0.0, 0.0, 0.0
+    distances = []
+    for contact, measured, share in zip(contact_in_base, velocity_in_base, trust, strict=True):
+        if share <= 0.0:
+            distances.append(0.0)
+            continue
+        around = cross(turning, contact)
+        off_x, off_y, off_z = (
+            measured[0] - v_x - around[0], measured[1] - v_y - around[1],
+            measured[2] - v_z - around[2])
+        variance = (noise.foot / share) ** 2
+        distance = (
+            off_x * off_x / (predicted[0][0] + variance)
+            + off_y * off_y / (predicted[1][1] + variance)
+            + off_z * off_z / (predicted[2][2] + variance))
+        distances.append(distance)
+        weight = 1.0 / (variance * max((nu + distance) / (nu + 3.0), 1.0))
+        total += weight
+        x, y, z = x + weight * off_x, y + weight * off_y, z + weight * off_z
+    if total == 0.0:
+        return state, tuple(distances)
+    HP = P[VELOCITY]
+    KT = np.array(inverse(_with_diagonal(predicted, 1.0 / total))).dot(HP)  # (3, 12)
+    error = np.array((x / total, y / total, z / total)).dot(KT)
+    return _corrected(state, error, P - HP.T.dot(KT)), tuple(distances)
 
 
 def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
@@ -227,13 +271,13 @@ def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
     FilterState
     """
     P = state.covariance.copy()
-    S = P[GYRO_BIAS, GYRO_BIAS].copy()
-    S.ravel()[::4] += deviation * deviation
-    left = np.eye(3) - np.linalg.solve(S, P[GYRO_BIAS, GYRO_BIAS]).T  # I − K
-    after = left @ P[GYRO_BIAS]
+    rows = P[GYRO_BIAS]
+    S = _with_diagonal(rows[:, GYRO_BIAS].tolist(), deviation * deviation)
+    left = np.array(inverse(S)) * (deviation * deviation)  # I − K = I − P S⁻¹ = (S − P) S⁻¹
+    after = left.dot(rows)
     P[GYRO_BIAS] = after
     P[:, GYRO_BIAS] = after.T
-    bias = rate - left @ (rate - state.gyro_bias)
+    bias = rate - left.dot(rate - state.gyro_bias)
     return FilterState(
         state.quaternion, state.velocity_in_base, bias, state.accelerometer_bias, 0.5 * (P + P.T)
     )
@@ -249,14 +293,7 @@ def _corrected(state: FilterState, error: Array, covariance: Array) -> FilterSta
     )
 
 
-def _spread(noise: FilterNoise) -> Array:
-    """Diagonal of the process noise per second (12,)."""
-    densities = (noise.gyro, noise.accelerometer, noise.gyro_walk, noise.accelerometer_walk)
-    return np.repeat(np.square(densities), 3)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Cross product of a (3,) with each row of b (..., 3); np.cross costs ten times as much."""
-    ax, ay, az = a.tolist()
-    matrix = np.array(((0.0, az, -ay), (-az, 0.0, ax), (ay, -ax, 0.0)))
-    return b @ matrix
+def _with_diagonal(M: list[list[float]], more: float) -> Matrix:
+    """A matrix (3, 3) with a number added to its diagonal."""
+    (a, b, c), (d, e, f), (g, h, i) = M
+    return (a + more, b, c), (d, e + more, f), (g, h, i + more)

@@ -121,7 +121,7 @@ class BodyState:
         if memory is None or estimate is None:
             return {}
         roll, pitch, _ = roll_pitch_yaw(estimate.quaternion)
-        slope_x, slope_y = memory.terrain.slope.tolist()
+        slope_x, slope_y = memory.terrain.slope
         return {
             'estimated_roll_rad': roll,
             'estimated_pitch_rad': pitch,
