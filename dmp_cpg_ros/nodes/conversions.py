@@ -23,10 +23,12 @@ from dmp_cpg_ros.nodes.message_values import (
     Array,
     checked_numbers,
     finite_list,
+    frame_of,
     header_ns,
     set_stamp,
 )
 from dmp_cpg_ros.nodes.robot_state_messages import BASE_FRAME
+from dmp_cpg_ros.nodes.serialized_messages import SerializedTwist
 
 CANONICAL_NAMES = tuple(f'{leg}_x{i}' for leg in LEGS for i in (1, 2))
 SHIFT_NAMES = tuple(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xyz')
@@ -73,8 +75,11 @@ class ReferenceWriter:
         return self.message
 
 
-def read_reference(message: TwistStamped) -> Array:
+def read_reference(message: TwistStamped | SerializedTwist) -> Array:
     """Reference r = (v_x, v_y, γ), ndarray (3,) [m/s, m/s, rad/s]; raises DataError."""
+    if isinstance(message, SerializedTwist):
+        numbers = checked_numbers(message.numbers, 'velocity')
+        return np.array((numbers[0], numbers[1], numbers[5]))
     return np.array(read_twist(message.twist))
 
 
@@ -175,4 +180,4 @@ class PostureFeedbackReader:
         return PostureFeedback(
             effort[_JOINTS], position[_FEET].reshape(len(LEGS), 3),
             velocity[_FEET].reshape(len(LEGS), 3)[:, :2], velocity[_BASE],
-            message.header.frame_id, position[_JOINTS])
+            frame_of(message), position[_JOINTS])

@@ -32,7 +32,7 @@ from dmp_cpg_ros.nodes.gait_setup import certificate_words
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
 from dmp_cpg_ros.nodes.inhibition_votes import NodeVotes
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
-from dmp_cpg_ros.nodes.message_values import header_ns
+from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 
@@ -90,7 +90,7 @@ class InhibitionNode(CertifiedNode):
             lambda message: self._ticks.add(
                 'canonical_state',
                 header_ns(message),
-                (*canonical.read(message), gaits.read(message.header.frame_id)),
+                (*canonical.read(message), gaits.read(frame_of(message))),
             ),
         )
         self.listen(

@@ -25,7 +25,7 @@ from dmp_cpg_ros.nodes.conversions import (
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import Array, header_ns
+from dmp_cpg_ros.nodes.message_values import Array, frame_of, header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
@@ -68,7 +68,7 @@ class LegTransformation(ManagedNode):
             lambda message: self._ticks.add(
                 'canonical_state',
                 header_ns(message),
-                (*canonical.read(message), gaits.read(message.header.frame_id)),
+                (*canonical.read(message), gaits.read(frame_of(message))),
             ),
         )
         self.listen(

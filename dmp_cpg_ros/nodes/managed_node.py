@@ -25,6 +25,7 @@ from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, LocalPublisher
 from dmp_cpg_ros.nodes.parameterized_node import ParameterizedNode
 from dmp_cpg_ros.nodes.readiness import missing_connections
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
+from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
 from dmp_cpg_ros.nodes.tick_inputs import TickInputs, drain
 
 
@@ -101,7 +102,9 @@ class ManagedNode(ParameterizedNode):
         topic : str or Interface
             Interface of the table, or its name.
         callback : callable (message)
-            Latched topics are also delivered while the node is configured and not active.
+            Latched topics are also delivered while the node is configured and not active. Kinds
+            that :mod:`~dmp_cpg_ros.nodes.serialized_messages` reads come as its classes from
+            other processes, unless ``command``.
         command : bool
             Whether the queue is emptied at the start of every tick.
         raw : bool
@@ -120,6 +123,11 @@ class ManagedNode(ParameterizedNode):
             self.local.attach(topic.name, receive)
             self._local_readers.append(receive)
             return None
+        reader = None if raw or command else serialized_reader(topic.type)
+        if reader is not None:
+            # Cheaper than rclpy's message objects; see serialized_messages.
+            read, raw = reader, True
+            receive = self._guarded(topic, lambda data: callback(read(data)))
         subscription = self.create_subscription(
             topic.type, topic.name, self._counted(topic.name, receive) if command else receive,
             qos or topic.reader_qos, raw=raw)

@@ -25,7 +25,11 @@ _LARGEST_SQUARED = LARGEST * LARGEST
 
 def stamp_ns(stamp: Time) -> int:
     """Read a stamp as nanoseconds; raises DataError when it is not a valid time."""
-    seconds, rest = stamp.sec, stamp.nanosec
+    return stamp_in_ns(stamp.sec, stamp.nanosec)
+
+
+def stamp_in_ns(seconds: int, rest: int) -> int:
+    """Join the two parts of a stamp to nanoseconds; raises DataError as :func:`stamp_ns`."""
     if seconds < 0 or rest >= NS:
         raise DataError(f'stamp {seconds} s + {rest} ns must have sec >= 0 and nanosec < 1e9')
     return seconds * NS + rest
@@ -33,7 +37,14 @@ def stamp_ns(stamp: Time) -> int:
 
 def header_ns(message: Any) -> int:
     """Stamp of a message's header [ns]; raises DataError when it is not valid."""
-    return stamp_ns(message.header.stamp)
+    known: int | None = getattr(message, 'stamp_ns', None)  # of what was read from bytes
+    return stamp_ns(message.header.stamp) if known is None else known
+
+
+def frame_of(message: Any) -> str:
+    """Frame of a message's header."""
+    known: str | None = getattr(message, 'frame_id', None)
+    return str(message.header.frame_id) if known is None else known
 
 
 def set_stamp(stamp: Time, time_ns: int) -> None:

@@ -25,7 +25,7 @@ from dmp_cpg_ros.nodes.conversions import (
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import header_ns
+from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
 
@@ -67,7 +67,7 @@ class PostureControl(ManagedNode):
             'reference': read_reference,
             'canonical_state': lambda message: (
                 *canonical.read(message),
-                gaits.read(message.header.frame_id),
+                gaits.read(frame_of(message)),
             ),
         }
         for name, read in readers.items():

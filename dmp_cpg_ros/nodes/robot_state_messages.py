@@ -17,6 +17,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.message_values import Array, checked, finite_list, set_stamp
+from dmp_cpg_ros.nodes.serialized_messages import SerializedImu
 
 BASE_FRAME, WORLD_FRAME = 'base_link', 'odom'
 
@@ -77,7 +78,7 @@ class JointsReader:
 
     def read(self, message: JointState) -> tuple[Array, Array, Array]:
         """Position [rad], velocity [rad/s] and effort [N m] (0 where absent), each (12,)."""
-        if message.effort:
+        if len(message.effort):
             position, velocity, effort = self._full.read(message)
             return position, velocity, effort
         position, velocity = self._without_effort.read(message)
@@ -130,11 +131,13 @@ def read_odom(message: Odometry) -> BaseMotion:
                       _vector(twist.angular, 'angular velocity'))
 
 
-def read_imu(message: Imu) -> tuple[Array, Array]:
+def read_imu(message: Imu | SerializedImu) -> tuple[Array, Array]:
     """Turn rate (3,) [rad/s] and specific force (3,) [m/s^2], as they are.
 
     Numbers that are not finite pass: the estimator judges them together with silent sensors.
     """
+    if isinstance(message, SerializedImu):
+        return np.array(message.rate), np.array(message.force)
     rate, force = message.angular_velocity, message.linear_acceleration
     return np.array((rate.x, rate.y, rate.z)), np.array((force.x, force.y, force.z))
 

@@ -1,0 +1,223 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the suite needs of the messages of every tick, read from their serialized bytes.
+
+rclpy builds a Python object for every part of a message: 30 objects for a ``JointState`` of
+twelve joints, of which a node needs the stamp and three arrays. The readers of this module take
+these from the bytes: CDR in little-endian order as of OMG DDSI-RTPS 2.5, section 10, with every
+primitive aligned to its size, counted from behind the four bytes that name the encoding. What is
+encoded otherwise is left to rclpy.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import TwistStamped
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import Imu, JointState
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.nodes.message_values import Array, stamp_in_ns
+
+CDR_LITTLE_ENDIAN = b'\x00\x01'
+"""First two bytes of a message that this module reads itself."""
+
+_BODY = 4
+"""Where a message begins: behind the bytes that say how it is encoded."""
+
+_HEADER, _COUNT = struct.Struct('<iII'), struct.Struct('<I')
+_TWIST, _IMU = struct.Struct('<6d'), struct.Struct('<104x3d72x3d')
+
+
+class SerializedJointState:
+    """Stamp, names and arrays of a serialized ``JointState``.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        [ns]
+    frame_id : str
+        Frame of the header.
+    name : list of str
+        Names; the same list object for the same names.
+    position, velocity, effort : ndarray (n,)
+        Entries.
+    """
+
+    __slots__ = ('effort', 'frame_id', 'name', 'position', 'stamp_ns', 'velocity')
+
+    def __init__(self, data: bytes) -> None:
+        """Read the bytes; raises struct.error or ValueError when they are cut short."""
+        self.stamp_ns, self.frame_id, at = _header(data)
+        self.name, at = _names(data, at)
+        self.position, at = _doubles(data, at)
+        self.velocity, at = _doubles(data, at)
+        self.effort, at = _doubles(data, at)
+
+
+class SerializedTwist:
+    """Stamp and numbers of a serialized ``TwistStamped``.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        [ns]
+    numbers : tuple of float
+        Linear x, y, z [m/s], angular x, y, z [rad/s].
+    """
+
+    __slots__ = ('numbers', 'stamp_ns')
+
+    def __init__(self, data: bytes) -> None:
+        """Read the bytes; raises struct.error when they are cut short."""
+        self.stamp_ns, _, at = _header(data)
+        self.numbers: tuple[float, ...] = _TWIST.unpack_from(data, _aligned(at, 8))
+
+
+class SerializedImu:
+    """Stamp and measurements of a serialized ``Imu``.
+
+    Attributes
+    ----------
+    stamp_ns : int
+        [ns]
+    rate : tuple of float
+        Angular velocity [rad/s].
+    force : tuple of float
+        Linear acceleration [m/s^2].
+    """
+
+    __slots__ = ('force', 'rate', 'stamp_ns')
+
+    def __init__(self, data: bytes) -> None:
+        """Read the bytes; raises struct.error when they are cut short."""
+        self.stamp_ns, _, at = _header(data)
+        numbers = _IMU.unpack_from(data, _aligned(at, 8))
+        self.rate, self.force = numbers[:3], numbers[3:]
+
+
+_READERS: dict[type, Callable[[bytes], Any]] = {
+    JointState: SerializedJointState,
+    TwistStamped: SerializedTwist,
+    Imu: SerializedImu,
+}
+
+
+def serialized_reader(kind: type) -> Callable[[bytes], Any] | None:
+    """How to read the bytes of a kind of message.
+
+    Parameters
+    ----------
+    kind : type
+        Message class.
+
+    Returns
+    -------
+    callable (bytes) → message, or None
+        Returns one of this module's classes, or the message itself where it is encoded in another
+        way; raises DataError for a stamp that is no time and for bytes that are no such message.
+        None for a kind that this module does not read.
+    """
+    read = _READERS.get(kind)
+    if read is None:
+        return None
+
+    def reader(data: bytes) -> Any:
+        if data[:2] != CDR_LITTLE_ENDIAN:
+            return deserialize_message(data, kind)
+        try:
+            return read(data)
+        except (struct.error, UnicodeDecodeError, ValueError) as error:
+            raise DataError(f'{len(data)} bytes are no {kind.__name__}: {error}') from None
+
+    return reader
+
+
+def _aligned(at: int, size: int) -> int:
+    """Place of the next primitive of a size of 4 or 8 bytes."""
+    return at + (_BODY - at) % size
+
+
+def _header(data: bytes) -> tuple[int, str, int]:
+    """Stamp [ns] and frame of the header, and where what follows it begins."""
+    seconds, rest, length = _HEADER.unpack_from(data, _BODY)
+    begin = _BODY + _HEADER.size
+    end = begin + length
+    return stamp_in_ns(seconds, rest), data[begin:end - 1].decode() if length else '', end
+
+
+@dataclass(frozen=True)
+class _Names:
+    """Layout of a sequence of names, and what it holds."""
+
+    layout: struct.Struct
+    content: tuple[int | bytes, ...]
+    names: list[str]
+
+
+def _names(data: bytes, at: int) -> tuple[list[str], int]:
+    """Sequence of texts and where what follows it begins.
+
+    Senders repeat their names in every message, so these are compared with known ones; the
+    bytes between texts are arbitrary and not compared.
+    """
+    at = _aligned(at, 4)
+    known = _known_names.get(data[at:at + _KEY])
+    if known is not None:
+        end = at + known.layout.size
+        if end <= len(data) and known.layout.unpack_from(data, at) == known.content:
+            return known.names, end
+    return _new_names(data, at)
+
+
+_KEY = 16
+"""Bytes by which names are looked up: their number and the begin of the first one."""
+
+_MOST_NAMES = 256
+"""Sequences of names that are known at a time."""
+
+_known_names: dict[bytes, _Names] = {}
+"""What was read, by its first bytes."""
+
+
+def _new_names(data: bytes, begin: int) -> tuple[list[str], int]:
+    """Read a sequence of texts piece by piece, and remember it."""
+    (count,) = _COUNT.unpack_from(data, begin)
+    at, layout, names = begin + 4, '<I', []
+    content: list[int | bytes] = [count]
+    for _ in range(count):
+        here = _aligned(at, 4)
+        (length,) = _COUNT.unpack_from(data, here)
+        raw = data[here + 4:here + 4 + length]
+        if len(raw) < max(length, 1):
+            raise ValueError('a name is cut short')
+        layout += f'{here - at}xI{length}s'
+        content += [length, raw]
+        names.append(raw[:-1].decode())
+        at = here + 4 + length
+    if len(_known_names) >= _MOST_NAMES:
+        _known_names.clear()
+    _known_names[data[begin:begin + _KEY]] = _Names(struct.Struct(layout), tuple(content), names)
+    return names, at
+
+
+def _doubles(data: bytes, at: int) -> tuple[Array, int]:
+    """Sequence of doubles, and where what follows it begins."""
+    at = _aligned(at, 4)
+    (count,) = _COUNT.unpack_from(data, at)
+    at += 4
+    if not count:
+        return _NONE, at
+    at = _aligned(at, 8)
+    end = at + 8 * count
+    if end > len(data):
+        raise ValueError('an array is cut short')
+    return np.frombuffer(data[at:end]), end
+
+
+_NONE: Array = np.empty(0)

@@ -1,0 +1,113 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages read from their bytes are what rclpy reads from the same bytes."""
+
+from __future__ import annotations
+
+from array import array
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import TwistStamped
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import Imu, JointState
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.nodes.conversions import read_reference
+from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
+from dmp_cpg_ros.nodes.robot_state_messages import read_imu
+from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
+
+TEXTS = st.text(st.characters(exclude_characters='\x00', exclude_categories=['Cs']), max_size=12)
+NUMBERS = st.lists(st.floats(width=64), max_size=9)
+
+
+def joint_state(frame: str, names: list[str], *arrays: list[float]) -> JointState:
+    message = JointState(name=names)
+    message.header.frame_id = frame
+    message.header.stamp.sec, message.header.stamp.nanosec = 12, 345_678_901
+    for field, numbers in zip(('position', 'velocity', 'effort'), arrays, strict=True):
+        setattr(message, field, array('d', numbers))
+    return message
+
+
+@settings(max_examples=200, deadline=None)
+@given(TEXTS, st.lists(TEXTS, max_size=6), NUMBERS, NUMBERS, NUMBERS)
+def test_a_joint_state_is_read_as_rclpy_reads_it(frame, names, position, velocity, effort):
+    message = joint_state(frame, names, position, velocity, effort)
+    read = serialized_reader(JointState)
+    for _ in range(2):  # the second time its names are known
+        got = read(bytes(serialize_message(message)))
+        assert (header_ns(got), frame_of(got), got.name) == (12_345_678_901, frame, names)
+        for field in ('position', 'velocity', 'effort'):
+            assert getattr(got, field).tobytes() == getattr(message, field).tobytes()
+
+
+def test_names_of_the_same_lengths_are_told_apart():
+    read = serialized_reader(JointState)
+    for names in (['aa', 'bb'], ['aa', 'cc'], ['aa', 'bb'], ['aa', 'b'], ['aa', 'bb']):
+        data = serialize_message(joint_state('', names, [1.0, 2.0], [], []))
+        assert read(data).name == names
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6), TEXTS)
+def test_a_twist_and_an_imu_are_read_as_rclpy_reads_them(numbers, frame):
+    twist, imu = TwistStamped(), Imu()
+    for message, pairs in ((twist, (twist.twist.linear, twist.twist.angular)),
+                           (imu, (imu.angular_velocity, imu.linear_acceleration))):
+        message.header.frame_id, message.header.stamp.sec = frame, 3
+        for place, vector in zip((0, 3), pairs, strict=True):
+            vector.x, vector.y, vector.z = numbers[place:place + 3]
+    data = serialize_message(twist), serialize_message(imu)
+    got = serialized_reader(TwistStamped)(data[0])
+    assert header_ns(got) == 3 * 10**9
+    np.testing.assert_array_equal(
+        read_reference(got), read_reference(deserialize_message(data[0], TwistStamped)))
+    got = serialized_reader(Imu)(data[1])
+    assert header_ns(got) == 3 * 10**9
+    np.testing.assert_array_equal(read_imu(got), read_imu(deserialize_message(data[1], Imu)))
+
+
+@pytest.mark.parametrize('kind', [JointState, TwistStamped, Imu])
+def test_bytes_that_are_cut_short_are_refused(kind):
+    message = joint_state('base', ['a', 'bc'], [1.0, 2.0], [3.0], []) if (
+        kind is JointState) else kind()
+    data, read = bytes(serialize_message(message)), serialized_reader(kind)
+    read(data)
+    used = len(data) if kind is not Imu else len(data) - 72  # of the last covariance nothing
+    for length in range(2, used - 8):
+        with pytest.raises(DataError):
+            read(data[:length])
+
+
+def test_impossible_numbers_of_entries_are_refused():
+    data = bytearray(serialize_message(joint_state('', ['a'], [1.0], [], [])))
+    read = serialized_reader(JointState)
+    at = bytes(data).index(b'\x01\x00\x00\x00\x02\x00\x00\x00a')
+    data[at:at + 4] = b'\xff\xff\xff\xff'
+    with pytest.raises(DataError):
+        read(bytes(data))
+
+
+def test_a_stamp_that_is_no_time_is_refused():
+    message = JointState()
+    message.header.stamp.sec = -1
+    with pytest.raises(DataError, match='stamp'):
+        serialized_reader(JointState)(serialize_message(message))
+
+
+def test_another_encoding_is_left_to_rclpy():
+    message = TwistStamped()
+    message.header.stamp.sec, message.twist.linear.x = 7, 0.25
+    little = serialize_message(message)
+    big = b'\x00\x00' + little[2:4] + (7).to_bytes(4, 'big') + little[8:12] + (
+        1).to_bytes(4, 'big') + little[16:]
+    got = serialized_reader(TwistStamped)(big)
+    assert isinstance(got, TwistStamped)
+    assert got.header.stamp.sec == 7
+
+
+def test_other_kinds_are_not_read_here():
+    assert serialized_reader(str) is None
