@@ -7,6 +7,8 @@ from __future__ import annotations
 import math
 import os
 import signal
+import subprocess
+import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -573,3 +575,22 @@ def test_the_middleware_profile_is_named_unless_the_user_has_one(
     assert not os.environ[middleware.VARIABLES[1]]
 
 
+
+
+def test_every_thread_of_a_process_is_scheduled_in_batches() -> None:
+    if not hasattr(os, 'SCHED_BATCH'):
+        pytest.skip('this system has no such policy')
+    told = subprocess.run(
+        [sys.executable, '-c', 'import os, threading\n'
+         'from dmp_cpg_ros.nodes.scheduling import schedule\n'
+         'event = threading.Event()\n'
+         'threading.Thread(target=event.wait).start()\n'
+         'print(schedule("normal"), schedule("batch"), schedule("batch"))\n'
+         'print({os.sched_getscheduler(int(t)) for t in os.listdir("/proc/self/task")}'
+         ' == {os.SCHED_BATCH})\n'
+         'event.set()'], capture_output=True, text=True, check=True, preexec_fn=_normal_policy)
+    assert told.stdout.split() == ['0', '2', '0', 'True']
+
+
+def _normal_policy() -> None:
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -27,6 +27,7 @@ from dmp_cpg_ros.nodes.help_text import help_text
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
+from dmp_cpg_ros.nodes.scheduling import schedule
 
 FOREVER_S = 1e6
 """A bounded wait: unbounded ones of the events executor do not work in some builds [s]."""
@@ -138,8 +139,8 @@ def run_nodes(program: str, arguments: Sequence[str],
     arguments : sequence of str
         Command line without the program's name; all of it for ROS.
     make : callable () → iterable of ManagedNode
-        Makes the nodes; called after ``rclpy.init``. The first node's parameter ``executor``
-        decides for all.
+        Makes the nodes; called after ``rclpy.init``. The first node's parameters ``executor`` and
+        ``scheduling`` decide for all.
 
     Returns
     -------
@@ -171,7 +172,9 @@ def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[Man
         nodes.extend(make())
         for node in nodes:
             node.start()
-        spin(nodes, nodes[0].parameters_of(NodeParameters).executor)
+        parameters = nodes[0].parameters_of(NodeParameters)
+        schedule(parameters.scheduling)
+        spin(nodes, parameters.executor)
     except DmpCpgError:
         raise
     except Exception:

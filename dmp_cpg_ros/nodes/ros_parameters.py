@@ -21,6 +21,7 @@ from rclpy.parameter import Parameter
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.nodes.interfaces import SUITE
+from dmp_cpg_ros.nodes.scheduling import BATCH, POLICIES
 
 P = TypeVar('P', bound=Parameters)
 
@@ -36,6 +37,9 @@ class NodeParameters(Parameters):
         True, 'whether the node configures and activates itself when it starts')
     executor: str = parameter('events', "rclpy's executor; events needs a quarter of single's CPU",
                               choices=('events', 'single'))
+    scheduling: str = parameter(
+        BATCH, 'policy of the Linux scheduler; batch keeps a reader from interrupting its writer',
+        choices=POLICIES)
     expected_nodes: tuple[str, ...] = parameter(
         SUITE[:-1], 'kinds of nodes that must be connected before ~/ready says yes', choices=SUITE)
 

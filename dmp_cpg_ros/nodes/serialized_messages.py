@@ -45,19 +45,36 @@ class SerializedJointState:
         Frame of the header.
     name : list of str
         Names; the same list object for the same names.
-    position, velocity, effort : ndarray (n,)
-        Entries.
     """
 
-    __slots__ = ('effort', 'frame_id', 'name', 'position', 'stamp_ns', 'velocity')
+    __slots__ = ('_data', '_places', 'frame_id', 'name', 'stamp_ns')
 
     def __init__(self, data: bytes) -> None:
         """Read the bytes; raises struct.error or ValueError when they are cut short."""
         self.stamp_ns, self.frame_id, at = _header(data)
         self.name, at = _names(data, at)
-        self.position, at = _doubles(data, at)
-        self.velocity, at = _doubles(data, at)
-        self.effort, at = _doubles(data, at)
+        first = _doubles(data, at)
+        second = _doubles(data, first[1])
+        self._data, self._places = data, (first, second, _doubles(data, second[1]))
+
+    @property
+    def position(self) -> Array:
+        """Positions."""
+        return self._array(0)
+
+    @property
+    def velocity(self) -> Array:
+        """Velocities."""
+        return self._array(1)
+
+    @property
+    def effort(self) -> Array:
+        """Efforts."""
+        return self._array(2)
+
+    def _array(self, which: int) -> Array:
+        begin, end = self._places[which]
+        return np.frombuffer(self._data[begin:end])
 
 
 class SerializedTwist:
@@ -206,18 +223,15 @@ def _new_names(data: bytes, begin: int) -> tuple[list[str], int]:
     return names, at
 
 
-def _doubles(data: bytes, at: int) -> tuple[Array, int]:
-    """Sequence of doubles, and where what follows it begins."""
+def _doubles(data: bytes, at: int) -> tuple[int, int]:
+    """Begin and end of a sequence of doubles."""
     at = _aligned(at, 4)
     (count,) = _COUNT.unpack_from(data, at)
     at += 4
     if not count:
-        return _NONE, at
+        return at, at
     at = _aligned(at, 8)
     end = at + 8 * count
     if end > len(data):
         raise ValueError('an array is cut short')
-    return np.frombuffer(data[at:end]), end
-
-
-_NONE: Array = np.empty(0)
+    return at, end
