@@ -202,7 +202,7 @@ def test_a_slipping_foot_is_not_believed(exact: list[SensorReadings]) -> None:
     def slipping(k: int, reading: SensorReadings) -> SensorReadings:
         if not first <= k < past:
             return reading
-        J = estimator.odometry.kinematics[0].jacobian_in_base(reading.joint_position[:3])
+        J = estimator.odometry.legs.kinematics[0].jacobian_in_base(reading.joint_position[:3])
         velocity = reading.joint_velocity.copy()
         velocity[:3] += np.linalg.solve(J, slide)
         return dataclasses.replace(reading, joint_velocity=velocity)

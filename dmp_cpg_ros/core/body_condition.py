@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.gait import GRAVITY
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.robot_state import RobotState
 
 Array = NDArray[np.float64]
@@ -51,11 +51,13 @@ class BodySense:
     ----------
     description : RobotDescription
         The robot.
+    legs : RobotLegs, optional
+        Its legs, where others ask them too.
     """
 
-    def __init__(self, description: RobotDescription) -> None:
+    def __init__(self, description: RobotDescription, legs: RobotLegs | None = None) -> None:
         """Prepare the legs."""
-        self._legs = [LegKinematics(leg) for leg in description.legs]
+        self._legs = legs or RobotLegs(description)
         self._radius = [leg.foot_radius for leg in description.legs]
         self._com_in_base = description.com_in_base
         self._weight = description.mass * GRAVITY
@@ -66,22 +68,21 @@ class BodySense:
         x, y, z, w = state.base_quaternion.tolist()
         down_x, down_y = 2.0 * (w * y - x * z), -2.0 * (y * z + w * x)
         down_z = 2.0 * (x * x + y * y) - 1.0
-        q, height = state.joint_position.tolist(), -inf
-        for i, (leg, radius) in enumerate(zip(self._legs, self._radius, strict=True)):
-            foot_x, foot_y, foot_z = leg.foot_in_base(q[3 * i : 3 * i + 3]).tolist()
+        legs, height = self._legs.at(state.joint_position.tolist()), -inf
+        for ((foot_x, foot_y, foot_z), _), radius in zip(legs, self._radius, strict=True):
             height = max(height, down_x * foot_x + down_y * foot_y + down_z * foot_z + radius)
         down = np.array((down_x, down_y, down_z))
-        support = float(state.foot_force.sum()) / self._weight
+        support = sum(state.foot_force.tolist()) / self._weight
         if support < CERTAIN_SUPPORT:
-            support = max(support, self._pressed(state, q, down))
+            support = max(support, self._pressed(state, down))
         return BodyCondition(down, acos(min(max(-down_z, -1.0), 1.0)), height, support)
 
-    def _pressed(self, state: RobotState, q: list[float], down: Array) -> float:
+    def _pressed(self, state: RobotState, down: Array) -> float:
         """Share of the weight that the joint torques press onto the ground.
 
         Forces are those of statics, f = −J⁻ᵀ τ at each foot, damped near singular postures.
         """
-        J = self._jacobians([q[3 * i : 3 * i + 3] for i in range(4)])
+        J = self._jacobians(state)
         tau = state.joint_effort.reshape(4, 3, 1)
         damped = J @ J.transpose(0, 2, 1) + 1e-4 * np.eye(3)
         forces = -np.linalg.solve(damped, J @ tau)[:, :, 0]
@@ -99,16 +100,15 @@ class BodySense:
         up = np.array(
             (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
         )
-        q = state.joint_position.reshape(4, 3).tolist()
-        feet = np.array([leg.foot_in_base(a) for leg, a in zip(self._legs, q, strict=True)])
+        feet = np.array([foot for foot, _ in self._legs.at(state.joint_position.tolist())])
         arms = feet - self._com_in_base
         arms -= np.outer(arms @ up, up)
         balance = np.concatenate((np.ones((1, 4)), arms.T))
         normal = balance @ balance.T + 1e-9 * np.eye(4)
         wanted = np.array((share * self._weight, 0.0, 0.0, 0.0))
         force = np.clip(balance.T @ np.linalg.solve(normal, wanted), 0.0, self._weight)
-        torque = -np.einsum('lij,i,l->lj', self._jacobians(q), up, force).ravel()
+        torque = -np.einsum('lij,i,l->lj', self._jacobians(state), up, force).ravel()
         return np.asarray(np.clip(torque, -self._limit, self._limit))
 
-    def _jacobians(self, q: list[list[float]]) -> Array:
-        return np.array([leg.jacobian_in_base(a) for leg, a in zip(self._legs, q, strict=True)])
+    def _jacobians(self, state: RobotState) -> Array:
+        return np.array([J for _, J in self._legs.at(state.joint_position.tolist())])

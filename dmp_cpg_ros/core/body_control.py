@@ -4,11 +4,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.body_command import BALANCED
 from dmp_cpg_ros.core.body_condition import BodySense
 from dmp_cpg_ros.core.body_mode import BodyModes, ModeParameters, ModeState
 from dmp_cpg_ros.core.body_requests import ModeAnswer, request
@@ -17,7 +16,9 @@ from dmp_cpg_ros.core.leg_primitive import body_scale
 from dmp_cpg_ros.core.phase import phase_rate
 from dmp_cpg_ros.core.posture import PostureFeedback
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.updated import updated
 
 Array = NDArray[np.float64]
 
@@ -31,12 +32,17 @@ class BodyControl:
         The robot.
     parameters : ModeParameters
         Start, fall detection, recovery.
+    legs : RobotLegs, optional
+        The robot's legs, where others ask them too.
     """
 
-    def __init__(self, description: RobotDescription, parameters: ModeParameters) -> None:
+    def __init__(
+        self, description: RobotDescription, parameters: ModeParameters,
+        legs: RobotLegs | None = None,
+    ) -> None:
         """Build the parts."""
         self.modes = BodyModes(description, parameters)
-        self._sense, self._scale = BodySense(description), body_scale(description)
+        self._sense, self._scale = BodySense(description, legs), body_scale(description)
 
     def initial_state(self) -> ModeState:
         """State at the start."""
@@ -78,11 +84,11 @@ class BodyControl:
 
     def balances(self, mode: ModeState) -> bool:
         """Whether the posture controller balances in a mode."""
-        return self.modes.command(mode).balanced
+        return mode.mode in BALANCED
 
     def labelled(self, mode: ModeState, feedback: PostureFeedback) -> PostureFeedback:
         """Feedback of the posture controller with the mode's name."""
-        return replace(feedback, mode=mode.mode)
+        return feedback if feedback.mode == mode.mode else updated(feedback, mode=mode.mode)
 
     def feedback(self, mode: ModeState, state: RobotState) -> PostureFeedback:
         """What the legs get while the posture controller does not balance."""

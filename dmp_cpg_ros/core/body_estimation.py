@@ -31,6 +31,7 @@ from dmp_cpg_ros.core.leg_odometry import (
     turn_rate_of_feet,
 )
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.rotations import levelled
 from dmp_cpg_ros.core.sensor_readings import SensorReadings
@@ -117,12 +118,17 @@ class BodyEstimator:
         The robot.
     parameters : EstimationParameters
         Noise and thresholds.
+    legs : RobotLegs, optional
+        The robot's legs, where others ask them too.
     """
 
-    def __init__(self, description: RobotDescription, parameters: EstimationParameters) -> None:
+    def __init__(
+        self, description: RobotDescription, parameters: EstimationParameters,
+        legs: RobotLegs | None = None,
+    ) -> None:
         """Scale the thresholds by the robot's weight."""
         self.parameters = parameters
-        self.odometry = LegOdometry(description)
+        self.odometry = LegOdometry(description, legs)
         self._weight = description.mass * GRAVITY
 
     @property

@@ -20,6 +20,7 @@ from dmp_cpg_ros.core.parameters import parameter
 from dmp_cpg_ros.core.posture_motion import phase_at
 from dmp_cpg_ros.core.posture_movements import SIDES, Movements
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.updated import updated
 
 UPRIGHT_TILT = 0.5
 """Tilt up to which a robot on the ground can rise without rolling over [rad]."""
@@ -145,12 +146,12 @@ class BodyModes:
         ModeState
         """
         begun = time_ns if state.begun_ns < 0 else state.begun_ns
-        state = replace(state, time_ns=time_ns, condition=condition, begun_ns=begun)
+        state = updated(state, time_ns=time_ns, condition=condition, begun_ns=begun)
         if state.mode not in ('damped', 'recovering'):
             fall, sign = self._detector.step(
                 state.fall, condition, time_ns, state.mode in BALANCED
             )
-            state = replace(state, fall=fall)
+            state = updated(state, fall=fall)
             if sign:
                 return self._fallen(state, f'fell at {time_ns * 1e-9:.3f} s: {sign}')
         if state.mode == 'stopping':

@@ -22,6 +22,9 @@ from dmp_cpg_ros.core.hopf import AndronovHopf
 
 Array = NDArray[np.float64]
 
+MOST_KEPT = 64
+"""Sets of gains for which matrices are kept."""
+
 
 class CanonicalSystem:
     """Coupled oscillators: vector field, Jacobian and time step; the state stays with the caller.
@@ -67,6 +70,7 @@ class CanonicalSystem:
         self._growth_at_origin = self.rho * self.radius**2
         self._coupling = graph.coupling_matrix()
         self._steps: dict[tuple[bytes, float], ExponentialStep] = {}
+        self._linear: dict[bytes, tuple[Array, Array]] = {}
 
     def linear_part(self, gains: Array) -> tuple[Array, Array]:
         """Matrix and constant of −L x + α (x_d − x).
@@ -101,8 +105,14 @@ class CanonicalSystem:
         ndarray (N, 2)
             [1/s]
         """
-        M, c = self.linear_part(gains)
-        return (M @ x.ravel() + c + self._nonlinear(omega)(x.ravel())).reshape(x.shape)
+        key = gains.tobytes()
+        linear = self._linear.get(key)
+        if linear is None:
+            if len(self._linear) > MOST_KEPT:
+                self._linear.clear()
+            linear = self._linear[key] = self.linear_part(gains)
+        (M, c), state = linear, x.ravel()
+        return (M.dot(state) + c + self._nonlinear(omega)(state)).reshape(x.shape)
 
     def jacobian(self, x: Array, omega: float | Array, gains: Array) -> Array:
         """Jacobian of :meth:`field`.
@@ -138,7 +148,7 @@ class CanonicalSystem:
         key = (gains.tobytes(), dt)
         step = self._steps.get(key)
         if step is None:
-            if len(self._steps) > 64:
+            if len(self._steps) > MOST_KEPT:
                 self._steps.clear()
             step = self._steps[key] = ExponentialStep(*self.linear_part(gains), dt)
         return step(x.ravel(), self._nonlinear(omega)).reshape(x.shape)

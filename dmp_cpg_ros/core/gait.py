@@ -178,9 +178,9 @@ class Gait:
         """
         return omega
 
-    def own_omegas(self, omega: float) -> float | Array:
+    def own_omegas(self, omega: float) -> list[float]:
         """As :meth:`own_omega` for all legs [rad/s]."""
-        return omega
+        return [omega] * len(LEGS)
 
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω of the oscillators at a foot speed [rad/s].

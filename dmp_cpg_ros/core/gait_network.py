@@ -9,7 +9,7 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil
+from math import atan2, ceil, cos, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.hopf import AndronovHopf
 from dmp_cpg_ros.core.inhibition import Inhibition
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.core.phase import phase, state_at, wrapped
+from dmp_cpg_ros.core.phase import scalar_phase, state_at
 from dmp_cpg_ros.core.robot_state import LEGS
 
 Array = NDArray[np.float64]
@@ -148,9 +148,7 @@ class GaitNetwork:
 
     def omega(self, r: Array) -> float:
         """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""
-        return self.gait.omega(
-            self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2])), self.scale
-        )
+        return self.gait.omega(self.scale.foot_speed(*r.tolist()), self.scale)
 
     def step(
         self,
@@ -239,6 +237,10 @@ class GaitNetwork:
         """Deviation of each leg's phase from its place, relative to the circular mean, ndarray
         (4,) [rad].
         """
-        relative = phase(x) - self.gait.phases
-        mean = np.arctan2(np.sin(relative).sum(), np.cos(relative).sum())
-        return wrapped(relative - mean)
+        places = self.gait.phases.tolist()
+        relative = [
+            scalar_phase(x_1, x_2) - place
+            for (x_1, x_2), place in zip(x.tolist(), places, strict=True)
+        ]
+        mean = atan2(sum(map(sin, relative)), sum(map(cos, relative)))
+        return np.array([(angle - mean + pi) % (2.0 * pi) - pi for angle in relative])

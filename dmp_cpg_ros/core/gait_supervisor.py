@@ -12,7 +12,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,10 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.ballot import NO_VOTES, Ballot
 from dmp_cpg_ros.core.gait_network import GaitNetwork
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
-from dmp_cpg_ros.core.phase import phase_rate
+from dmp_cpg_ros.core.phase import scalar_phase_rates
 from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.swing_activity import activity_step
+from dmp_cpg_ros.core.swing_activity import activities_step
+from dmp_cpg_ros.core.updated import updated
 from dmp_cpg_ros.core.voting_parameters import SUM
 
 Array = NDArray[np.float64]
@@ -145,14 +147,15 @@ class GaitSupervisor:
         Votes that do not stop the gait act weakly while it walks. In a stop the larger acts on
         each leg of what was asked for and what was voted, once the reference is slow.
         """
-        gains = np.zeros(len(state.activity))
-        if not state.requested:
-            gains = state.ballot.gains
-        elif state.armed:
-            gains = self.parameters.armed_gains if state.asked else gains
-            gains = np.maximum(gains, state.vote_gains) if state.voted else gains
+        gains = self._gains(state, state.armed)
         at_rest = state.word == 'at_rest'
         return Inhibition(state.requested, gains, self.parameters.region_radius, at_rest)
+
+    def _gains(self, state: SupervisorState, armed: bool) -> Array:
+        if not state.requested:
+            return state.ballot.gains
+        gains = self.parameters.armed_gains if armed and state.asked else np.zeros(len(LEGS))
+        return np.maximum(gains, state.vote_gains) if armed and state.voted else gains
 
     def request(
         self, state: SupervisorState, stop: bool, automatic: bool = False
@@ -163,7 +166,7 @@ class GaitSupervisor:
         A service call that asks for a start ends a stop by votes too, once nobody votes any more.
         """
         voted = state.voted and (stop or automatic or state.ballot.alive)
-        return self._turned(replace(state, asked=stop, automatic=automatic, voted=voted))
+        return self._turned(updated(state, asked=stop, automatic=automatic, voted=voted))
 
     def step(
         self,
@@ -200,18 +203,22 @@ class GaitSupervisor:
         SupervisorState
         """
         dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
-        gait, rates = self.network.gait, phase_rate(x, x_dot)
-        own = gait.own_omegas(self.network.omega(r))
-        activity = activity_step(
-            state.activity, rates + gait.rest_rate, own, self.activity_rate, dt
+        gait, rates = self.network.gait, scalar_phase_rates(x, x_dot)
+        speed = self.network.scale.foot_speed(*r.tolist())
+        omega, more = gait.omega(speed, self.network.scale), gait.rest_rate
+        activity = activities_step(
+            state.activity,
+            [rate + more for rate in rates],
+            gait.own_omegas(omega),
+            self.activity_rate,
+            dt,
         )
-        state = replace(state, time_ns=time_ns, activity=activity)
+        state = updated(state, time_ns=time_ns, activity=activity)
         if body_mode == 'standing':
             state = self._automatic(state, command)
         else:
             state = self._barred(state, body_mode)
         state = self._voted(state, ballot or state.ballot)
-        speed = self.network.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
         if state.requested:
             return self._stopping(state, x, rates, speed)
         return self._running(state, x, speed)
@@ -225,10 +232,10 @@ class GaitSupervisor:
         if not self.parameters.auto_inhibit:
             return state
         if any(command):
-            state = replace(state, idle_ns=-1)
+            state = updated(state, idle_ns=-1)
             return self.request(state, False, True) if state.asked and state.automatic else state
         if state.idle_ns < 0:
-            state = replace(state, idle_ns=state.time_ns)
+            state = updated(state, idle_ns=state.time_ns)
         waited = (state.time_ns - state.idle_ns) * 1e-9
         if not state.asked and waited >= self.parameters.auto_delay:
             return self.request(state, True, True)
@@ -237,15 +244,15 @@ class GaitSupervisor:
     def _voted(self, state: SupervisorState, ballot: Ballot) -> SupervisorState:
         """Stop when votes overcome the threshold; keep what holds until it is released."""
         if ballot is not state.ballot:
-            state = replace(state, ballot=ballot)
+            state = updated(state, ballot=ballot)
         if ballot.stops and not state.voted:
-            return self._turned(replace(state, voted=True, vote_gains=ballot.gains))
+            return self._turned(updated(state, voted=True, vote_gains=ballot.gains))
         if not state.voted:
             return state
         if not ballot.alive and self.parameters.vote_resume:
-            return self._turned(replace(state, voted=False))
+            return self._turned(updated(state, voted=False))
         if self.parameters.vote_rule == SUM and np.any(ballot.gains > state.vote_gains):
-            return replace(state, vote_gains=np.maximum(ballot.gains, state.vote_gains))
+            return updated(state, vote_gains=np.maximum(ballot.gains, state.vote_gains))
         return state
 
     @staticmethod
@@ -254,7 +261,7 @@ class GaitSupervisor:
         stop = state.asked or state.voted
         if stop == state.requested:
             return state
-        return replace(
+        return updated(
             state,
             word='waiting' if stop else 'releasing',
             requested=stop,
@@ -269,33 +276,35 @@ class GaitSupervisor:
         automatic = body_mode not in FALLEN_MODES
         if not state.asked:
             return self.request(state, True, automatic)
-        return replace(state, automatic=state.automatic and automatic, idle_ns=-1)
+        return updated(state, automatic=state.automatic and automatic, idle_ns=-1)
 
     def _stopping(
-        self, state: SupervisorState, x: Array, rates: Array, speed: float
+        self, state: SupervisorState, x: Array, rates: list[float], speed: float
     ) -> SupervisorState:
         armed = state.armed or speed <= self.parameters.capture_speed
-        inhibition = self.inhibition(replace(state, armed=armed))
-        if not np.any(inhibition.acting_gains(x, self.network.target)):
-            return replace(state, armed=armed, word='waiting')
+        inhibition = Inhibition(True, self._gains(state, armed), self.parameters.region_radius)
+        if not any(inhibition.acting_gains(x, self.network.target).tolist()):
+            return updated(state, armed=armed, word='waiting')
         if (
-            np.abs(rates).max() > REST_PHASE_RATE
+            max(map(abs, rates)) > REST_PHASE_RATE
             or speed > REST_SPEED
-            or state.activity.max() > REST_ACTIVITY
+            or max(state.activity.tolist()) > REST_ACTIVITY
         ):
-            return replace(state, armed=armed, word='captured')
-        return replace(state, armed=armed, word='at_rest', measured_s=self._measured(state))
+            return updated(state, armed=armed, word='captured')
+        return updated(state, armed=armed, word='at_rest', measured_s=self._measured(state))
 
     def _running(self, state: SupervisorState, x: Array, speed: float) -> SupervisorState:
-        locked = np.abs(self.network.phase_errors(x)).max() <= LOCKED_PHASE_ERROR
-        if state.word == 'releasing' and not (locked and state.activity.min() >= LOCKED_ACTIVITY):
+        errors = self.network.phase_errors(x).tolist()
+        locked = max(map(abs, errors)) <= LOCKED_PHASE_ERROR
+        swinging = min(state.activity.tolist())
+        if state.word == 'releasing' and not (locked and swinging >= LOCKED_ACTIVITY):
             return state
         word = 'walking' if locked and speed > REST_SPEED else 'free'
-        return replace(state, word=word, measured_s=self._measured(state))
+        return updated(state, word=word, measured_s=self._measured(state))
 
     @staticmethod
     def _measured(state: SupervisorState) -> float:
         """Time from the request to now, kept once it has been set [s]."""
-        if np.isfinite(state.measured_s):
+        if isfinite(state.measured_s):
             return state.measured_s
         return (state.time_ns - state.request_ns) * 1e-9

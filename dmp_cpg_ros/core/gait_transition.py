@@ -204,9 +204,9 @@ class BlendedGait:
         """Frequency with which one leg goes through its cycle when the gait's is ω [rad/s]."""
         return omega + self.turning * float(self.transition.arcs[leg])
 
-    def own_omegas(self, omega: float) -> Array:
-        """As :meth:`own_omega` of all legs, ndarray (4,) [rad/s]."""
-        return omega + self.turning * self.transition.arcs
+    def own_omegas(self, omega: float) -> list[float]:
+        """As :meth:`own_omega` of all legs [rad/s]."""
+        return [omega + self.turning * arc for arc in self.transition.arcs.tolist()]
 
     def scalar_cycle_position(self, phi: float) -> float:
         """As :meth:`cycle_position` for one leg, without arrays."""

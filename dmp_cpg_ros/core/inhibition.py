@@ -7,6 +7,7 @@ are (paper, Section 5).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ class InhibitionParameters(VotingParameters):
                 f'{", ".join(LEGS)}, none twice'
             )
 
-    @property
+    @cached_property
     def armed_gains(self) -> Array:
         """Gains α_i of the four legs when inhibition is armed, ndarray (4,) [1/s]."""
         return np.array(
@@ -106,6 +107,8 @@ class Inhibition:
         -------
         ndarray (N,)
         """
+        if not any(self.gains.tolist()):
+            return self.gains
         error = x - target
         inside = error[:, 0] * error[:, 0] + error[:, 1] * error[:, 1] <= self.region_radius**2
         return np.where(inside, self.gains, 0.0)

@@ -20,8 +20,8 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.triples import Matrix, Triple, cross, times, triple
 
 Array = NDArray[np.float64]
@@ -53,11 +53,13 @@ class LegOdometry:
     ----------
     description : RobotDescription
         The robot.
+    legs : RobotLegs, optional
+        Its legs, where others ask them too.
     """
 
-    def __init__(self, description: RobotDescription) -> None:
+    def __init__(self, description: RobotDescription, legs: RobotLegs | None = None) -> None:
         """Build the legs."""
-        self.kinematics = [LegKinematics(leg) for leg in description.legs]
+        self.legs = legs or RobotLegs(description)
         self._signs = [triple(leg.axis_sign.tolist()) for leg in description.legs]
         self._radius = [leg.foot_radius for leg in description.legs]
 
@@ -79,11 +81,10 @@ class LegOdometry:
         """
         n_x, n_y, n_z = normal_in_base
         contacts, velocities, jacobians = [], [], []
-        for i, (leg, sign, radius) in enumerate(
-            zip(self.kinematics, self._signs, self._radius, strict=True)
+        for i, (((x, y, z), J), sign, radius) in enumerate(
+            zip(self.legs.at(q), self._signs, self._radius, strict=True)
         ):
             angles, rates = q[3 * i : 3 * i + 3], triple(q_dot[3 * i : 3 * i + 3])
-            (x, y, z), J = leg.foot_and_jacobian(angles)
             down = (radius * n_x, radius * n_y, radius * n_z)
             rolling, moving = cross(shank_rate(sign, angles, rates), down), times(J, rates)
             contacts.append((x - down[0], y - down[1], z - down[2]))

@@ -82,6 +82,14 @@ def scalar_phase_rate(x_1: float, x_2: float, x_1_dot: float, x_2_dot: float) ->
     return (x_2 * x_1_dot - x_1 * x_2_dot) / squared if squared > 0.0 else 0.0
 
 
+def scalar_phase_rates(x: Array, x_dot: Array) -> list[float]:
+    """As :func:`phase_rate` of a few states (N, 2), without arithmetic on arrays."""
+    return [
+        scalar_phase_rate(x_1, x_2, x_1_dot, x_2_dot)
+        for (x_1, x_2), (x_1_dot, x_2_dot) in zip(x.tolist(), x_dot.tolist(), strict=True)
+    ]
+
+
 def phase_rotation(phi: float) -> Array:
     """Matrix R(φ) that advances the phase of a state by φ: ``phase(R x) = phase(x) + φ``.
 

@@ -21,15 +21,15 @@ from dmp_cpg_ros.core.force_distribution import distribute
 from dmp_cpg_ros.core.gait import GRAVITY
 from dmp_cpg_ros.core.gait_transition import GaitInForce
 from dmp_cpg_ros.core.ground_frame import ground_from_base, lean
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.leg_primitive import LegFeedback, body_scale, nominal_foothold
-from dmp_cpg_ros.core.phase import phase, phase_rate
+from dmp_cpg_ros.core.phase import phase, scalar_phase_rates
 from dmp_cpg_ros.core.posture_parameters import PostureParameters
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.speed_keeping import SpeedKeeping
 from dmp_cpg_ros.core.stance_load import planned_load
-from dmp_cpg_ros.core.swing_activity import activity_step
+from dmp_cpg_ros.core.swing_activity import activities_step
 from dmp_cpg_ros.core.virtual_model import BodyMotion, VirtualModel
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
@@ -101,14 +101,18 @@ class PostureController:
         The gait in force; the attribute is set when it changes.
     parameters : PostureParameters
         Gains; the attribute is set when they change.
+    legs : RobotLegs, optional
+        The robot's legs, where others ask them too.
     """
 
     def __init__(
-        self, description: RobotDescription, gait: GaitInForce, parameters: PostureParameters
+        self, description: RobotDescription, gait: GaitInForce, parameters: PostureParameters,
+        legs: RobotLegs | None = None,
     ) -> None:
         """Scale all parts by the robot's lengths, mass and inertia."""
         self.description, self.gait, self.parameters = description, gait, parameters
-        self.kinematics = [LegKinematics(leg) for leg in description.legs]
+        self.legs = legs or RobotLegs(description)
+        self.kinematics = self.legs.kinematics
         self.scale = body_scale(description)
         footholds = np.array([nominal_foothold(description, leg.name) for leg in description.legs])
         self.model = VirtualModel(description, self.scale.leg_length)
@@ -152,8 +156,8 @@ class PostureController:
         speed = self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
         gait = self.gait
         omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
-        rates = phase_rate(x, x_dot) + gait.rest_rate
-        activity = activity_step(
+        rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
+        activity = activities_step(
             memory.activity, rates, gait.own_omegas(omega), p.activity_rate, dt)
         load = planned_load(gait.cycle_position(phase(x)), duty, activity, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
@@ -179,9 +183,8 @@ class PostureController:
 
     def _torque(self, state: RobotState, body: BodyMotion, load: Array, r: Array) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
-        q = state.joint_position.reshape(4, 3).tolist()
-        feet_in_base = np.array(
-            [leg.foot_in_base(angles) for leg, angles in zip(self.kinematics, q, strict=True)])
+        legs = self.legs.at(state.joint_position.tolist())
+        feet_in_base = np.array([foot for foot, _ in legs])
         # from the centre of mass, in the frame of the ground
         feet = (feet_in_base - self.description.com_in_base) @ body.R_ground_base.T
         total = float(load.sum())
@@ -190,7 +193,6 @@ class PostureController:
         forces = distribute(
             self.model.wrench(self.parameters, body, r), feet, load, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self.importance)
-        J = np.array(
-            [leg.jacobian_in_base(angles) for leg, angles in zip(self.kinematics, q, strict=True)])
+        J = np.array([jacobian for _, jacobian in legs])
         torque = -np.einsum('lij,li->lj', J, forces @ body.R_ground_base)
         return np.clip(torque, -self.torque_limit, self.torque_limit).ravel()

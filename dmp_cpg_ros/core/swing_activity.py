@@ -11,31 +11,24 @@ first-order filter as the paper uses for amplitudes.
 from __future__ import annotations
 
 from math import exp
-from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-ActivityT = TypeVar('ActivityT', float, NDArray[np.float64])
-
 
 def activity_step(
-    activity: ActivityT,
-    phase_rate: ActivityT,
-    omega: float | NDArray[np.float64],
-    rate: float,
-    dt: float,
-) -> ActivityT:
+    activity: float, phase_rate: float, omega: float, rate: float, dt: float
+) -> float:
     """Advance ȧ = rate · (sat(φ̇/ω) − a) exactly for a held phase rate.
 
     Parameters
     ----------
-    activity : float or ndarray (...)
+    activity : float
         a in [0, 1].
-    phase_rate : float or ndarray (...)
+    phase_rate : float
         φ̇ [rad/s].
-    omega : float or ndarray (...)
-        Free-running ω > 0 [rad/s], of all or of each.
+    omega : float
+        Free-running ω > 0 [rad/s].
     rate : float
         Rate of the filter [1/s].
     dt : float
@@ -43,11 +36,22 @@ def activity_step(
 
     Returns
     -------
-    float or ndarray (...)
+    float
     """
-    wanted: Any = (
-        min(max(phase_rate / omega, 0.0), 1.0)
-        if isinstance(phase_rate, float)
-        else np.minimum(np.maximum(phase_rate / omega, 0.0), 1.0)
-    )
+    wanted = min(max(phase_rate / omega, 0.0), 1.0)
     return wanted + (activity - wanted) * exp(-rate * dt)
+
+
+def activities_step(
+    activities: NDArray[np.float64],
+    phase_rates: list[float],
+    omegas: list[float],
+    rate: float,
+    dt: float,
+) -> NDArray[np.float64]:
+    """As :func:`activity_step` for a few legs, (n,), without arithmetic on arrays."""
+    return np.array([
+        activity_step(activity, phase_rate, omega, rate, dt)
+        for activity, phase_rate, omega in zip(
+            activities.tolist(), phase_rates, omegas, strict=True)
+    ])

@@ -8,7 +8,7 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,12 +37,14 @@ from dmp_cpg_ros.core.posture import PostureController, PostureFeedback
 from dmp_cpg_ros.core.posture_motion import LegMotion, MotionState
 from dmp_cpg_ros.core.reference import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.robot_state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.running_network import RunningNetwork
 from dmp_cpg_ros.core.sensor_readings import readings_of
 from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation import TransformationState
+from dmp_cpg_ros.core.updated import updated
 from dmp_cpg_ros.core.vote_counter import VoteCounter
 from dmp_cpg_ros.core.voting_sensors import vote_sensors
 
@@ -117,8 +119,9 @@ class WalkingLoop:
         self.votes = VoteCounter(
             p.inhibition, p.votes, self.network, p.reference, description.mass
         )
-        self.posture = PostureController(description, self.network.gait, p.posture)
-        self.body = BodyControl(description, p.mode)
+        known_legs = RobotLegs(description)
+        self.posture = PostureController(description, self.network.gait, p.posture, known_legs)
+        self.body = BodyControl(description, p.mode, known_legs)
         self.legs = [LegPrimitive(leg, description, self.network.gait, p.leg) for leg in LEGS]
         self.motions = [
             LegMotion(slice(3 * i, 3 * i + 3), self.body.modes.movements, leg.transformation)
@@ -130,7 +133,7 @@ class WalkingLoop:
         self.x = initial_canonical_state(self.network, p.inhibition)
         self.posture_state = self.posture.initial_state()
         self.estimator = (
-            BodyEstimator(description, p.estimation)
+            BodyEstimator(description, p.estimation, known_legs)
             if p.state_source.state_source == ESTIMATE
             else None
         )
@@ -144,6 +147,7 @@ class WalkingLoop:
         self.motion_states: list[MotionState | None] = [None] * len(LEGS)
         self._time_ns: int | None = None
         self._dt = 0.004
+        self._body_command = BodyCommand()
 
     def command(self, v_x: float, v_y: float = 0.0, gamma: float = 0.0) -> None:
         """Command a velocity; acts from the next tick on. Raises DataError for values that are
@@ -290,7 +294,7 @@ class WalkingLoop:
         self._time_ns, self._dt = state.time_ns, dt or self._dt
         command = self.gate.at(state.time_ns)
         inhibition = self.inhibition
-        r_ext = np.zeros(3) if inhibition.requested else np.array(command)
+        r_ext = np.array((0.0, 0.0, 0.0) if inhibition.requested else command)
         self.r = self.reference.step(self.r, r_ext, dt)
         self.x = self._running.begin_tick(self.x, self.r, inhibition, dt)
         self._follow(self._running.network)
@@ -307,7 +311,9 @@ class WalkingLoop:
             self.stop, state.time_ns, self.x, x_dot, self.r, command, ballot, self.barring
         )
         self.inhibition = self.supervisor.inhibition(self.stop)
-        body = BodyCommand.from_text(feedback.mode)
+        if feedback.mode != self._body_command.text:
+            self._body_command = BodyCommand.from_text(feedback.mode)
+        body = self._body_command
         targets = [
             self._leg(i, state, x_dot, feedback, dt)
             if body.balanced
@@ -322,10 +328,9 @@ class WalkingLoop:
             self.stop,
             feedback,
             JointTargets(
-                *(
-                    np.concatenate([getattr(target, name) for target in targets])
-                    for name in ('position', 'velocity', 'effort')
-                )
+                np.concatenate([target.position for target in targets]),
+                np.concatenate([target.velocity for target in targets]),
+                np.concatenate([target.effort for target in targets]),
             ),
             self.mode,
             self._running.word,
@@ -355,7 +360,7 @@ class WalkingLoop:
     def _body(self, state: RobotState) -> RobotState:
         """State of the robot as the posture controller is to know it."""
         if self.estimator is None:
-            return replace(state, foot_force=np.zeros(len(LEGS)))  # as odom, which has none
+            return updated(state, foot_force=np.zeros(len(LEGS)))  # as odom, which has none
         readings = readings_of(state)
         self.estimator_state, estimate = self.estimator.step(self.estimator_state, readings)
         return estimated_state(readings, estimate)

@@ -18,6 +18,7 @@ from dmp_cpg_ros.core.estimation_parameters import (
     StateSourceParameters,
 )
 from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.robot_state import LEGS, RobotState
 from dmp_cpg_ros.core.rotations import roll_pitch_yaw
 from dmp_cpg_ros.core.sensor_readings import SensorReadings
@@ -46,6 +47,8 @@ class BodyState:
         The node that needs the state; its parameters choose where it comes from.
     description : RobotDescription
         The robot.
+    legs : RobotLegs, optional
+        Its legs, where others ask them too.
 
     Attributes
     ----------
@@ -59,7 +62,9 @@ class BodyState:
         The last one.
     """
 
-    def __init__(self, node: ManagedNode, description: RobotDescription) -> None:
+    def __init__(
+        self, node: ManagedNode, description: RobotDescription, legs: RobotLegs | None = None
+    ) -> None:
         """Build the estimator, where there is one, and its publisher."""
         self._node = node
         source = node.parameters_of(StateSourceParameters).state_source
@@ -75,7 +80,8 @@ class BodyState:
         self.optional = BODY_TOPICS[ESTIMATE]
         contacts = FootContactsReader(strict=False)
         self.readers |= {'imu': _stamped(read_imu), 'foot_contacts': _stamped(contacts.read)}
-        self._estimator = BodyEstimator(description, node.parameters_of(EstimationParameters))
+        self._estimator = BodyEstimator(
+            description, node.parameters_of(EstimationParameters), legs)
         self._writer, self._publisher = (
             EstimatedOdometryWriter(),
             node.publisher('estimated_odom'),

@@ -14,6 +14,7 @@ from dmp_cpg_ros.core.body_requests import REQUESTS
 from dmp_cpg_ros.core.estimation_parameters import EstimationParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters
 from dmp_cpg_ros.core.posture import PostureController, PostureParameters
+from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.nodes.body_mode_messages import BodyModeWriter
 from dmp_cpg_ros.nodes.body_state import BodyState
@@ -46,12 +47,13 @@ class PostureControl(ManagedNode):
         """Build the controller and its topics."""
         gaits, canonical = gait_reader(self), CanonicalStateReader()
         description = description_of(self)
+        legs = RobotLegs(description)
         self._controller = PostureController(
-            description, gaits.read(''), self.parameters_of(PostureParameters)
+            description, gaits.read(''), self.parameters_of(PostureParameters), legs
         )
-        self._body = BodyState(self, description)
+        self._body = BodyState(self, description, legs)
         self._memory, self._last_ns = self._controller.initial_state(), -1
-        self._modes = BodyControl(description, self.parameters_of(ModeParameters))
+        self._modes = BodyControl(description, self.parameters_of(ModeParameters), legs)
         self._mode, self._told = self._modes.initial_state(), ''
         self._mode_writer, self._mode_publisher = BodyModeWriter(), self.publisher('body_mode')
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
