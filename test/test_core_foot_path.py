@@ -47,7 +47,7 @@ def test_slope_against_differences(path: FootPath, c: float) -> None:
     h = 1e-7
     if abs(abs(c) - 0.5 * (1.0 - path.duty)) < 2.0 * h:
         return
-    expected = (path.at(c + h)[0] - path.at(c - h)[0]) / (2.0 * h)
+    expected = np.subtract(path.at(c + h)[0], path.at(c - h)[0]) / (2.0 * h)
     assert np.allclose(path.at(c)[1], expected, atol=1e-4)
 
 
@@ -88,7 +88,7 @@ def test_the_foot_is_on_the_ground_in_stance_and_above_it_in_swing(
 def test_stance_is_centred_on_the_foothold_when_going_straight(path: FootPath) -> None:
     straight = FootPath(path.foothold_in_base, path.v_x, path.v_y, 0.0, path.omega, path.duty, 0.0)
     half = 0.5 * (1.0 - path.duty)
-    middle = 0.5 * (straight.at(half)[0] + straight.at(-half)[0])
+    middle = 0.5 * np.add(straight.at(half)[0], straight.at(-half)[0])
     assert np.allclose(middle, path.foothold_in_base)
 
 

@@ -22,7 +22,7 @@ vectors = st.tuples(lengths, lengths, lengths).map(np.array)
 @given(shift=vectors, wanted=vectors, height=st.floats(0.0, 1.0), dt=st.floats(1e-4, 0.1))
 def test_a_swinging_foot_comes_nearer_and_does_not_overshoot(
         shift: np.ndarray, wanted: np.ndarray, height: float, dt: float) -> None:
-    after = shift + dt * RATES.in_swing(shift, wanted, height, 1.0, dt)
+    after = shift + dt * np.array(RATES.in_swing(shift, wanted, height, 1.0, dt))
     assert np.all(np.abs(after - wanted) <= np.abs(shift - wanted) + 1e-12)
     assert np.all((after - wanted) * (shift - wanted) >= -1e-12)
 
@@ -30,14 +30,14 @@ def test_a_swinging_foot_comes_nearer_and_does_not_overshoot(
 @given(shift=vectors, wanted=vectors)
 def test_a_foot_on_the_ground_is_not_dragged_to_its_placement(
         shift: np.ndarray, wanted: np.ndarray) -> None:
-    assert not RATES.in_swing(shift, wanted, 0.0, 1.0, TICK).any()
+    assert not any(RATES.in_swing(shift, wanted, 0.0, 1.0, TICK))
 
 
 @given(shift=vectors, away=vectors)
 def test_at_rest_a_foot_holds_its_place_and_returns_to_level(
         shift: np.ndarray, away: np.ndarray) -> None:
-    rate = RATES.in_stance(shift, np.zeros(2), away, 0.0, TICK)
-    assert not rate[:2].any()
+    rate = RATES.in_stance(shift, (0.0, 0.0), away[:2], 0.0, TICK)
+    assert not any(rate[:2])
     assert abs(shift[2] + TICK * rate[2]) <= abs(shift[2])
 
 

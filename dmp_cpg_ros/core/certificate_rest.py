@@ -62,6 +62,6 @@ def rest_inequalities(network: GaitNetwork, leg: LegParameters,
 def _heights(network: GaitNetwork, leg: LegParameters, rest: InhibitedEquilibrium) -> list[float]:
     """Heights of the feet at rest, as fractions of the standing height."""
     duty = network.gait.duty(0.0, network.scale)
-    path = FootPath(np.zeros(3), 0.0, 0.0, 0.0, 1.0, duty, leg.clearance * REST_ACTIVITY)
+    path = FootPath((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 1.0, duty, leg.clearance * REST_ACTIVITY)
     positions = network.gait.cycle_position(phase(rest.state))
     return [float(path.at(float(position))[0][2]) for position in positions]

@@ -11,6 +11,7 @@ both ends, lifted by :func:`swing_height`. The whole path is C¹ in the phase.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, sin
 
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
+from dmp_cpg_ros.core.triples import Triple
 
 Array = NDArray[np.float64]
 
@@ -33,7 +35,7 @@ class FootPath:
 
     Attributes
     ----------
-    foothold_in_base : ndarray (3,)
+    foothold_in_base : sequence of three floats
         Where the foot is at mid-stance [m].
     v_x, v_y, gamma : float
         Reference velocity of the base [m/s], [rad/s].
@@ -47,7 +49,7 @@ class FootPath:
         Share of the stance displacement, along x and y, that the foot's centre makes.
     """
 
-    foothold_in_base: Array
+    foothold_in_base: Sequence[float]
     v_x: float
     v_y: float
     gamma: float
@@ -56,7 +58,7 @@ class FootPath:
     clearance: float
     rolling: tuple[float, float] = (1.0, 1.0)
 
-    def at(self, cycle_position: float) -> tuple[Array, Array]:
+    def at(self, cycle_position: float) -> tuple[Triple, Triple]:
         """Foot position and its derivative with respect to the cycle position.
 
         Parameters
@@ -66,19 +68,19 @@ class FootPath:
 
         Returns
         -------
-        position_in_base : ndarray (3,)
+        position_in_base : tuple of float
             [m]
-        slope : ndarray (3,)
+        slope : tuple of float
             ∂p/∂c [m per cycle]; the velocity is slope · φ̇ / 2π.
         """
         period, swing = 6.283185307179586 / self.omega, 1.0 - self.duty
-        height = float(self.foothold_in_base[2])
+        height = self.foothold_in_base[2]
         if abs(cycle_position) >= 0.5 * swing:
             from_mid_stance = (
                 cycle_position - 0.5 if cycle_position > 0.0 else cycle_position + 0.5
             )
             x, y, x_dot, y_dot = self._stance(from_mid_stance * period)
-            return (np.array((x, y, height)), np.array((x_dot * period, y_dot * period, 0.0)))
+            return (x, y, height), (x_dot * period, y_dot * period, 0.0)
         half_stance = 0.5 * self.duty * period
         x0, y0, dx0, dy0 = self._stance(half_stance)
         x1, y1, dx1, dy1 = self._stance(-half_stance)
@@ -87,8 +89,8 @@ class FootPath:
         y, y_slope = _hermite(s, y0, y1, dy0 * scale, dy1 * scale)
         bump, bump_slope = swing_height(s)
         return (
-            np.array((x, y, height + self.clearance * bump)),
-            np.array((x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing)),
+            (x, y, height + self.clearance * bump),
+            (x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing),
         )
 
     def _stance(self, t: float) -> tuple[float, float, float, float]:
@@ -99,7 +101,7 @@ class FootPath:
             along, across = s / self.gamma, (1.0 - c) / self.gamma
         else:
             along, across = t, 0.5 * angle * t
-        x0, y0, _ = self.foothold_in_base.tolist()
+        x0, y0, _ = self.foothold_in_base
         x = c * x0 + s * y0 - along * self.v_x - across * self.v_y
         y = c * y0 - s * x0 - along * self.v_y + across * self.v_x
         share_x, share_y = self.rolling

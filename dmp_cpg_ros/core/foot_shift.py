@@ -14,10 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import exp
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.triples import Triple
 
 
 @dataclass(frozen=True)
@@ -39,13 +36,13 @@ class ShiftRates:
     levelling: float
 
     def in_swing(
-        self, shift: Array, wanted: Array, height: float, activity: float, dt: float
-    ) -> Array:
+        self, shift: Triple, wanted: Triple, height: float, activity: float, dt: float
+    ) -> Triple:
         """Rate of the shift of a swinging foot.
 
         Parameters
         ----------
-        shift, wanted : ndarray (3,)
+        shift, wanted : tuple of float
             Present and wanted shift [m].
         height : float
             Height of the foot as a share of its largest, in [0, 1].
@@ -56,24 +53,27 @@ class ShiftRates:
 
         Returns
         -------
-        ndarray (3,)
+        tuple of float
             Mean over the step [m/s].
         """
-        return (wanted - shift) * ((1.0 - exp(-self.placement * activity * height * dt)) / dt)
+        share = (1.0 - exp(-self.placement * activity * height * dt)) / dt
+        (x, y, z), (wanted_x, wanted_y, wanted_z) = shift, wanted
+        return (wanted_x - x) * share, (wanted_y - y) * share, (wanted_z - z) * share
 
     def in_stance(
-        self, shift: Array, drift: Array, away: Array, activity: float, dt: float
-    ) -> Array:
+        self, shift: Triple, drift: tuple[float, float], away: tuple[float, float],
+        activity: float, dt: float,
+    ) -> Triple:
         """Rate of the shift of a standing foot.
 
         Parameters
         ----------
-        shift : ndarray (3,)
+        shift : tuple of float
             Present shift [m].
-        drift : ndarray (2,)
-            Velocity by which the ground moves otherwise than planned [m/s].
-        away : ndarray (3,)
-            Where the foot is relative to its target [m].
+        drift : tuple of float
+            Horizontal velocity by which the ground moves otherwise than planned [m/s].
+        away : tuple of float
+            Where the foot is horizontally relative to its target [m].
         activity : float
             Swing activity of the leg; at rest the foot holds.
         dt : float
@@ -81,10 +81,9 @@ class ShiftRates:
 
         Returns
         -------
-        ndarray (3,)
+        tuple of float
             Mean over the step [m/s].
         """
         share = activity * (1.0 - exp(-self.yielding * dt)) / dt
         back = (1.0 - exp(-self.levelling * dt)) / dt
-        return np.array((
-            drift[0] + share * away[0], drift[1] + share * away[1], -back * shift[2]))
+        return drift[0] + share * away[0], drift[1] + share * away[1], -back * shift[2]

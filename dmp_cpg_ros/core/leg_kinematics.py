@@ -69,8 +69,13 @@ class LegKinematics:
         ndarray (3,)
             In ``base_link`` [m].
         """
-        x, y, z, *_ = self._chain(q)
-        return np.array((self._hip[0] + x, self._hip[1] + y, self._hip[2] + z))
+        return np.array(self.foot(q))
+
+    def foot(self, q: Array | Sequence[float]) -> Triple:
+        """:meth:`foot_in_base` as a tuple."""
+        chain = self._chain(q)
+        hip_x, hip_y, hip_z = self._hip
+        return hip_x + chain[0], hip_y + chain[1], hip_z + chain[2]
 
     def jacobian_in_base(self, q: Array | Sequence[float]) -> Array:
         """Jacobian of :meth:`foot_in_base`.
@@ -115,7 +120,11 @@ class LegKinematics:
         ndarray (3,)
             Abduction, hip, knee [rad].
         """
-        px, py, pz = np.asarray(foot_in_base, dtype=float).tolist()
+        return np.array(self.angles(triple(np.asarray(foot_in_base, dtype=float).tolist())))
+
+    def angles(self, foot_in_base: Triple) -> Triple:
+        """:meth:`inverse` for and as a tuple."""
+        px, py, pz = foot_in_base
         px, py, pz = px - self._hip[0], py - self._hip[1], pz - self._hip[2]
         depth = -sqrt(max(py * py + pz * pz - self._lateral * self._lateral, 1e-8))
         q0 = atan2(pz, py) - atan2(depth, self._lateral)
@@ -129,7 +138,7 @@ class LegKinematics:
         hip = atan2(-x, -z) - atan2(b * sin(knee), a + b * cos(knee))
         q1 = hip - self._thigh_angle
         q2 = knee - self._shank_angle + self._thigh_angle
-        return np.array((self._s[0] * q0, self._s[1] * _wrapped(q1), self._s[2] * _wrapped(q2)))
+        return self._s[0] * q0, self._s[1] * _wrapped(q1), self._s[2] * _wrapped(q2)
 
     def _chain(self, q: Array | Sequence[float]) -> tuple[float, ...]:
         q0, q1, q2 = q.tolist() if isinstance(q, np.ndarray) else q

@@ -25,6 +25,7 @@ from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS, JointTargets
 from dmp_cpg_ros.core.swing_activity import activity_step
 from dmp_cpg_ros.core.transformation import TransformationState, TransformationSystem
+from dmp_cpg_ros.core.triples import Matrix, Triple, moved, pair, plus, triple
 
 Array = NDArray[np.float64]
 
@@ -143,6 +144,7 @@ class LegPrimitive:
         self.kinematics = LegKinematics(geometry)
         self.scale = body_scale(description)
         self.foothold_in_base = nominal_foothold(description, leg)
+        self._foothold = triple(self.foothold_in_base.tolist())
         self.rolling = rolling_share(self.kinematics, self.foothold_in_base)
         self.shift_rates = ShiftRates(
             parameters.placement_rate, parameters.yielding_rate, parameters.levelling_rate)
@@ -198,21 +200,21 @@ class LegPrimitive:
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
         swinging = abs(position) < 0.5 * (1.0 - duty)
+        shift = triple(state.shift_in_base.tolist())
         if dt <= 0.0:
-            shift_rate = np.zeros(3)
+            shift_rate = (0.0, 0.0, 0.0)
         elif swinging:
             height, _ = swing_height(position / (1.0 - duty) + 0.5)
             shift_rate = self.shift_rates.in_swing(
-                state.shift_in_base, feedback.shift_in_base, height, activity, dt)
+                shift, triple(feedback.shift_in_base.tolist()), height, activity, dt)
         else:
-            place = self.kinematics.foot_in_base
-            away = place(feedback.joint_position) - place(state.joints.position)
             shift_rate = self.shift_rates.in_stance(
-                state.shift_in_base, feedback.drift_in_base, away, activity, dt)
-        shift = state.shift_in_base + shift_rate * dt
+                shift, pair(feedback.drift_in_base.tolist()), self._away(state, feedback),
+                activity, dt)
+        shift = moved(shift, shift_rate, dt)
         more_x, more_y, more_gamma = feedback.correction.tolist()
         path = FootPath(
-            self.foothold_in_base,
+            self._foothold,
             v_x + more_x,
             v_y + more_y,
             gamma + more_gamma,
@@ -222,13 +224,18 @@ class LegPrimitive:
             self.rolling,
         )
         foot, slope = path.at(position)
-        velocity = slope * (rate / (2.0 * pi))
-        foot += shift
-        velocity += shift_rate
-        goal = self.kinematics.inverse(foot)
-        goal_velocity = _joint_velocity(self.kinematics.jacobian_in_base(goal), velocity)
+        foot, velocity = plus(foot, shift), moved(shift_rate, slope, rate / (2.0 * pi))
+        angles = self.kinematics.angles(foot)
+        _, jacobian = self.kinematics.foot_and_jacobian(angles)
+        goal, goal_velocity = np.array(angles), np.array(_joint_velocity(jacobian, velocity))
         joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
-        return LegState(joints, activity, shift), goal, goal_velocity
+        return LegState(joints, activity, np.array(shift)), goal, goal_velocity
+
+    def _away(self, state: LegState, feedback: LegFeedback) -> tuple[float, float]:
+        """Where the foot is horizontally relative to its target [m]."""
+        x, y, _ = self.kinematics.foot(feedback.joint_position)
+        target_x, target_y, _ = self.kinematics.foot(state.joints.position)
+        return x - target_x, y - target_y
 
     def targets(
         self,
@@ -287,17 +294,15 @@ def nominal_foothold(description: RobotDescription, leg: str) -> Array:
     return np.array((x, y, geometry.foot_radius - description.stance_height))
 
 
-def _joint_velocity(J: Array, velocity: Array) -> Array:
+def _joint_velocity(J: Matrix, velocity: Triple) -> Triple:
     """Solve J q̇ = v by Cramer's rule; damped near singular postures."""
-    (a, b, c), (d, e, f), (g, h, i) = J.tolist()
-    x, y, z = velocity.tolist()
+    (a, b, c), (d, e, f), (g, h, i) = J
+    x, y, z = velocity
     minor_0, minor_1, minor_2 = e * i - f * h, f * g - d * i, d * h - e * g
     determinant = a * minor_0 + b * minor_1 + c * minor_2
     inverse = determinant / (determinant * determinant + 1e-12)
-    return np.array(
-        (
-            (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
-            (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
-            (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse,
-        )
+    return (
+        (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
+        (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
+        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse,
     )

@@ -48,7 +48,7 @@ class TransformationSystem:
     def __init__(self, stiffness: float, damping: float, inertia: Array) -> None:
         """Keep the gains."""
         self.stiffness, self.damping, self.inertia = stiffness, damping, inertia
-        self._matrices: dict[float, Array] = {}
+        self._transitions: dict[float, tuple[float, float, float, float]] = {}
 
     def acceleration(
         self, position: Array, velocity: Array, goal: Array, goal_velocity: Array
@@ -76,16 +76,21 @@ class TransformationSystem:
         -------
         TransformationState
         """
-        matrix = self._matrices.get(dt)
-        if matrix is None:
+        transition = self._transitions.get(dt)
+        if transition is None:
             system = np.array([[0.0, 1.0], [-self.stiffness, -self.damping]])
-            self._matrices[dt] = matrix = phi_functions(system * dt, 1)[0]
-        error = state.position - (goal - goal_velocity * dt)
-        error_rate = state.velocity - goal_velocity
-        return TransformationState(
-            goal + matrix[0, 0] * error + matrix[0, 1] * error_rate,
-            goal_velocity + matrix[1, 0] * error + matrix[1, 1] * error_rate,
-        )
+            a, b, c, d = phi_functions(system * dt, 1)[0].ravel().tolist()
+            transition = self._transitions[dt] = (a, b, c, d)
+        a, b, c, d = transition
+        position, velocity = [], []
+        for theta, theta_dot, at, rate in zip(
+            state.position.tolist(), state.velocity.tolist(), goal.tolist(),
+            goal_velocity.tolist(), strict=True,
+        ):  # fmt: skip
+            error, error_rate = theta - (at - rate * dt), theta_dot - rate
+            position.append(at + a * error + b * error_rate)
+            velocity.append(rate + c * error + d * error_rate)
+        return TransformationState(np.array(position), np.array(velocity))
 
     def torque(self, acceleration: Array, feedback: Array) -> Array:
         """τ = J θ̈ + τ_fb [N m], ndarray (n,)."""

@@ -22,6 +22,22 @@ def triple(values: Sequence[float]) -> Triple:
     return x, y, z
 
 
+def pair(values: Sequence[float]) -> tuple[float, float]:
+    """As :func:`triple` for two numbers."""
+    x, y = values
+    return x, y
+
+
+def plus(a: Triple, b: Triple) -> Triple:
+    """Sum a + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def moved(a: Triple, rate: Triple, time: float) -> Triple:
+    """Where a is after a time: a + rate · time."""
+    return a[0] + rate[0] * time, a[1] + rate[1] * time, a[2] + rate[2] * time
+
+
 def dot(a: Triple, b: Triple) -> float:
     """Scalar product a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
