@@ -12,7 +12,9 @@ oscillators that is not in the model.
 
 from __future__ import annotations
 
+from cmath import phase as angle
 from dataclasses import dataclass
+from itertools import combinations
 from math import asin, exp, inf, pi, sqrt
 
 import numpy as np
@@ -22,7 +24,6 @@ from dmp_cpg_ros.core.certificate_network import EXPECTED_MISMATCH
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
 from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.phase import phase
 
 Array = NDArray[np.float64]
 
@@ -74,6 +75,9 @@ class PhaseLockWatch:
         """Start with no network."""
         self._parameters: CanonicalParameters | None = None
         self._found: Synchronisation | None = None
+        self._weights: list[float] = []
+        self._places: list[float] = []
+        self._turns: list[complex] = []
 
     def step(self, before: PhaseLock | None, network: GaitNetwork, r: Array, x: Array, free: bool,
              dt: float, contact: float = 0.0) -> PhaseLock:
@@ -101,18 +105,20 @@ class PhaseLockWatch:
         PhaseLock
         """
         found, places = self._synchronisation(network), network.gait.phases
-        z = np.hypot(x[:, 0], x[:, 1]) * np.exp(1j * (phase(x) - places))
-        weights = found.weights if found.synchronises else None
-        if weights is None:
-            return PhaseLock(_spread(z), pi, LOCKED, inf, places)
-        mean = complex(weights @ z)
-        epsilon = sqrt(float(weights @ np.abs(z - mean) ** 2))
+        z = [complex(x_1, -x_2) * turn
+             for (x_1, x_2), turn in zip(x.tolist(), self._into_places(places), strict=True)]
         error = _spread(z)
+        if found.weights is None or not found.synchronises:
+            return PhaseLock(error, pi, LOCKED, inf, places)
+        weights = self._weights
+        mean = sum(weight * each for weight, each in zip(weights, z, strict=True))
+        epsilon = sqrt(sum(weight * abs(each - mean) ** 2
+                           for weight, each in zip(weights, z, strict=True)))
         if before is None or not free:
             return PhaseLock(error, pi, LOCKED, epsilon, places)
-        size = max(network.parameters.radius, float(np.abs(z).max()))
+        size = max(network.parameters.radius, *map(abs, z))
         steady = (EXPECTED_MISMATCH * network.omega(r) + contact) * size / found.rate
-        moved = np.abs(_centred(places - before.places)).max() * size
+        moved = _moved(places - before.places) * size
         fade = exp(-found.rate * dt)
         envelope = max(steady, before.envelope * fade + (1.0 - fade) * steady) + moved
         if before.envelope == inf:
@@ -124,11 +130,20 @@ class PhaseLockWatch:
     def _synchronisation(self, network: GaitNetwork) -> Synchronisation:
         """Theorem 4 for the network's parameters; places make no difference to it."""
         p = network.parameters
-        if self._found is None or p != self._parameters:
-            self._parameters = p
+        if self._found is None or (p is not self._parameters and p != self._parameters):
             self._found = synchronisation(network.system.graph,
                                           float(growth(p.rho, p.radius)))
+            weights = self._found.weights
+            self._weights = [] if weights is None else weights.tolist()
+        self._parameters = p
         return self._found
+
+    def _into_places(self, places: Array) -> list[complex]:
+        """Rotations R(−φ_i) into the places' own frames, as complex numbers."""
+        listed = places.tolist()
+        if listed != self._places:
+            self._places, self._turns = listed, np.exp(-1j * places).tolist()
+        return self._turns
 
 
 def _judged(before: PhaseLock, now: PhaseLock, epsilon: float, steady: float) -> PhaseLock:
@@ -144,21 +159,22 @@ def _judged(before: PhaseLock, now: PhaseLock, epsilon: float, steady: float) ->
     return PhaseLock(now.error, steady, LOST if lost else DISTURBED, now.envelope, now.places)
 
 
-def _spread(z: NDArray[np.complex128]) -> float:
+def _spread(z: list[complex]) -> float:
     """Largest difference of two phases, on the circle."""
-    angle = np.angle(z[:, None] * np.conj(z[None, :]))
-    return float(np.abs(angle).max())
+    return max(abs(angle(one * other.conjugate())) for one, other in combinations(z, 2))
 
 
-def _centred(change: Array) -> Array:
-    """Changes of places without what they have in common, on the circle."""
+def _moved(change: Array) -> float:
+    """Largest change of a place without what the changes have in common, on the circle."""
+    if not change.any():
+        return 0.0
     turned = np.exp(1j * change)
-    return np.angle(turned * np.conj(turned.mean()))
+    return float(np.abs(np.angle(turned * np.conj(turned.mean()))).max())
 
 
-def _phase_bound(epsilon: float, weights: Array, mean_radius: float) -> float:
+def _phase_bound(epsilon: float, weights: list[float], mean_radius: float) -> float:
     """Largest difference of two phases at a disagreement ε around a mean."""
-    smallest, second = np.sort(weights)[:2].tolist()
+    smallest, second = sorted(weights)[:2]
     inner = mean_radius - epsilon * sqrt((1.0 - smallest) / smallest)
     half = epsilon * sqrt(1.0 / smallest + 1.0 / second) / (2.0 * inner) if inner > 0.0 else 1.0
     return 2.0 * asin(half) if half < 1.0 else pi
