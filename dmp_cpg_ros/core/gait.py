@@ -18,16 +18,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.bounce import GRAVITY, Bounce, planned_bounce, stance_groups
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait_word import gait_word
 from dmp_cpg_ros.core.phase import wrapped
 from dmp_cpg_ros.core.robot_state import LEGS
 
 Array = NDArray[np.float64]
-
-GRAVITY = 9.81
-"""Standard gravity used to scale speeds and to carry the body [m/s^2]."""
-
 
 LATERAL_WEIGHT = 2.0
 """Weight of speed across the body in the speed by which a gait chooses its cadence."""
@@ -87,6 +84,7 @@ class Gait:
     cadence: Array
     duty_factor: Array
     rest: float = field(init=False)
+    groups: int = field(init=False)
     cadence_scale: float = field(init=False, default=1.0)
     _tables: tuple[list[float], list[float], list[float]] = field(
         init=False, repr=False, compare=False
@@ -111,6 +109,7 @@ class Gait:
         if not np.all((self.cadence > 0.0) & np.isfinite(self.cadence)):
             raise ParameterError(f"gait '{self.name}': cadence must be positive")
         object.__setattr__(self, 'rest', _rest_phase(self.lag))
+        object.__setattr__(self, 'groups', stance_groups(self.lag))
         object.__setattr__(
             self,
             '_tables',
@@ -207,6 +206,10 @@ class Gait:
         return _interpolated(
             foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self._tables[0], self._tables[2]
         )
+
+    def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
+        """How the body is planned to rise and fall, see :mod:`~dmp_cpg_ros.core.bounce`."""
+        return planned_bounce(cycle_position, self.groups, duty, omega)
 
     def scalar_cycle_position(self, phi: float) -> float:
         """As :meth:`cycle_position` for one leg, without arrays."""

@@ -31,6 +31,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.bounce import Bounce
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait_arcs import arcs_between
@@ -207,6 +208,12 @@ class BlendedGait:
     def own_omegas(self, omega: float) -> list[float]:
         """As :meth:`own_omega` of all legs [rad/s]."""
         return [omega + self.turning * arc for arc in self.transition.arcs.tolist()]
+
+    def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
+        """How the body is planned to rise and fall, as :meth:`Gait.bounce`."""
+        before, after = self.transition.before, self.transition.after
+        return before.bounce(cycle_position, duty, omega).mixed(
+            after.bounce(cycle_position, duty, omega), self.weight)
 
     def scalar_cycle_position(self, phi: float) -> float:
         """As :meth:`cycle_position` for one leg, without arrays."""

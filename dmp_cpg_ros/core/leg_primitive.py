@@ -224,7 +224,10 @@ class LegPrimitive:
             self.rolling,
         )
         foot, slope = path.at(position)
-        foot, velocity = plus(foot, shift), moved(shift_rate, slope, rate / (2.0 * pi))
+        bounce = gait.bounce(position, duty, omega)
+        foot = plus(plus(foot, shift), (0.0, 0.0, -activity * bounce.height))
+        velocity = moved(shift_rate, slope, rate / (2.0 * pi))
+        velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
         angles = self.kinematics.angles(foot)
         _, jacobian = self.kinematics.foot_and_jacobian(angles)
         goal, goal_velocity = np.array(angles), np.array(_joint_velocity(jacobian, velocity))

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.bounce import Bounce
 from dmp_cpg_ros.core.foot_placement import FootPlacement
 from dmp_cpg_ros.core.force_distribution import distribute
 from dmp_cpg_ros.core.gait import GRAVITY
@@ -159,7 +160,8 @@ class PostureController:
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
         activity = activities_step(
             memory.activity, rates, gait.own_omegas(omega), p.activity_rate, dt)
-        load = planned_load(gait.cycle_position(phase(x)), duty, activity, p.load_transfer)
+        place = gait.cycle_position(phase(x))
+        load = planned_load(place, duty, activity, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
         velocity = R_ground_base @ state.base_velocity_in_base
         rate = R_ground_base @ state.base_rate_in_base
@@ -173,15 +175,24 @@ class PostureController:
         shift = shift + p.slope_lean * lean(upward, self.model.height)
         raised = self.placement.raised(p, shift, R_ground_base)
         body = BodyMotion(R_ground_base, upward, velocity, rate, 0.0)
+        bounce = self._bounce(place, duty, omega, moving)
         return replace(memory, activity=activity, keeping=keeping), PostureFeedback(
-            self._torque(state, body, load, planned),
+            self._torque(state, body, load, planned, bounce),
             np.column_stack([shift, raised]),
             self.placement.drift(p, measured, planned, activity),
             correction,
             measured=state.joint_position,
         )
 
-    def _torque(self, state: RobotState, body: BodyMotion, load: Array, r: Array) -> Array:
+    def _bounce(self, place: Array, duty: float, omega: float, moving: float) -> Bounce:
+        """Planned bounce of the body: what the legs give way to, in the mean."""
+        each = [self.gait.bounce(position, duty, omega) for position in place.tolist()]
+        share = moving / len(each)
+        return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
+
+    def _torque(
+        self, state: RobotState, body: BodyMotion, load: Array, r: Array, bounce: Bounce
+    ) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
         legs = self.legs.at(state.joint_position.tolist())
         feet_in_base = np.array([foot for foot, _ in legs])
@@ -191,8 +202,9 @@ class PostureController:
         ground = float(load @ feet[:, 2]) / total if total > 1e-6 else float(feet[:, 2].min())
         body = replace(body, height=self.foot_radius - ground)
         forces = distribute(
-            self.model.wrench(self.parameters, body, r), feet, load, self.parameters.friction,
-            LARGEST_LOAD * self.description.mass * GRAVITY, self.importance)
+            self.model.wrench(self.parameters, body, r, bounce), feet, load,
+            self.parameters.friction, LARGEST_LOAD * self.description.mass * GRAVITY,
+            self.importance)
         J = np.array([jacobian for _, jacobian in legs])
         torque = -np.einsum('lij,li->lj', J, forces @ body.R_ground_base)
         return np.clip(torque, -self.torque_limit, self.torque_limit).ravel()

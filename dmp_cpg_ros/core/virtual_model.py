@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.bounce import LEVEL, Bounce
 from dmp_cpg_ros.core.gait import GRAVITY
 from dmp_cpg_ros.core.posture_parameters import PostureParameters
 from dmp_cpg_ros.core.robot_description import RobotDescription
@@ -62,7 +63,9 @@ class VirtualModel:
         self._inertia = np.diag(description.base_inertia).copy()
         self.height = description.stance_height + float(description.com_in_base[2])
 
-    def wrench(self, p: PostureParameters, body: BodyMotion, r: Array) -> Array:
+    def wrench(
+        self, p: PostureParameters, body: BodyMotion, r: Array, bounce: Bounce = LEVEL
+    ) -> Array:
         """Force [N] and moment [N m] about the centre of mass in the frame of the ground.
 
         Parameters
@@ -73,6 +76,8 @@ class VirtualModel:
             The body.
         r : ndarray (3,)
             Reference v_x, v_y [m/s], γ [rad/s].
+        bounce : Bounce
+            Planned motion along the normal of the ground.
 
         Returns
         -------
@@ -82,8 +87,9 @@ class VirtualModel:
         roll, pitch = body.R_ground_base[2, 1], -body.R_ground_base[2, 0]  # for small angles
         push = rate * p.velocity_gain * (r[:2] - body.velocity[:2])
         lift = (
-            squared * p.height_stiffness * (self.height - body.height)
-            - rate * p.height_damping * body.velocity[2]
+            squared * p.height_stiffness * (self.height + bounce.height - body.height)
+            + rate * p.height_damping * (bounce.velocity - body.velocity[2])
+            + bounce.acceleration
         )
         turn = (
             -squared * p.attitude_stiffness * roll - rate * p.attitude_damping * body.rate[0],
