@@ -39,8 +39,10 @@ STANDING, RAMP = 0.5, 1.0
 turning [rad/s^2].
 """
 
-MEASURED = 5.0
-"""Time over which a steady velocity is averaged [s]."""
+MEASURED, MEASURED_WAY = 5.0, 2.0
+"""Least time [s] and, where it goes somewhere, least way [m] over which a steady velocity and the
+heading are averaged: over half a metre the sway of single steps would be taken for drift.
+"""
 
 PUSH_DURATION = 0.1
 """Time over which the impulse of a push is spread [s]."""
@@ -128,12 +130,13 @@ class SteadyOutcome:
 
 def steady(gait: str, velocity: Velocity, robot: str | None = None,
            file: str | None = None) -> SteadyOutcome:
-    """Walk at a velocity until it is steady, then for ``MEASURED``."""
+    """Walk at a velocity until it is steady, then for ``MEASURED`` and ``MEASURED_WAY``."""
     run = Walk(gait, robot, file=file)
     if not (run.reach(velocity) and run.walk(3.0)):
         return SteadyOutcome(True)
     run.states = [run.state]
-    if not run.walk(MEASURED):
+    speed = hypot(*velocity[:2])
+    if not run.walk(max(MEASURED, MEASURED_WAY / speed if speed else 0.0)):
         return SteadyOutcome(True)
     states = run.states
     mean = np.mean([(*state.base_velocity_in_base[:2], state.base_rate_in_base[2])
