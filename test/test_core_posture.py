@@ -10,13 +10,14 @@ from core_examples import GAITS, GRAVITY, TICK, network, quadruped, standing_sta
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.force_distribution import distribute
+from dmp_cpg_ros.core.force_distribution import REGULARISATION, distribute
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.leg_primitive import nominal_foothold
 from dmp_cpg_ros.core.levelling import level_from_base
 from dmp_cpg_ros.core.posture import PostureController, PostureParameters
 from dmp_cpg_ros.core.rotations import rotation_matrix, turned
 from dmp_cpg_ros.core.terrain_plane import normal_in_world
+from dmp_cpg_ros.core.triples import Triple, triple
 
 ROBOT = quadruped()
 FEET = np.array([nominal_foothold(ROBOT, leg.name) for leg in ROBOT.legs])
@@ -24,6 +25,14 @@ WEIGHT = ROBOT.mass * GRAVITY
 LARGEST = 2.0 * WEIGHT
 
 wrenches = st.tuples(*[st.floats(-300.0, 300.0)] * 3, *[st.floats(-80.0, 80.0)] * 3).map(np.array)
+def shared(wrench: np.ndarray, feet: np.ndarray, load: np.ndarray, friction: float,
+           **importance: Triple) -> np.ndarray:
+    """Forces (4, 3) of ``distribute``."""
+    places = [triple(foot) for foot in feet.tolist()]
+    return np.array(distribute(triple(wrench[:3].tolist()), triple(wrench[3:].tolist()), places,
+                               load.tolist(), friction, LARGEST, **importance))
+
+
 loads = st.lists(st.sampled_from([0.0, 0.3, 1.0]), min_size=4, max_size=4).map(np.array)
 
 
@@ -35,7 +44,7 @@ def wrench_of(forces: np.ndarray, feet: np.ndarray) -> np.ndarray:
 def test_forces_stay_in_their_cones(
         wrench: np.ndarray, load: np.ndarray, friction: float, seed: int) -> None:
     feet = FEET + np.random.default_rng(seed).normal(scale=0.05, size=(4, 3))
-    forces = distribute(wrench, feet, load, friction, LARGEST)
+    forces = shared(wrench, feet, load, friction)
     assert np.all(np.isfinite(forces))
     assert np.all(forces[:, 2] >= 0.0) and np.all(forces[:, 2] <= LARGEST * load + 1e-9)
     assert np.all(np.hypot(*forces[:, :2].T) <= friction * forces[:, 2] + 1e-9)
@@ -52,15 +61,38 @@ def test_a_wrench_within_the_limits_is_met(
         # three feet carry what is above their triangle
         support = FEET[load > 0.0].mean(axis=0)
         wrench[3:5] += lift * WEIGHT * np.array([support[1], -support[0]])
-    forces = distribute(wrench, FEET, load, 2.0, LARGEST)
+    forces = shared(wrench, FEET, load, 2.0)
     scale = np.array([WEIGHT] * 3 + [0.2 * WEIGHT] * 3)
     assert np.all(np.abs(wrench_of(forces, FEET) - wrench) < 0.01 * scale)
     assert swinging is None or not forces[swinging].any()
 
 
+@given(load=loads, seed=st.integers(0, 100))
+def test_forces_are_those_of_the_damped_least_squares(load: np.ndarray, seed: int) -> None:
+    """The minimum of |D (G f − wrench)|² / damping + Σ |f_i|² / w_i over the loaded feet."""
+    rng, importance = np.random.default_rng(seed), (9.0, 12.0, 7.0)
+    feet = FEET + rng.normal(scale=0.05, size=(4, 3))
+    # pressed so hard onto the ground that no cone is left
+    forces = rng.normal(size=(4, 3)) + (0.0, 0.0, 0.2 * WEIGHT)
+    wrench = wrench_of(forces * load[:, None], feet)
+    weights = np.repeat(load, 3)
+    grasp = np.concatenate([np.tile(np.eye(3), 4), np.concatenate(
+        [np.cross(foot, np.eye(3)).T for foot in feet], axis=1)])
+    D = np.diag([1.0, 1.0, 1.0, *importance])
+    damping = REGULARISATION * max(load.mean(), 1e-9)
+    multipliers = np.linalg.solve(
+        D @ grasp @ np.diag(weights) @ grasp.T @ D + damping * np.eye(6), D @ wrench)
+    expected = (weights * (grasp.T @ D @ multipliers)).reshape(4, 3)
+    found = shared(wrench, feet, load, 100.0, importance=importance)
+    inside = np.all((expected[:, 2] > 0.0) & (expected[:, 2] < LARGEST * load)
+                    & (np.hypot(*expected[:, :2].T) < 100.0 * expected[:, 2]) | (load == 0.0))
+    if inside:
+        np.testing.assert_allclose(found, expected, atol=1e-7 * WEIGHT)
+
+
 def test_without_load_there_are_no_forces() -> None:
     wrench = np.array([0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0])
-    forces = distribute(wrench, FEET, np.zeros(4), 0.6, LARGEST)
+    forces = shared(wrench, FEET, np.zeros(4), 0.6)
     assert not forces.any()
 
 
@@ -102,7 +134,7 @@ def test_errors_are_answered_by_the_opposite_wrench(
         of.initial_state(), standing_state(ROBOT), x, 0.0 * x, np.zeros(3), TICK)[1].torque), FEET)
     state = standing_state(ROBOT, **change)
     feedback = of.step(of.initial_state(), state, x, 0.0 * x, np.zeros(3), TICK)[1]
-    R = level_from_base(state.base_quaternion)
+    R = np.array(level_from_base(state.base_quaternion.tolist()))
     wrench = wrench_of(forces_of(feedback.torque) @ R.T, FEET @ R.T)
     assert sign * (wrench - at_rest)[component] > 0.1
 
@@ -162,7 +194,7 @@ def test_levelling_keeps_the_heading_and_removes_the_tilt(seed: int) -> None:
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
-    R_level_base = level_from_base(np.array([x, y, z, w]))
+    R_level_base = np.array(level_from_base((x, y, z, w)))
     assert np.allclose(R_level_base @ R_level_base.T, np.eye(3), atol=1e-6)
     R_world_level = R_world_base @ R_level_base.T
     assert np.allclose(R_world_level[2], [0.0, 0.0, 1.0], atol=1e-6)

@@ -22,6 +22,7 @@ def test_products_and_inverse(_: int) -> None:
     assert triples.pair([1.0, 2.0]) == (1.0, 2.0)
     assert triples.dot(u, v) == pytest.approx(a @ b)
     np.testing.assert_array_equal(triples.plus(u, v), a + b)
+    np.testing.assert_array_equal(triples.minus(u, v), a - b)
     np.testing.assert_array_equal(triples.moved(u, v, 0.3), a + b * 0.3)
     np.testing.assert_allclose(triples.cross(u, v), np.cross(a, b), atol=1e-14)
     np.testing.assert_allclose(triples.times(matrix, v), M @ b, atol=1e-14)

@@ -15,32 +15,34 @@ from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.leg_primitive import nominal_foothold
 from dmp_cpg_ros.core.levelling import level_from_base
 from dmp_cpg_ros.core.posture_parameters import PostureParameters
+from dmp_cpg_ros.core.triples import Triple, pair
 
 ROBOT = quadruped()
 FEET = np.array([nominal_foothold(ROBOT, leg.name) for leg in ROBOT.legs])
 LEG_LENGTH = 0.28
 KINEMATICS = [LegKinematics(leg) for leg in ROBOT.legs]
 PLACEMENT, P = FootPlacement(KINEMATICS, FEET, LEG_LENGTH), PostureParameters()
-velocities = st.tuples(st.floats(-4.0, 4.0), st.floats(-3.0, 3.0), st.floats(-4.0, 4.0)).map(
-    np.array)
+AT_REST = (0.0, 0.0, 0.0)
+velocities = st.tuples(st.floats(-4.0, 4.0), st.floats(-3.0, 3.0), st.floats(-4.0, 4.0))
 half_stances = st.floats(0.03, 0.3)
 
 
 @given(velocity=velocities, half_stance=half_stances)
 def test_a_body_that_moves_as_planned_needs_no_shift_within_reach(
-        velocity: np.ndarray, half_stance: float) -> None:
-    shift = PLACEMENT.shift(P, velocity, velocity, half_stance)
-    way = half_stance * PLACEMENT.over_feet(velocity)
-    inside = (PLACEMENT.within_reach(way, P.reach) == way).all(axis=1)
+        velocity: Triple, half_stance: float) -> None:
+    shift = np.array(PLACEMENT.shift(P, velocity, velocity, half_stance))
+    way = half_stance * np.array(PLACEMENT.over_feet(velocity))
+    reached = np.array(PLACEMENT.within_reach([pair(place) for place in way.tolist()], P.reach))
+    inside = (reached == way).all(axis=1)
     own_side = (FEET[:, 1] + way[:, 1]) * FEET[:, 1] > 0.0
     assert np.allclose(shift[inside & own_side], 0.0, atol=1e-12)
 
 
 @given(measured=velocities, reference=velocities, half_stance=half_stances)
 def test_feet_are_placed_where_the_legs_reach_and_on_their_own_side(
-        measured: np.ndarray, reference: np.ndarray, half_stance: float) -> None:
-    shift = PLACEMENT.shift(P, measured, reference, half_stance)
-    down = FEET[:, :2] + half_stance * PLACEMENT.over_feet(reference) + shift
+        measured: Triple, reference: Triple, half_stance: float) -> None:
+    shift = np.array(PLACEMENT.shift(P, measured, reference, half_stance))
+    down = FEET[:, :2] + half_stance * np.array(PLACEMENT.over_feet(reference)) + shift
     assert np.all(down[:, 1] * np.sign(FEET[:, 1]) >= -1e-12)
     for kinematics, x, y in zip(KINEMATICS, *down.T, strict=True):
         foot = np.array([x, y, FEET[0, 2]])
@@ -48,10 +50,10 @@ def test_feet_are_placed_where_the_legs_reach_and_on_their_own_side(
 
 
 @given(measured=velocities)
-def test_left_and_right_are_mirrored(measured: np.ndarray) -> None:
-    mirror, zero = np.array([1.0, -1.0, -1.0]), np.zeros(3)
-    here = PLACEMENT.shift(P, measured, zero, 0.1)
-    there = PLACEMENT.shift(P, mirror * measured, zero, 0.1)
+def test_left_and_right_are_mirrored(measured: Triple) -> None:
+    v_x, v_y, gamma = measured
+    here = np.array(PLACEMENT.shift(P, measured, AT_REST, 0.1))
+    there = np.array(PLACEMENT.shift(P, (v_x, -v_y, -gamma), AT_REST, 0.1))
     assert np.allclose(there, here[[1, 0, 3, 2]] * [1.0, -1.0], atol=1e-12)
 
 
@@ -59,11 +61,10 @@ def test_left_and_right_are_mirrored(measured: np.ndarray) -> None:
 def test_a_pendulum_comes_to_rest_on_its_footholds(gain: float) -> None:
     """The linear inverted pendulum x'' = g x / l that steps onto d every T_s seconds."""
     rate, stance, velocity = (GRAVITY / LEG_LENGTH) ** 0.5, 0.2, 0.5
-    p, zero, place = PostureParameters(placement_gain=gain), np.zeros(3), PLACEMENT
+    p = PostureParameters(placement_gain=gain)
     speeds = [velocity]
     for _ in range(12):
-        measured = np.array([velocity, 0.0, 0.0])
-        d = float(place.shift(p, measured, zero, 0.5 * stance)[0, 0])
+        d, _ = PLACEMENT.shift(p, (velocity, 0.0, 0.0), AT_REST, 0.5 * stance)[0]
         c, s = np.cosh(rate * stance), np.sinh(rate * stance)
         velocity = velocity * c - d * rate * s
         speeds.append(velocity)
@@ -74,8 +75,8 @@ def test_a_pendulum_comes_to_rest_on_its_footholds(gain: float) -> None:
 @given(roll=st.floats(-0.3, 0.3), pitch=st.floats(-0.3, 0.3))
 def test_raised_feet_of_a_tilted_body_are_level(roll: float, pitch: float) -> None:
     q = np.array([np.sin(roll / 2), np.sin(pitch / 2), 0.0, 1.0])
-    R_level_base = level_from_base(q / np.linalg.norm(q))
-    raised = PLACEMENT.raised(P, np.zeros((4, 2)), R_level_base)
-    feet = (FEET + raised[:, None] * np.array([0.0, 0.0, 1.0])) @ R_level_base.T
+    R_level_base = level_from_base((q / np.linalg.norm(q)).tolist())
+    raised = np.array(PLACEMENT.raised(P, [(0.0, 0.0)] * 4, R_level_base))
+    feet = (FEET + raised[:, None] * np.array([0.0, 0.0, 1.0])) @ np.array(R_level_base).T
     inside = np.abs(raised) < 0.09
     assert np.allclose(feet[inside, 2], FEET[inside, 2], atol=1e-9)

@@ -16,14 +16,19 @@ velocity of its stance; the rest is the shift.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from math import sqrt
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.gait import GRAVITY
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
 from dmp_cpg_ros.core.posture_parameters import PostureParameters
+from dmp_cpg_ros.core.triples import Matrix, Triple, dot, triple
 
 Array = NDArray[np.float64]
+Pair = tuple[float, float]
 
 LARGEST_RAISE = 0.35
 """Largest correction of a swinging foot's height by levelling, in leg lengths."""
@@ -46,32 +51,32 @@ class FootPlacement:
         self, kinematics: list[LegKinematics], footholds_in_base: Array, leg_length: float
     ) -> None:
         """Keep places and lengths."""
-        self.footholds_in_base, self._leg_length = footholds_in_base, leg_length
-        self._side = np.sign(footholds_in_base[:, 1])
-        self._straight = np.array([leg.thigh_length + leg.shank_length for leg in kinematics])
-        self._lateral = np.array([leg.lateral_offset for leg in kinematics])
-        self._depth = np.array([
+        self._footholds = [triple(foot) for foot in footholds_in_base.tolist()]
+        self._leg_length = leg_length
+        self._straight = [leg.thigh_length + leg.shank_length for leg in kinematics]
+        self._lateral = [leg.lateral_offset for leg in kinematics]
+        self._depth = [
             float(leg.geometry.hip_in_base[2]) - height
-            for leg, height in zip(kinematics, footholds_in_base[:, 2], strict=True)
-        ])
-        self._across = np.stack([-footholds_in_base[:, 1], footholds_in_base[:, 0]], axis=1)
+            for leg, (_, _, height) in zip(kinematics, self._footholds, strict=True)
+        ]
 
-    def over_feet(self, velocity: Array) -> Array:
+    def over_feet(self, velocity: Triple) -> list[Pair]:
         """Velocity of the body over its feet, v + γ ẑ × p.
 
         Parameters
         ----------
-        velocity : ndarray (3,)
+        velocity : tuple of float
             v_x, v_y [m/s], γ [rad/s].
 
         Returns
         -------
-        ndarray (4, 2)
+        list of four pairs of float
             [m/s]
         """
-        return velocity[:2] + velocity[2] * self._across
+        v_x, v_y, gamma = velocity
+        return [(v_x - gamma * y, v_y + gamma * x) for x, y, _ in self._footholds]
 
-    def within_reach(self, down: Array, reach: float) -> Array:
+    def within_reach(self, down: Sequence[Pair], reach: float) -> list[Pair]:
         """Shorten displacements from the neutral places to what the legs reach.
 
         The leg's plane is beside its abduction axis by y_0, so a foot at (x, y_0 + y, z) from the
@@ -79,75 +84,89 @@ class FootPlacement:
 
         Parameters
         ----------
-        down : ndarray (4, 2)
+        down : sequence of four pairs of float
             Displacements [m].
         reach : float
             Share of the straight leg that is used.
 
         Returns
         -------
-        ndarray (4, 2)
+        list of four pairs of float
         """
-        room = np.maximum((reach * self._straight) ** 2 - self._depth**2, 1e-6)
-        squared = np.maximum((down * down).sum(axis=1), 1e-12)
-        outward = self._lateral * down[:, 1]
-        share = (np.sqrt(outward * outward + squared * room) - outward) / squared
-        return down * np.minimum(1.0, share)[:, None]
+        reached = []
+        for (x, y), straight, depth, lateral in zip(
+            down, self._straight, self._depth, self._lateral, strict=True
+        ):
+            room = max((reach * straight) ** 2 - depth * depth, 1e-6)
+            squared, outward = max(x * x + y * y, 1e-12), lateral * y
+            share = min((sqrt(outward * outward + squared * room) - outward) / squared, 1.0)
+            reached.append((x * share, y * share))
+        return reached
 
     def shift(
-        self, p: PostureParameters, measured: Array, planned: Array, half_stance: float
-    ) -> Array:
+        self, p: PostureParameters, measured: Triple, planned: Triple, half_stance: float
+    ) -> list[Pair]:
         """Shift of the footholds.
 
         Parameters
         ----------
         p : PostureParameters
             Gains.
-        measured, planned : ndarray (3,)
+        measured, planned : tuple of float
             Velocity of the body, and v_plan: v_x, v_y [m/s], γ [rad/s].
         half_stance : float
             T_s / 2 [s].
 
         Returns
         -------
-        ndarray (4, 2)
+        list of four pairs of float
             [m]
         """
-        over = self.over_feet(measured)
         capture = p.placement_gain * (self._leg_length / GRAVITY) ** 0.5
-        down = half_stance * over + capture * (over - self.over_feet(planned))
-        down = self.within_reach(down, p.reach)
-        across = self.footholds_in_base[:, 1]
-        down[:, 1] = self._side * np.maximum(self._side * (across + down[:, 1]), 0.0) - across
-        return down - half_stance * self.over_feet(planned)
+        over, wanted = self.over_feet(measured), self.over_feet(planned)
+        down = self.within_reach(
+            [
+                (half_stance * x + capture * (x - wanted_x),
+                 half_stance * y + capture * (y - wanted_y))
+                for (x, y), (wanted_x, wanted_y) in zip(over, wanted, strict=True)
+            ],
+            p.reach,
+        )
+        return [
+            (x - half_stance * wanted_x, _on_own_side(y, place) - half_stance * wanted_y)
+            for (x, y), (wanted_x, wanted_y), (_, place, _) in zip(
+                down, wanted, self._footholds, strict=True)
+        ]
 
-    def raised(self, p: PostureParameters, shift: Array, R_ground_base: Array) -> Array:
+    def raised(
+        self, p: PostureParameters, shift: Sequence[Pair], R_ground_base: Matrix
+    ) -> list[float]:
         """Change of the feet's height in the base that keeps them level over the ground.
 
         Parameters
         ----------
         p : PostureParameters
             Gains.
-        shift : ndarray (4, 2)
+        shift : sequence of four pairs of float
             Shift of the footholds [m].
-        R_ground_base : ndarray (3, 3)
+        R_ground_base : tuple of rows
             Attitude.
 
         Returns
         -------
-        ndarray (4,)
+        list of four floats
             [m]
         """
-        foot = self.footholds_in_base.copy()
-        foot[:, :2] += shift
-        upward = R_ground_base[2]
-        lost = foot[:, 2] - foot @ upward
-        limit = LARGEST_RAISE * self._leg_length
-        return np.clip(p.levelling * lost / max(float(upward[2]), 0.3), -limit, limit)
+        upward, limit = R_ground_base[2], LARGEST_RAISE * self._leg_length
+        gain, raised = p.levelling / max(upward[2], 0.3), []
+        for (x, y, z), (more_x, more_y) in zip(self._footholds, shift, strict=True):
+            lost = z - dot((x + more_x, y + more_y, z), upward)
+            raised.append(min(max(gain * lost, -limit), limit))
+        return raised
 
     def drift(
-        self, p: PostureParameters, measured: Array, planned: Array, activity: Array
-    ) -> Array:
+        self, p: PostureParameters, measured: Triple, planned: Triple, activity: Sequence[float]
+    ) -> list[Pair]:
         """Velocity that standing feet add to their paths so as to go along with the ground.
 
         Without it the joint drive would hold the body to its planned velocity, with a force that
@@ -158,14 +177,22 @@ class FootPlacement:
         ----------
         p : PostureParameters
             Gains.
-        measured, planned : ndarray (3,)
+        measured, planned : tuple of float
             As for :meth:`shift`.
-        activity : ndarray (4,)
+        activity : sequence of four floats
             Swing activity; at rest the feet hold the body.
 
         Returns
         -------
-        ndarray (4, 2)
+        list of four pairs of float
             [m/s]
         """
-        return -p.yielding * activity[:, None] * (measured - planned)[:2]
+        x = -p.yielding * (measured[0] - planned[0])
+        y = -p.yielding * (measured[1] - planned[1])
+        return [(swings * x, swings * y) for swings in activity]
+
+
+def _on_own_side(y: float, place: float) -> float:
+    """Displacement across the body of a foot from its place, but not beyond the middle."""
+    inside = place + y < 0.0 if place > 0.0 else place + y > 0.0
+    return -place if inside else y

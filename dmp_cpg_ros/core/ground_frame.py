@@ -9,24 +9,19 @@ it, the frame is level; of a slight slope it takes a part only.
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from math import sqrt
 
 from dmp_cpg_ros.core.levelling import frame_of
 from dmp_cpg_ros.core.robot_state import RobotState
-from dmp_cpg_ros.core.rotations import rotation_matrix
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.triples import Matrix, Triple, rotation, times, transposed_times
 
 SLIGHT = 0.03
 """Slope of which half is followed, more of steeper ones and little of the few tenths of a degree
 that soft ground and compliant feet feign.
 """
 
-UPWARD = np.array((0.0, 0.0, 1.0))
 
-
-def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Array, Array]:
+def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Matrix, Triple]:
     """Rotation from ``base_link`` to the frame of the ground, and the vertical in that frame.
 
     Parameters
@@ -39,38 +34,42 @@ def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Array, 
 
     Returns
     -------
-    R_ground_base : ndarray (3, 3)
-        Its third row is the frame's z axis in the base.
-    upward_in_ground : ndarray (3,)
+    R_ground_base : tuple of rows
+        The third is the frame's z axis in the base.
+    upward_in_ground : tuple of float
         Direction away from gravity.
     """
-    R_world_base = rotation_matrix(state.base_quaternion)
+    R_world_base = rotation(state.base_quaternion.tolist())
     normal, vertical = state.ground_normal_in_world, R_world_base[2]
     if normal is None or following == 0.0:
-        return frame_of(vertical), UPWARD.copy()
-    slope = normal / normal[2] - UPWARD
-    squared = float(slope @ slope)
-    leaning = UPWARD + following * squared / (squared + SLIGHT**2) * slope
-    leaning /= np.sqrt(leaning @ leaning)
-    R_ground_base = frame_of(leaning @ R_world_base)
-    return R_ground_base, R_ground_base @ vertical
+        return frame_of(vertical), (0.0, 0.0, 1.0)
+    x, y, z = normal.tolist()
+    x, y = x / z, y / z
+    squared = x * x + y * y
+    share = following * squared / (squared + SLIGHT**2)
+    length = sqrt(share * share * squared + 1.0)
+    leaning = (share * x / length, share * y / length, 1.0 / length)
+    R_ground_base = frame_of(transposed_times(R_world_base, leaning))
+    return R_ground_base, times(R_ground_base, vertical)
 
 
-def lean(upward_in_ground: Array, height: float) -> Array:
+def lean(upward_in_ground: Triple, height: float) -> tuple[float, float]:
     """Where the vertical through a point at a height meets the ground, relative to its foot.
 
     Feet that stand around this place carry the body evenly: on a slope it lies downhill.
 
     Parameters
     ----------
-    upward_in_ground : ndarray (3,)
+    upward_in_ground : tuple of float
         As from :func:`ground_from_base`.
     height : float
         Of the centre of mass over the ground, along its normal [m].
 
     Returns
     -------
-    ndarray (2,)
-        In the frame of the ground [m].
+    tuple of float
+        x and y in the frame of the ground [m].
     """
-    return -height * upward_in_ground[:2] / max(float(upward_in_ground[2]), 0.3)
+    x, y, z = upward_in_ground
+    depth = -height / max(z, 0.3)
+    return depth * x, depth * y

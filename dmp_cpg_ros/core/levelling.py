@@ -4,39 +4,32 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
+from math import sqrt
 
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.triples import Matrix, Triple, cross, upward
 
 
-def level_from_base(quaternion: Array) -> Array:
+def level_from_base(quaternion: Sequence[float]) -> Matrix:
     """Rotation from ``base_link`` to a frame of the same heading with z up.
 
     Parameters
     ----------
-    quaternion : ndarray (4,)
+    quaternion : sequence of four floats
         Orientation of ``base_link`` in ``odom``, x, y, z, w.
 
     Returns
     -------
-    ndarray (3, 3)
+    tuple of rows
         R_level_base.
     """
-    x, y, z, w = quaternion.tolist()
-    z_world = np.array((2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))
-    return frame_of(z_world)
+    return frame_of(upward(quaternion))
 
 
-def frame_of(z_in_base: Array) -> Array:
-    """Rotation (3, 3) from the base to the frame of a z axis (3,) with the base's heading."""
-    forward = np.array((1.0, 0.0, 0.0)) - z_in_base[0] * z_in_base
-    forward /= np.sqrt(forward @ forward) + 1e-12
-    left = np.array(
-        (
-            z_in_base[1] * forward[2] - z_in_base[2] * forward[1],
-            z_in_base[2] * forward[0] - z_in_base[0] * forward[2],
-            z_in_base[0] * forward[1] - z_in_base[1] * forward[0],
-        )
-    )
-    return np.stack((forward, left, z_in_base))
+def frame_of(z_in_base: Triple) -> Matrix:
+    """Rotation from the base to the frame of a z axis with the base's heading."""
+    x, y, z = z_in_base
+    forward_x, forward_y, forward_z = 1.0 - x * x, -x * y, -x * z
+    length = sqrt(forward_x * forward_x + forward_y * forward_y + forward_z * forward_z) + 1e-12
+    forward = (forward_x / length, forward_y / length, forward_z / length)
+    return forward, cross(z_in_base, forward), z_in_base

@@ -11,19 +11,21 @@ torques τ_fb = −Jᵀ f. Swinging feet are placed so as to catch the body
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.bounce import Bounce
+from dmp_cpg_ros.core.bounce import LEVEL, Bounce
 from dmp_cpg_ros.core.foot_placement import FootPlacement
 from dmp_cpg_ros.core.force_distribution import distribute
 from dmp_cpg_ros.core.gait import GRAVITY
 from dmp_cpg_ros.core.gait_transition import GaitInForce
 from dmp_cpg_ros.core.ground_frame import ground_from_base, lean
 from dmp_cpg_ros.core.leg_primitive import LegFeedback, body_scale, nominal_foothold
-from dmp_cpg_ros.core.phase import phase, scalar_phase_rates
+from dmp_cpg_ros.core.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.posture_parameters import PostureParameters
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_legs import RobotLegs
@@ -31,6 +33,15 @@ from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.speed_keeping import SpeedKeeping
 from dmp_cpg_ros.core.stance_load import planned_load
 from dmp_cpg_ros.core.swing_activity import activities_step
+from dmp_cpg_ros.core.triples import (
+    Matrix,
+    Triple,
+    minus,
+    plus,
+    times,
+    transposed_times,
+    triple,
+)
 from dmp_cpg_ros.core.virtual_model import BodyMotion, VirtualModel
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
@@ -119,16 +130,17 @@ class PostureController:
         self.model = VirtualModel(description, self.scale.leg_length)
         self.placement = FootPlacement(self.kinematics, footholds, self.scale.leg_length)
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
-        self.torque_limit = np.array([leg.torque_limit for leg in description.legs])
-        inertia = np.diag(description.base_inertia)
+        self._com_in_base = triple(description.com_in_base.tolist())
+        self._torque_limit = [triple(leg.torque_limit.tolist()) for leg in description.legs]
+        inertia = description.base_inertia.diagonal()
         # moments count as the accelerations that they cause at the length of a leg
-        self.importance = np.concatenate(
-            [np.ones(3), description.mass * self.scale.leg_length / inertia])
+        self._importance = triple(
+            (description.mass * self.scale.leg_length / inertia).tolist())
 
     def initial_state(self) -> PostureState:
         """State of a robot that stands."""
         return PostureState(
-            np.zeros(len(self.kinematics)), SpeedKeeping(np.zeros(2), 0.0, float('nan')))
+            np.zeros(len(self.kinematics)), SpeedKeeping((0.0, 0.0), 0.0, float('nan')))
 
     def step(
         self, memory: PostureState, state: RobotState, x: Array, x_dot: Array, r: Array, dt: float
@@ -153,58 +165,77 @@ class PostureController:
         memory : PostureState
         feedback : PostureFeedback
         """
-        p, leg_length = self.parameters, self.scale.leg_length
-        speed = self.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
-        gait = self.gait
+        p, leg_length, gait = self.parameters, self.scale.leg_length, self.gait
+        reference = triple(r.tolist())
+        speed = self.scale.foot_speed(*reference)
         omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
         activity = activities_step(
             memory.activity, rates, gait.own_omegas(omega), p.activity_rate, dt)
-        place = gait.cycle_position(phase(x))
-        load = planned_load(place, duty, activity, p.load_transfer)
+        swings = activity.tolist()
+        positions = [
+            gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
+        load = planned_load(positions, duty, swings, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
-        velocity = R_ground_base @ state.base_velocity_in_base
-        rate = R_ground_base @ state.base_rate_in_base
-        moving = float(activity.mean())
+        velocity = times(R_ground_base, triple(state.base_velocity_in_base.tolist()))
+        rate = times(R_ground_base, triple(state.base_rate_in_base.tolist()))
+        moving = sum(swings) / len(swings)
         keeping = memory.keeping.following(
-            p, leg_length, moving, state.base_quaternion, velocity, r, dt)
+            p, leg_length, moving, state.base_quaternion.tolist(), velocity, reference, dt)
         correction = keeping.acting(p, leg_length, moving)
-        measured = np.array((velocity[0], velocity[1], rate[2]))
-        planned = r + correction
-        shift = self.placement.shift(p, measured, planned, np.pi * duty / omega)
-        shift = shift + p.slope_lean * lean(upward, self.model.height)
+        measured = (velocity[0], velocity[1], rate[2])
+        planned = plus(reference, correction)
+        lean_x, lean_y = lean(upward, self.model.height)
+        shift = [
+            (along + p.slope_lean * lean_x, across + p.slope_lean * lean_y)
+            for along, across in self.placement.shift(p, measured, planned, pi * duty / omega)
+        ]
         raised = self.placement.raised(p, shift, R_ground_base)
-        body = BodyMotion(R_ground_base, upward, velocity, rate, 0.0)
-        bounce = self._bounce(place, duty, omega, moving)
-        return replace(memory, activity=activity, keeping=keeping), PostureFeedback(
-            self._torque(state, body, load, planned, bounce),
-            np.column_stack([shift, raised]),
-            self.placement.drift(p, measured, planned, activity),
-            correction,
+        legs = self.legs.at(state.joint_position.tolist())
+        feet = [
+            times(R_ground_base, minus(foot, self._com_in_base)) for foot, _ in legs]
+        body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
+        bounce = self._bounce(positions, duty, omega, moving)
+        return PostureState(activity, keeping), PostureFeedback(
+            self._torque(body, legs, feet, load, planned, bounce),
+            np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
+            np.array(self.placement.drift(p, measured, planned, swings)),
+            np.array(correction),
             measured=state.joint_position,
         )
 
-    def _bounce(self, place: Array, duty: float, omega: float, moving: float) -> Bounce:
+    def _height(self, feet: list[Triple], load: list[float]) -> float:
+        """Height of the centre of mass over the ground under the feet that carry [m]."""
+        total, heights = sum(load), [z for _, _, z in feet]
+        if total <= 1e-6:
+            return self.foot_radius - min(heights)
+        carried = sum(share * z for share, z in zip(load, heights, strict=True))
+        return self.foot_radius - carried / total
+
+    def _bounce(
+        self, positions: list[float], duty: float, omega: float, moving: float
+    ) -> Bounce:
         """Planned bounce of the body: what the legs give way to, in the mean."""
-        each = [self.gait.bounce(position, duty, omega) for position in place.tolist()]
+        each = [self.gait.bounce(position, duty, omega) for position in positions]
+        if all(one is LEVEL for one in each):
+            return LEVEL
         share = moving / len(each)
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
 
     def _torque(
-        self, state: RobotState, body: BodyMotion, load: Array, r: Array, bounce: Bounce
+        self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
+        load: list[float], r: Triple, bounce: Bounce,
     ) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
-        legs = self.legs.at(state.joint_position.tolist())
-        feet_in_base = np.array([foot for foot, _ in legs])
-        # from the centre of mass, in the frame of the ground
-        feet = (feet_in_base - self.description.com_in_base) @ body.R_ground_base.T
-        total = float(load.sum())
-        ground = float(load @ feet[:, 2]) / total if total > 1e-6 else float(feet[:, 2].min())
-        body = replace(body, height=self.foot_radius - ground)
+        force, moment = self.model.wrench(self.parameters, body, r, bounce)
         forces = distribute(
-            self.model.wrench(self.parameters, body, r, bounce), feet, load,
-            self.parameters.friction, LARGEST_LOAD * self.description.mass * GRAVITY,
-            self.importance)
-        J = np.array([jacobian for _, jacobian in legs])
-        torque = -np.einsum('lij,li->lj', J, forces @ body.R_ground_base)
-        return np.clip(torque, -self.torque_limit, self.torque_limit).ravel()
+            force, moment, feet, load, self.parameters.friction,
+            LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
+        torques: list[float] = []
+        for on_foot, (_, J), limits in zip(forces, legs, self._torque_limit, strict=True):
+            in_base = transposed_times(body.R_ground_base, on_foot)
+            torques += [
+                min(max(-torque, -limit), limit)
+                for torque, limit in zip(transposed_times(J, in_base), limits, strict=True)
+            ]
+        return np.array(torques)

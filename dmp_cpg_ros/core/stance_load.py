@@ -4,30 +4,32 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from collections.abc import Sequence
 
 
-def planned_load(cycle_position: Array, duty: float, activity: Array, transfer: float) -> Array:
+def planned_load(
+    cycle_position: Sequence[float], duty: float, activity: Sequence[float], transfer: float
+) -> list[float]:
     """Share of the load that each foot may take: a trapezoid over the planned stance.
 
     Parameters
     ----------
-    cycle_position : ndarray (n,)
+    cycle_position : sequence of n floats
         0 at mid-swing, in [−1/2, 1/2).
     duty : float
         Duty factor β.
-    activity : ndarray (n,)
+    activity : sequence of n floats
         Swing activity; a leg that does not swing carries.
     transfer : float
         Fraction of the cycle over which a foot takes and gives load.
 
     Returns
     -------
-    ndarray (n,)
+    list of n floats
         In [0, 1].
     """
-    into_stance = np.abs(cycle_position) - 0.5 * (1.0 - duty)
-    return np.maximum(np.clip(into_stance / transfer, 0.0, 1.0), 1.0 - activity)
+    lift_off = 0.5 * (1.0 - duty)
+    return [
+        max(min(max((abs(position) - lift_off) / transfer, 0.0), 1.0), 1.0 - swings)
+        for position, swings in zip(cycle_position, activity, strict=True)
+    ]

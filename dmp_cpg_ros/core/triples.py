@@ -33,6 +33,11 @@ def plus(a: Triple, b: Triple) -> Triple:
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
+def minus(a: Triple, b: Triple) -> Triple:
+    """Difference a − b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
 def moved(a: Triple, rate: Triple, time: float) -> Triple:
     """Where a is after a time: a + rate · time."""
     return a[0] + rate[0] * time, a[1] + rate[1] * time, a[2] + rate[2] * time

@@ -12,15 +12,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dmp_cpg_ros.core.bounce import LEVEL, Bounce
 from dmp_cpg_ros.core.gait import GRAVITY
 from dmp_cpg_ros.core.posture_parameters import PostureParameters
 from dmp_cpg_ros.core.robot_description import RobotDescription
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.triples import Matrix, Triple, triple
 
 
 @dataclass(frozen=True)
@@ -29,20 +25,20 @@ class BodyMotion:
 
     Attributes
     ----------
-    R_ground_base : ndarray (3, 3)
-        Its third row holds the tilt against the ground.
-    upward_in_ground : ndarray (3,)
+    R_ground_base : tuple of rows
+        The third holds the tilt against the ground.
+    upward_in_ground : tuple of float
         Direction away from gravity; (0, 0, 1) on level ground.
-    velocity, rate : ndarray (3,)
+    velocity, rate : tuple of float
         Linear [m/s] and angular [rad/s].
     height : float
         Of the centre of mass over the stance feet's ground [m].
     """
 
-    R_ground_base: Array
-    upward_in_ground: Array
-    velocity: Array
-    rate: Array
+    R_ground_base: Matrix
+    upward_in_ground: Triple
+    velocity: Triple
+    rate: Triple
     height: float
 
 
@@ -60,12 +56,12 @@ class VirtualModel:
     def __init__(self, description: RobotDescription, leg_length: float) -> None:
         """Keep the scales."""
         self._mass, self._rate = description.mass, (GRAVITY / leg_length) ** 0.5
-        self._inertia = np.diag(description.base_inertia).copy()
+        self._inertia = triple(description.base_inertia.diagonal().tolist())
         self.height = description.stance_height + float(description.com_in_base[2])
 
     def wrench(
-        self, p: PostureParameters, body: BodyMotion, r: Array, bounce: Bounce = LEVEL
-    ) -> Array:
+        self, p: PostureParameters, body: BodyMotion, r: Triple, bounce: Bounce = LEVEL
+    ) -> tuple[Triple, Triple]:
         """Force [N] and moment [N m] about the centre of mass in the frame of the ground.
 
         Parameters
@@ -74,29 +70,36 @@ class VirtualModel:
             Gains.
         body : BodyMotion
             The body.
-        r : ndarray (3,)
+        r : tuple of float
             Reference v_x, v_y [m/s], γ [rad/s].
         bounce : Bounce
             Planned motion along the normal of the ground.
 
         Returns
         -------
-        ndarray (6,)
+        force, moment : tuple of float
         """
         rate, squared = self._rate, self._rate * self._rate
-        roll, pitch = body.R_ground_base[2, 1], -body.R_ground_base[2, 0]  # for small angles
-        push = rate * p.velocity_gain * (r[:2] - body.velocity[:2])
+        z_x, z_y, _ = body.R_ground_base[2]
+        roll, pitch = z_y, -z_x  # for small angles
+        push = rate * p.velocity_gain
         lift = (
             squared * p.height_stiffness * (self.height + bounce.height - body.height)
             + rate * p.height_damping * (bounce.velocity - body.velocity[2])
             + bounce.acceleration
         )
-        turn = (
-            -squared * p.attitude_stiffness * roll - rate * p.attitude_damping * body.rate[0],
-            -squared * p.attitude_stiffness * pitch - rate * p.attitude_damping * body.rate[1],
-            rate * p.yaw_rate_gain * (r[2] - body.rate[2]),
+        stiffness, damping = squared * p.attitude_stiffness, rate * p.attitude_damping
+        mass, (up_x, up_y, up_z) = self._mass, body.upward_in_ground
+        i_x, i_y, i_z = self._inertia
+        return (
+            (
+                mass * (push * (r[0] - body.velocity[0]) + GRAVITY * up_x),
+                mass * (push * (r[1] - body.velocity[1]) + GRAVITY * up_y),
+                mass * (lift + GRAVITY * up_z),
+            ),
+            (
+                -i_x * (stiffness * roll + damping * body.rate[0]),
+                -i_y * (stiffness * pitch + damping * body.rate[1]),
+                i_z * rate * p.yaw_rate_gain * (r[2] - body.rate[2]),
+            ),
         )
-        force = self._mass * (
-            np.array((push[0], push[1], lift)) + GRAVITY * body.upward_in_ground
-        )
-        return np.concatenate([force, self._inertia * np.array(turn)])
