@@ -39,6 +39,7 @@ events:
   - {at: 0.2, command: {v_x: 0.5, gamma: 0.1}}
   - {at: 1.0, gait: trot}
   - {at: 1.5, push: {impulse: [1, 4, 0], duration: 0.15}}
+  - {at: 1.8, command: {v_x: 1.6, gamma: 0.1}}   # more than a walk can do
   - {at: 1.9, gait: walk}
   - {at: 2.0, inhibit: true}
   - {at: 3.9, gait: pace}

@@ -13,6 +13,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,8 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait_word import gait_word
 from dmp_cpg_ros.core.phase import wrapped
 from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.speed_limit import within_limit
+from dmp_cpg_ros.core.triples import Triple
 
 Array = NDArray[np.float64]
 
@@ -76,6 +79,9 @@ class Gait:
         Dimensionless stride frequencies.
     duty_factor : ndarray (n,)
         Fraction β of the cycle that a foot is planned to stand, in (0, 1).
+    highest_speed : float
+        Dimensionless foot speed that the gait never exceeds, not below the last of ``speed``, so
+        that the cadence is that of the tables with and without it; infinite for none.
     """
 
     name: str
@@ -83,6 +89,7 @@ class Gait:
     speed: Array
     cadence: Array
     duty_factor: Array
+    highest_speed: float = inf
     rest: float = field(init=False)
     groups: int = field(init=False)
     cadence_scale: float = field(init=False, default=1.0)
@@ -108,6 +115,10 @@ class Gait:
             raise ParameterError(f"gait '{self.name}': duty_factor must lie in (0, 1)")
         if not np.all((self.cadence > 0.0) & np.isfinite(self.cadence)):
             raise ParameterError(f"gait '{self.name}': cadence must be positive")
+        if not self.highest_speed >= max(float(self.speed[-1]), 1e-3):
+            raise ParameterError(
+                f"gait '{self.name}': highest_speed must be positive and not below the last of "
+                f'speed, {self.speed[-1]:g}, not {self.highest_speed:g}')
         object.__setattr__(self, 'rest', _rest_phase(self.lag))
         object.__setattr__(self, 'groups', stance_groups(self.lag))
         object.__setattr__(
@@ -125,15 +136,18 @@ class Gait:
         ParameterError
             If a key is missing or not known, or a value is impossible.
         """
-        valid = ('lag', 'speed', 'cadence', 'duty_factor')
-        if not isinstance(values, Mapping) or set(values) != set(valid):
-            raise ParameterError(f"gait '{name}' must have exactly the keys {', '.join(valid)}")
+        valid, optional = ('lag', 'speed', 'cadence', 'duty_factor'), 'highest_speed'
+        if not isinstance(values, Mapping) or set(values) - {optional} != set(valid):
+            raise ParameterError(
+                f"gait '{name}' must have the keys {', '.join(valid)} and may have {optional}, "
+                'no others')
         lag = values['lag']
         if not isinstance(lag, Mapping) or set(lag) != set(LEGS):
             raise ParameterError(f"gait '{name}': lag must name the legs {', '.join(LEGS)}")
         try:
-            tables = [np.asarray(values[key], dtype=float) for key in valid[1:]]
-            return cls(name, np.array([float(lag[leg]) for leg in LEGS]), *tables)
+            speed, cadence, duty = (np.asarray(values[key], dtype=float) for key in valid[1:])
+            return cls(name, np.array([float(lag[leg]) for leg in LEGS]), speed, cadence, duty,
+                       float(values.get(optional, inf)))
         except (TypeError, ValueError) as error:
             raise ParameterError(f"gait '{name}': {error}") from error
 
@@ -155,6 +169,12 @@ class Gait:
             scaled, '_tables', (self._tables[0], cadence.tolist(), self._tables[2])
         )
         return scaled
+
+    def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
+        """Velocity (v_x, v_y, γ) that the gait does of one that is asked for [m/s], [rad/s], see
+        :mod:`~dmp_cpg_ros.core.speed_limit`.
+        """
+        return limited(velocity, scale, self.highest_speed)
 
     @property
     def phases(self) -> Array:
@@ -227,6 +247,12 @@ class Gait:
             Oscillator phases [rad].
         """
         return wrapped(np.asarray(phi) + 2.0 * np.pi * self.rest) / (2.0 * np.pi)
+
+
+def limited(velocity: Triple, scale: BodyScale, highest_speed: float) -> Triple:
+    """Velocity (v_x, v_y, γ) within a dimensionless highest speed [m/s], [rad/s]."""
+    most = highest_speed * (GRAVITY * scale.leg_length) ** 0.5
+    return within_limit(velocity, scale.foot_speed(*velocity), most)
 
 
 def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:

@@ -9,13 +9,14 @@ down; the band between keeps the choice from flickering.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait import GRAVITY, BodyScale
+from dmp_cpg_ros.core.gait import GRAVITY, BodyScale, Gait
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 
 Array = NDArray[np.float64]
@@ -57,6 +58,29 @@ class GaitChoiceParameters(Parameters):
                 f'auto_speeds = {list(self.auto_speeds)} must increase by more than '
                 f'auto_hysteresis = {self.auto_hysteresis:g}'
             )
+
+
+def highest_speed(
+    parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait]
+) -> float:
+    """Dimensionless foot speed up to which commands are followed.
+
+    Parameters
+    ----------
+    parameters : GaitChoiceParameters
+        Whether the gait is chosen, and among which.
+    name : str
+        Gait that is wanted where it is not chosen.
+    named : callable (str) → Gait
+        Gait of a name.
+
+    Returns
+    -------
+    float
+        That of the gait, or of the fastest that may be chosen.
+    """
+    names = parameters.auto_gaits if parameters.auto_gait else (name,)
+    return max(named(each).highest_speed for each in names)
 
 
 def chosen_gait(

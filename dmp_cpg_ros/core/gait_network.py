@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical import CanonicalSystem
-from dmp_cpg_ros.core.gait import BodyScale
+from dmp_cpg_ros.core.gait import GRAVITY, BodyScale
 from dmp_cpg_ros.core.gait_transition import GaitInForce
 from dmp_cpg_ros.core.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.hopf import AndronovHopf
@@ -145,6 +145,11 @@ class GaitNetwork:
         other = copy(self)
         other.gait = gait
         return other
+
+    @property
+    def highest_speed(self) -> float:
+        """Foot speed at which the gait in force is held [m/s]."""
+        return self.gait.highest_speed * (GRAVITY * self.scale.leg_length) ** 0.5
 
     def omega(self, r: Array) -> float:
         """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""

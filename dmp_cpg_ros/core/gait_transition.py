@@ -31,12 +31,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.bounce import Bounce
+from dmp_cpg_ros.core.bounce import GRAVITY, Bounce
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait import BodyScale, Gait, limited
 from dmp_cpg_ros.core.gait_arcs import arcs_between
 from dmp_cpg_ros.core.gait_word import gait_word
 from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.speed_limit import blended_limit
+from dmp_cpg_ros.core.triples import Triple
 
 Array = NDArray[np.float64]
 
@@ -187,8 +189,22 @@ class BlendedGait:
         """Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]."""
         return self.turning * self.transition.rest_arc
 
+    @property
+    def highest_speed(self) -> float:
+        """Dimensionless foot speed that is not exceeded."""
+        before, after = self.transition.before, self.transition.after
+        return blended_limit(before.highest_speed, after.highest_speed, self.weight)
+
+    def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
+        """Velocity that the blend does of one that is asked for, as :meth:`Gait.limited`."""
+        return limited(velocity, scale, self.highest_speed)
+
+    def _most(self, scale: BodyScale) -> float:
+        return self.highest_speed * (GRAVITY * scale.leg_length) ** 0.5
+
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω at a foot speed, as :meth:`Gait.omega` [rad/s]."""
+        foot_speed = min(foot_speed, self._most(scale))
         return self.cadence_scale * self._blended(
             self.transition.before.omega(foot_speed, scale),
             self.transition.after.omega(foot_speed, scale),
@@ -196,6 +212,7 @@ class BlendedGait:
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed, as :meth:`Gait.duty`."""
+        foot_speed = min(foot_speed, self._most(scale))
         return self._blended(
             self.transition.before.duty(foot_speed, scale),
             self.transition.after.duty(foot_speed, scale),

@@ -191,7 +191,7 @@ class LegPrimitive:
             g_θ [rad] and g_θ̇ [rad/s].
         """
         p, gait = self.parameters, self.gait
-        v_x, v_y, gamma = r.tolist()
+        v_x, v_y, gamma = gait.limited(r.tolist(), self.scale)
         speed = self.scale.foot_speed(v_x, v_y, gamma)
         duty = gait.duty(speed, self.scale)
         omega = gait.own_omega(self.place, gait.omega(speed, self.scale))

@@ -166,7 +166,7 @@ class PostureController:
         feedback : PostureFeedback
         """
         p, leg_length, gait = self.parameters, self.scale.leg_length, self.gait
-        reference = triple(r.tolist())
+        reference = gait.limited(triple(r.tolist()), self.scale)
         speed = self.scale.foot_speed(*reference)
         omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]

@@ -12,11 +12,13 @@ falls, so that stops are those of the plain filter.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.gait import BodyScale, limited
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 
 Array = NDArray[np.float64]
@@ -62,11 +64,21 @@ class CommandGate:
     ----------
     parameters : ReferenceParameters
         Limits and timeout.
+    scale : BodyScale, optional
+        The robot's lengths, for the limit of the gait.
+
+    Attributes
+    ----------
+    highest_speed : float
+        Dimensionless foot speed of the gait that is wanted, see
+        :func:`~dmp_cpg_ros.core.gait_choice.highest_speed`; infinite at the start.
     """
 
-    def __init__(self, parameters: ReferenceParameters) -> None:
+    def __init__(
+        self, parameters: ReferenceParameters, scale: BodyScale | None = None
+    ) -> None:
         """Start with a zero command."""
-        self.parameters = parameters
+        self.parameters, self.highest_speed, self._scale = parameters, inf, scale
         self._command: tuple[float, float, float] = (0.0, 0.0, 0.0)
         self._received_ns: int | None = None
         self._fresh = False
@@ -107,7 +119,9 @@ class CommandGate:
         timeout = self.parameters.cmd_vel_timeout
         if timeout > 0.0 and (time_ns - self._received_ns) * 1e-9 > timeout:
             return 0.0, 0.0, 0.0
-        return self._command
+        if self._scale is None:
+            return self._command
+        return limited(self._command, self._scale, self.highest_speed)
 
 
 class ReferenceSystem:

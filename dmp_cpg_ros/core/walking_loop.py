@@ -27,6 +27,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation_parameters import ESTIMATE
 from dmp_cpg_ros.core.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait import Gait
+from dmp_cpg_ros.core.gait_choice import highest_speed
 from dmp_cpg_ros.core.gait_network import GaitNetwork
 from dmp_cpg_ros.core.gait_networks import GaitNetworks
 from dmp_cpg_ros.core.gait_reader import GaitReader
@@ -114,7 +115,9 @@ class WalkingLoop:
         networks = GaitNetworks(p.canonical, body_scale(description), p.gait_change, reader)
         self._running = RunningNetwork(networks, gait, p.gait_choice)
         self.network = self._running.network
-        self.gate, self.reference = CommandGate(p.reference), ReferenceSystem(p.reference)
+        self.gate = CommandGate(p.reference, body_scale(description))
+        self.gate.highest_speed = highest_speed(p.gait_choice, gait.name, reader.named)
+        self.reference = ReferenceSystem(p.reference)
         self.supervisor = GaitSupervisor(p.inhibition, self.network, p.leg.activity_rate)
         self.votes = VoteCounter(
             p.inhibition, p.votes, self.network, p.reference, description.mass
@@ -209,6 +212,8 @@ class WalkingLoop:
             self._running.change(p.canonical, p.gait_change)
             self._running.choice, self._running.wanted = p.gait_choice, wanted
             self.gate.parameters = self.reference.parameters = p.reference
+            self.gate.highest_speed = highest_speed(
+                p.gait_choice, wanted.name, running.networks.reader.named)
             self.supervisor.parameters = p.inhibition
             self.votes.follow(p.inhibition, p.reference, p.votes)
             if self.contact is not None:

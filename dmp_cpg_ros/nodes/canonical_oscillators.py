@@ -185,6 +185,7 @@ class CanonicalOscillators(CertifiedNode):
             'phase_error_bound_rad': nan if self._lock is None else self._lock.bound,
             'gait': self._running_network.word,
             'gait_wanted': self._running_network.wanted.name,
+            'highest_speed': self._running_network.network.highest_speed,
             'certificate': certificate_words(self.certificate),
         }
 

@@ -23,14 +23,14 @@ from dmp_cpg_ros.core.certificate_gate import (
     shown,
 )
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
-from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
+from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters, highest_speed
 from dmp_cpg_ros.core.gait_network import CanonicalParameters
 from dmp_cpg_ros.core.gait_networks import GaitNetworks
 from dmp_cpg_ros.core.gait_transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters, body_scale
 from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import (
     CHANGEABLE,
     OWNER,
@@ -104,6 +104,19 @@ class CertifiedNode(ManagedNode):
         """Networks of all gaits with the parameters in effect, without reading any file."""
         return GaitNetworks(self.parameters_of(CanonicalParameters), self._scale,
                             self.parameters_of(GaitChangeParameters), self.gaits)
+
+    def new_gate(self) -> CommandGate:
+        """Gate of commands with the limits in effect."""
+        gate = CommandGate(self.parameters_of(ReferenceParameters), self._scale)
+        self.limit(gate)
+        return gate
+
+    def limit(self, gate: CommandGate) -> None:
+        """Let a gate of commands follow the limits in effect, those of the gait included."""
+        gate.parameters = self.parameters_of(ReferenceParameters)
+        gate.highest_speed = highest_speed(
+            self.parameters_of(GaitChoiceParameters), self.parameters_of(GaitParameters).gait,
+            self.gaits.named)
 
     def certificate_changed(self) -> None:
         """Say on ``/diagnostics`` whether the accepted parameters are certified."""

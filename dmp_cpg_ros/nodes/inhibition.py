@@ -15,7 +15,7 @@ from dmp_cpg_ros.core.certificate import Certificate
 from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters
-from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.reference import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.suite_parameters import (
@@ -58,7 +58,7 @@ class InhibitionNode(CertifiedNode):
         self._supervisor = GaitSupervisor(
             parameters, network, self.parameters_of(LegParameters).activity_rate
         )
-        self._gate, self._reference = CommandGate(reference), ReferenceSystem(reference)
+        self._gate, self._reference = self.new_gate(), ReferenceSystem(reference)
         self._state = self._supervisor.initial_state()
         self._acting = self._supervisor.inhibition(self._state)
         self._x: Any = None
@@ -119,7 +119,7 @@ class InhibitionNode(CertifiedNode):
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
         self._supervisor.parameters = self.parameters_of(InhibitionParameters)
-        self._gate.parameters = self.parameters_of(ReferenceParameters)
+        self.limit(self._gate)
         self._reference.parameters = self.parameters_of(ReferenceParameters)
         self._networks = self.new_networks()
         self._supervisor.network = self._networks.of(self._supervisor.network.gait)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.reference import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import ReferenceWriter, read_twist
@@ -32,7 +32,7 @@ class ReferenceFilter(CertifiedNode):
     def configure(self) -> None:
         """Build the filter and its topics."""
         self.prepare_certificate()
-        self._gate = CommandGate(self.parameters_of(ReferenceParameters))
+        self._gate = self.new_gate()
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
         self._r, self._last_ns, self._requested = np.zeros(3), -1, False
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
@@ -67,7 +67,8 @@ class ReferenceFilter(CertifiedNode):
 
     def on_parameters(self) -> None:
         """Take over limits and rates."""
-        self._gate.parameters = self._system.parameters = self.parameters_of(ReferenceParameters)
+        self.limit(self._gate)
+        self._system.parameters = self.parameters_of(ReferenceParameters)
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""

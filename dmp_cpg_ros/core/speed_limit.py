@@ -1,0 +1,59 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""No gait is asked for more than its highest speed.
+
+Commands are limited before they are filtered, by the gait that is wanted
+(:class:`~dmp_cpg_ros.core.reference.CommandGate`), so that the reference comes to the highest
+speed as smoothly as to any other. While gaits change, the reference is not there yet, or the old
+gait cannot do what the new one can: whatever reads the reference by a gait, the oscillators'
+frequency, the legs' paths and the posture controller, takes it within the limit of the gait in
+force, which moves from one to the other with the blend. The robot slows down on the way into a
+slower gait and speeds up on the way into a faster one.
+
+Velocity and turn rate are shortened alike: a curve stays the same curve.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+from dmp_cpg_ros.core.triples import Triple
+
+
+def within_limit(velocity: Triple, speed: float, most: float) -> Triple:
+    """Shorten a velocity to the highest speed.
+
+    Parameters
+    ----------
+    velocity : tuple of float
+        v_x, v_y [m/s], γ [rad/s].
+    speed : float
+        The foot speed that goes with it, as from
+        :meth:`~dmp_cpg_ros.core.gait.BodyScale.foot_speed`, in proportion to it.
+    most : float
+        Highest foot speed, in the same unit.
+
+    Returns
+    -------
+    tuple of float
+        The same where it is within the limit.
+    """
+    if speed <= most:
+        return velocity
+    share = most / speed
+    return velocity[0] * share, velocity[1] * share, velocity[2] * share
+
+
+def blended_limit(before: float, after: float, weight: float) -> float:
+    """Limit on the way from one to another: the slowness 1/u moves evenly, so that it is a number
+    also where one of them has no limit, and near the slower one for most of the way.
+
+    Parameters
+    ----------
+    before, after : float
+        Limits, positive; infinite for none.
+    weight : float
+        In [0, 1].
+    """
+    slowness = (1.0 - weight) / before + weight / after
+    return 1.0 / slowness if slowness > 0.0 else inf

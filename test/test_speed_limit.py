@@ -1,0 +1,128 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every gait stays within its highest speed, wherever the reference comes from, and slows down
+where it must.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+import pytest
+from core_examples import GAITS, TICK, quadruped, standing_state
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.commands.walking_trials import Walk
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait import GRAVITY, BodyScale, Gait, limited
+from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters, highest_speed
+from dmp_cpg_ros.core.gait_transition import GaitTransition
+from dmp_cpg_ros.core.leg_primitive import LegFeedback, LegParameters, LegPrimitive, body_scale
+from dmp_cpg_ros.core.phase import state_at
+from dmp_cpg_ros.core.posture import PostureController, PostureParameters
+from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters
+from dmp_cpg_ros.core.speed_limit import blended_limit
+
+ROBOT = quadruped()
+SCALE = body_scale(ROBOT)
+ROOT = (GRAVITY * SCALE.leg_length) ** 0.5
+velocities = st.tuples(*(st.floats(-4.0, 4.0) for _ in range(3)))
+FAST = (4.0, 0.4, 0.5)
+
+
+@given(velocity=velocities, most=st.floats(0.1, 3.0))
+def test_a_velocity_is_shortened_and_keeps_its_curve(
+        velocity: tuple[float, float, float], most: float) -> None:
+    scale = BodyScale(0.28, 0.2)
+    short = limited(velocity, scale, most)
+    reached, speed = scale.foot_speed(*short), scale.foot_speed(*velocity)
+    assert reached <= most * (GRAVITY * 0.28) ** 0.5 * (1.0 + 1e-12)
+    share = reached / speed if speed > 0.0 else 1.0
+    assert np.allclose(short, np.array(velocity) * share, atol=1e-12)
+    if speed <= most * (GRAVITY * 0.28) ** 0.5:
+        assert short == velocity
+
+
+def test_every_gait_of_the_package_has_a_limit_that_its_tables_reach() -> None:
+    for gait in GAITS.values():
+        assert np.isfinite(gait.highest_speed) and gait.highest_speed >= gait.speed[-1]
+        assert gait.scaled(1.2).highest_speed == gait.highest_speed
+
+
+@pytest.mark.parametrize('wrong', [0.5, -1.0, float('nan'), 'fast'])
+def test_an_impossible_limit_is_refused(wrong: object) -> None:
+    values = {'lag': dict(fl=0.0, fr=0.5, rl=0.5, rr=0.0), 'speed': [0.0, 0.6],
+              'cadence': [0.3, 0.4], 'duty_factor': [0.6, 0.6]}
+    assert Gait.from_mapping('own', values).highest_speed == inf
+    assert Gait.from_mapping('own', {**values, 'highest_speed': 0.6}).highest_speed == 0.6
+    with pytest.raises(ParameterError, match="gait 'own'"):
+        Gait.from_mapping('own', {**values, 'highest_speed': wrong})
+
+
+@given(before=st.floats(0.2, 3.0), after=st.floats(0.2, 3.0))
+def test_a_change_leads_from_limit_to_limit(before: float, after: float) -> None:
+    weights = np.linspace(0.0, 1.0, 50).tolist()
+    limits = np.array([blended_limit(before, after, weight) for weight in weights])
+    assert limits[0] == pytest.approx(before) and limits[-1] == pytest.approx(after)
+    assert np.all(np.diff(limits) * np.sign(after - before) >= -1e-12)
+    assert blended_limit(inf, after, 0.0) == inf
+    assert blended_limit(inf, after, 1.0) == pytest.approx(after)
+    assert blended_limit(inf, inf, 0.3) == inf
+
+
+def test_commands_are_followed_up_to_the_gait_or_the_fastest_that_may_be_chosen() -> None:
+    gate = CommandGate(ReferenceParameters(cmd_vel_timeout=0.0), SCALE)
+    gate.accept(3.0, 0.0, 0.0)
+    assert gate.at(0) == (3.0, 0.0, 0.0)
+    choice = GaitChoiceParameters()
+    gate.highest_speed = highest_speed(choice, 'walk', GAITS.__getitem__)
+    assert gate.at(1)[0] == pytest.approx(GAITS['walk'].highest_speed * ROOT)
+    choice = GaitChoiceParameters(auto_gait=True)
+    assert highest_speed(choice, 'walk', GAITS.__getitem__) == GAITS['trot'].highest_speed
+
+
+@pytest.mark.parametrize('gait', [GAITS['walk'], GaitTransition(GAITS['trot'], GAITS['walk']).at(
+    0.4, 1.0)])
+def test_legs_posture_and_cadence_take_the_same_velocity(gait: object) -> None:
+    """What exceeds the limit is as if the limit had been asked for."""
+    short = gait.limited(FAST, SCALE)  # type: ignore[attr-defined]
+    speeds = [SCALE.foot_speed(*velocity) for velocity in (FAST, short)]
+    assert speeds[1] < 0.99 * speeds[0]
+    assert np.allclose(*([gait.omega(u, SCALE), gait.duty(u, SCALE)] for u in speeds))  # type: ignore[attr-defined]
+    x = state_at(gait.phases + 0.7, 1.0)  # type: ignore[attr-defined]
+    x_dot = 12.0 * x[:, ::-1] * [1.0, -1.0]
+    nothing = LegFeedback(np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(3))
+    leg = LegPrimitive('fr', ROBOT, gait, LegParameters())  # type: ignore[arg-type]
+    posture = PostureController(ROBOT, gait, PostureParameters())  # type: ignore[arg-type]
+    goals, torques = [], []
+    for velocity in (FAST, short):
+        r = np.array(velocity)
+        goals.append(np.concatenate(leg.step(
+            leg.initial_state(), x[1], x_dot[1], r, nothing, TICK)[1:]))
+        feedback = posture.step(
+            posture.initial_state(), standing_state(ROBOT, 0), x, x_dot, r, TICK)[1]
+        torques.append([feedback.torque.sum(), feedback.shift_in_base.sum()])
+    assert np.allclose(*goals) and np.allclose(*torques)
+
+
+@pytest.mark.parametrize('gait', ['amble', 'walk', 'pronk'])
+def test_a_robot_that_is_asked_for_too_much_goes_as_fast_as_it_can(gait: str) -> None:
+    run = Walk(gait)
+    run.loop.command(3.0)
+    assert run.walk(5.0)
+    most = GAITS[gait].highest_speed * ROOT
+    mean = np.mean([state.base_velocity_in_base[0] for state in run.states[-500:]])
+    assert mean == pytest.approx(most, rel=0.05)
+    assert SCALE.foot_speed(*run.loop.r.tolist()) <= most * (1.0 + 1e-9)
+
+
+def test_a_change_to_a_slower_gait_slows_down_without_a_fall() -> None:
+    run = Walk('trot')
+    assert run.reach((2.5, 0.0, 0.0)) and run.walk(1.0)
+    assert not run.loop.change_gait('walk')
+    assert run.walk(3.0)
+    assert run.loop.network.gait.name == 'walk'
+    mean = np.mean([state.base_velocity_in_base[0] for state in run.states[-250:]])
+    assert mean == pytest.approx(GAITS['walk'].highest_speed * ROOT, rel=0.05)
