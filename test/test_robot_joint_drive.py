@@ -151,3 +151,18 @@ def test_targets_that_are_not_finite_are_refused_by_joint(field, bad):
 def test_targets_of_another_shape_are_refused():
     with pytest.raises(DataError, match=r'velocity has shape \(3,\)'):
         drive().accept(JointTargets(ZERO, np.zeros(3), ZERO))
+
+
+def test_unequal_arrivals_do_what_equal_ones_do():
+    """All joints new at once are handled apart; a joint with an old number among them is not."""
+    one, other = drive(), drive()
+    rng = np.random.default_rng(5)
+    held = np.full(12, 0.3)
+    other.accept(JointTargets(held, np.zeros(12), np.zeros(12)))
+    position, velocity, effort = rng.uniform(-0.5, 0.5, (3, 12))
+    position[4] = 0.3  # the same number as before, but with another velocity
+    one.accept(JointTargets(position, velocity, effort))
+    other.accept(JointTargets(position, velocity, effort))
+    for step in range(STEPS):
+        np.testing.assert_array_equal(
+            one.torque(step, ZERO, ZERO), other.torque(step, ZERO, ZERO))

@@ -4,11 +4,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.robot.leg_reader import actuator_of, is_motor, motor_ratio
 from dmp_cpg_ros.robot.mujoco_import import mujoco
+
+Places = slice | NDArray[np.integer[Any]]
+"""Where some values are in an array."""
+
+
+def as_slice(places: NDArray[np.integer[Any]]) -> Places:
+    """Slice of consecutive places, which reads and writes at a fraction of the price of a list of
+    them; of others the list itself.
+    """
+    first = int(places[0])
+    consecutive = np.array_equal(places, np.arange(first, first + len(places)))
+    return slice(first, first + len(places)) if consecutive else places
 
 
 class JointActuators:
@@ -25,10 +39,10 @@ class JointActuators:
                   and motor_ratio(model, a) != 0.0]
         self._through_motors = len(motors) == len(joints)
         if self._through_motors:
-            self._index = np.array(motors)
+            self._index = as_slice(np.array(motors))
             self._per_torque = 1.0 / np.array([motor_ratio(model, a) for a in motors])
             return
-        self._index = model.jnt_dofadr[joints]
+        self._index = as_slice(model.jnt_dofadr[joints])
         for actuator in actuators:
             if actuator is not None:
                 model.actuator_gainprm[actuator] = 0.0

@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,6 +14,8 @@ from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JointTargets
 
 Vector = NDArray[np.float64]
+
+_STACKED = (3, len(JOINT_NAMES))
 
 ROLL_OFF_FROM = 0.7
 """Share of the speed limit above which torque along the motion falls, linearly to zero."""
@@ -47,12 +51,14 @@ class JointDrive:
         self._stall = self._limit / (1.0 - ROLL_OFF_FROM)  # the falling line at zero speed
         self._forward = self._kd + (self._kp > 0.0) * np.asarray(damping, dtype=float)
         self._steps, self._step_s = steps, step_s
+        self._new = np.zeros(12)
+        self._ahead = step_s * np.arange(steps)[:, None]  # (steps, 1) [s]
         self.reset()
 
     def reset(self) -> None:
         """Forget all targets."""
         self._last = np.full((3, 12), np.nan)
-        self._age = np.zeros(12)  # physics steps since arrival
+        self._age = self._new  # physics steps since arrival
         self._command = np.zeros((self._steps, 12))
 
     def accept(self, targets: JointTargets) -> None:
@@ -68,11 +74,16 @@ class JointDrive:
         DataError
             If an array has another shape or holds a value that is not finite.
         """
-        new = checked_targets(targets)
-        arrived = (new != self._last).any(axis=0)
-        self._age = np.where(arrived, 0.0, self._age + self._steps)
+        new, last = checked_targets(targets), self._last
         self._last = new
         position, velocity, effort = new
+        if not (new == last).any():  # the usual case, at a third of the price of the general one
+            self._age = self._new
+            reference = position + velocity * self._ahead
+            self._command = self._kp * reference + self._forward * velocity + effort
+            return
+        arrived = (new != last).any(axis=0)
+        self._age = np.where(arrived, 0.0, self._age + self._steps)
         age = self._age + np.arange(self._steps)[:, None]  # (steps, 12)
         moving = velocity * (age < self._steps)
         reference = position + velocity * (np.minimum(age, self._steps) * self._step_s)
@@ -117,14 +128,22 @@ def checked_targets(targets: JointTargets) -> NDArray[np.float64]:
     DataError
         If an array has another shape or holds a value that is not finite.
     """
+    try:
+        stacked = np.array((targets.position, targets.velocity, targets.effort), dtype=float)
+    except (TypeError, ValueError):
+        stacked = np.empty(0)
+    if stacked.shape != _STACKED:
+        _refuse_shapes(targets)
+    if not isfinite(float(stacked.sum())) and not np.isfinite(stacked).all():
+        bad = [JOINT_NAMES[i] for i in np.flatnonzero(~np.isfinite(stacked).all(axis=0))]
+        raise DataError(f"joint targets: the values for {', '.join(bad)} are not finite")
+    return stacked
+
+
+def _refuse_shapes(targets: JointTargets) -> None:
     shape = (len(JOINT_NAMES),)
     for name, value in (('position', targets.position), ('velocity', targets.velocity),
                         ('effort', targets.effort)):
         if np.shape(value) != shape:
             raise DataError(
                 f'joint targets: {name} has shape {np.shape(value)}, it must be {shape}')
-    stacked = np.array((targets.position, targets.velocity, targets.effort), dtype=float)
-    if not np.isfinite(stacked).all():
-        bad = [JOINT_NAMES[i] for i in np.flatnonzero(~np.isfinite(stacked).all(axis=0))]
-        raise DataError(f"joint targets: the values for {', '.join(bad)} are not finite")
-    return stacked

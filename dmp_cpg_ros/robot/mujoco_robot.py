@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from dmp_cpg_ros.core.sensor_parameters import SensorParameters
 from dmp_cpg_ros.core.world import World, height_over_ground
 from dmp_cpg_ros.robot.contact_reader import ContactReader
 from dmp_cpg_ros.robot.home_pose import home_joint_position
-from dmp_cpg_ros.robot.joint_actuators import JointActuators
+from dmp_cpg_ros.robot.joint_actuators import JointActuators, as_slice
 from dmp_cpg_ros.robot.joint_drive import JointDrive
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import find_ids, read_description
@@ -89,8 +90,9 @@ class MujocoRobot:
         # A silent restart of the simulation on bad numbers would look like a jump of the robot.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self._ids = find_ids(model, robot_file)
-        self._qpos = model.jnt_qposadr[self._ids.joints]
-        self._dof = model.jnt_dofadr[self._ids.joints]
+        self._qpos = as_slice(model.jnt_qposadr[self._ids.joints])
+        self._dof = as_slice(model.jnt_dofadr[self._ids.joints])
+        self._step_s, self._gravity = model.opt.timestep, model.opt.gravity.copy()
         self._base_qpos = int(model.jnt_qposadr[self._ids.free_joint])
         self._base_dof = int(model.jnt_dofadr[self._ids.free_joint])
         self._actuators = JointActuators(model, self._ids.joints)
@@ -110,6 +112,7 @@ class MujocoRobot:
         self.data = mujoco.MjData(model)
         self._tick = 0
         self._push: tuple[Vector, int] = (np.zeros(3), 0)
+        self._pushing = False
         self._pushes = PushQueue()
         self.reset()
 
@@ -158,7 +161,7 @@ class MujocoRobot:
         mujoco.mj_forward(model, data)
         # As held at rest: the first instant of the contacts is nothing that a sensor would show.
         R_world_base = data.xmat[self._ids.base].reshape(3, 3)
-        self._specific_force = -model.opt.gravity @ R_world_base
+        self._specific_force = -self._gravity @ R_world_base
         return self._state()
 
     def step(self, targets: JointTargets) -> RobotState:
@@ -177,16 +180,17 @@ class MujocoRobot:
         qpos, qvel, step = data.qpos, data.qvel, mujoco.mj_step
         d, specific_force = self._base_dof, np.zeros(3)
         R_world_base = data.xmat[self._ids.base].reshape(3, 3)  # a view, of the step's begin
+        base_velocity = qvel[d:d + 3]
         for i in range(self._steps):
             self._effort = drive.torque(i, qpos[self._qpos], qvel[self._dof])
             self._actuators.apply(data, self._effort)
             self._push_on()
-            before = qvel[d:d + 3].copy()
+            before = base_velocity.copy()
             step(model, data)
-            change = (qvel[d:d + 3] - before) / model.opt.timestep
-            specific_force += (change - model.opt.gravity) @ R_world_base
+            change = (base_velocity - before) / self._step_s
+            specific_force += (change - self._gravity) @ R_world_base
         self._tick += 1
-        if not (np.isfinite(qpos).all() and np.isfinite(qvel).all()):
+        if not isfinite(qpos.dot(qpos) + qvel.dot(qvel)):
             raise RobotError('the simulation became unstable in the tick that ends at '
                              f'{self._tick * self.tick_ns * 1e-9:.3f} s; lower the gains kp and '
                              'kd or the physics step')
@@ -207,6 +211,7 @@ class MujocoRobot:
             raise ParameterError(
                 f'a push must be three finite numbers [N], not {force_in_world!r}')
         self._push = (force, steps_per_tick(duration_ns, self._step_ns))
+        self._pushing = True
 
     def take_push(self, force: PushForce) -> None:
         """Let a force act from its time on, for ``HOLD_NS`` or until the next one."""
@@ -228,18 +233,20 @@ class MujocoRobot:
         force = self._pushes.due(self._tick * self.tick_ns)
         if force is not None:
             b = self._base_qpos
-            quaternion = np.roll(self.data.qpos[b + 3:b + 7], -1)
+            quaternion = _xyzw(self.data.qpos[b + 3:b + 7])
             steps = -(-HOLD_NS // self._step_ns)
             self.apply_push(force.in_world(quaternion), steps * self._step_ns)
 
     def _push_on(self) -> None:
+        if not self._pushing:
+            return
         force, left = self._push
         if left:
             self.data.xfrc_applied[self._ids.base, :3] = force
             self._push = (force, left - 1)
-        elif force.any():
+        else:
             self.data.xfrc_applied[self._ids.base, :3] = 0.0
-            self._push = (np.zeros(3), 0)
+            self._pushing = False
 
     @property
     def fallen(self) -> bool:
@@ -268,20 +275,27 @@ class MujocoRobot:
 
     def _state(self) -> RobotState:
         data, b, d = self.data, self._base_qpos, self._base_dof
-        quaternion = data.qpos[b + 3:b + 7]
+        qpos, qvel = data.qpos, data.qvel
+        quaternion = qpos[b + 3:b + 7]
         R_world_base = _rotation(quaternion)
         state = RobotState(
             time_ns=self._tick * self.tick_ns,
-            joint_position=data.qpos[self._qpos],
-            joint_velocity=data.qvel[self._dof],
+            joint_position=qpos[self._qpos].copy(),
+            joint_velocity=qvel[self._dof].copy(),
             joint_effort=self._effort.copy(),
-            base_position_in_world=data.qpos[b:b + 3].copy(),
-            base_quaternion=np.roll(quaternion, -1),
-            base_velocity_in_base=data.qvel[d:d + 3] @ R_world_base,
-            base_rate_in_base=data.qvel[d + 3:d + 6].copy(),
+            base_position_in_world=qpos[b:b + 3].copy(),
+            base_quaternion=_xyzw(quaternion),
+            base_velocity_in_base=qvel[d:d + 3] @ R_world_base,
+            base_rate_in_base=qvel[d + 3:d + 6].copy(),
             acceleration_in_base=self._specific_force.copy(),
             foot_force=self._contacts.foot_force(data))
         return state if self._sensors is None else self._sensors.measured(state)
+
+
+def _xyzw(quaternion: Vector) -> Vector:
+    """Quaternion x, y, z, w of one in MuJoCo's order."""
+    w, x, y, z = quaternion.tolist()
+    return np.array((x, y, z, w))
 
 
 def _rotation(quaternion: Vector) -> Vector:

@@ -4,12 +4,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.sensor_parameters import SensorParameters
+from dmp_cpg_ros.core.updated import updated
 
 STREAM = 1
 """Tells the sensors' random numbers from others of the same seed."""
@@ -56,7 +55,7 @@ class SensorNoise:
         """
         noise = self._deviation * self._random.standard_normal(30)
         noise[:6] += self._bias
-        return replace(
+        return updated(
             state,
             joint_position=state.joint_position + noise[6:18],
             joint_velocity=state.joint_velocity + noise[18:],

@@ -7,13 +7,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.robot.joint_actuators import Places
 from dmp_cpg_ros.robot.leg_reader import foot_position
 from dmp_cpg_ros.robot.model_reader import ModelIds
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 
 def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,
-                    dof: NDArray[np.int64]) -> NDArray[np.float64]:
+                    dof: Places) -> NDArray[np.float64]:
     """Return the torques of statics, τ = h(q) − Σ J_iᵀ f_i, with vertical foot forces f_i.
 
     The forces carry the weight and have no moment about the centre of mass; of all such forces
@@ -25,7 +26,7 @@ def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,
         MuJoCo's, after mj_forward, at rest.
     ids : ModelIds
         Base and feet.
-    dof : ndarray (12,)
+    dof : ndarray (12,) or slice
         Degrees of freedom of the joints.
 
     Returns
