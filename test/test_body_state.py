@@ -15,6 +15,7 @@ pytest.importorskip('rclpy')
 
 import ros_processes
 from core_examples import network, quadruped, standing_state
+from rclpy.serialization import deserialize_message
 from ros_processes import Processes, Ros
 
 from dmp_cpg_ros.core.body_estimation import BodyEstimator
@@ -30,6 +31,7 @@ from dmp_cpg_ros.nodes.robot_state_messages import (
     read_imu,
     read_odom,
 )
+from dmp_cpg_ros.nodes.serialized_messages import Serialized
 
 processes, ros_domain, ros = ros_processes.processes, ros_processes.ros_domain, ros_processes.ros
 
@@ -57,14 +59,20 @@ def test_an_old_or_absent_reading_is_missing(old: Any) -> None:
     assert readings.imu_is_usable and not any(readings.usable_contacts)
 
 
+def wire(message: Serialized) -> Any:
+    """The message as rclpy reads it."""
+    return deserialize_message(message.serialized, message.KIND)
+
+
 @pytest.mark.parametrize('bad', [math.nan, math.inf, -math.inf, 1e300])
 def test_numbers_that_are_not_finite_reach_the_estimators_judgement(bad: float) -> None:
     writer = RobotStateWriter()
     writer.fill(standing_state(quadruped()))
-    writer.imu.angular_velocity.y = bad
-    writer.foot_contacts.effort[2] = bad
-    contacts = FootContactsReader(strict=False).read(writer.foot_contacts)
-    readings = sensor_readings(0, {'joint_states': JOINTS, 'imu': (0, read_imu(writer.imu)),
+    imu, feet = wire(writer.imu), wire(writer.foot_contacts)
+    imu.angular_velocity.y = bad
+    feet.effort[2] = bad
+    contacts = FootContactsReader(strict=False).read(feet)
+    readings = sensor_readings(0, {'joint_states': JOINTS, 'imu': (0, read_imu(imu)),
                                    'foot_contacts': (0, contacts)})
     assert not readings.imu_is_usable
     assert readings.usable_contacts == (True, True, False, True)
@@ -75,7 +83,7 @@ def test_the_estimate_passes_bit_for_bit() -> None:
     estimator = BodyEstimator(robot, EstimationParameters())
     memory, _ = estimator.step(None, readings_of(standing_state(robot)))
     _, estimate = estimator.step(memory, readings_of(standing_state(robot, 4_000_000)))
-    message = EstimatedOdometryWriter().fill(estimate)
+    message = wire(EstimatedOdometryWriter().fill(estimate))
     read = read_odom(message)
     assert np.array_equal(read.position_in_world, estimate.position_in_world)
     assert np.array_equal(read.quaternion, estimate.quaternion)
@@ -106,15 +114,16 @@ def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros:
     def ticked(broken: bool) -> bool:
         time_ns = 4_000_000 * next(ticks)
         writer.fill(standing_state(quadruped(), time_ns))
+        feet = wire(writer.foot_contacts)
         if broken:
-            writer.foot_contacts.effort[1] = math.nan
+            feet.effort[1] = math.nan
         else:
-            publishers['imu'].publish(writer.imu)
-        publishers['foot_contacts'].publish(writer.foot_contacts)
-        publishers['joint_states'].publish(writer.joint_states)
-        publishers['reference'].publish(reference.fill(time_ns, np.zeros(3)))
+            publishers['imu'].publish(writer.imu.serialized)
+        publishers['foot_contacts'].publish(feet)
+        publishers['joint_states'].publish(writer.joint_states.serialized)
+        publishers['reference'].publish(reference.fill(time_ns, np.zeros(3)).serialized)
         publishers['canonical_state'].publish(
-            canonical.fill(time_ns, oscillators.locked_state(), np.zeros((4, 2))))
+            canonical.fill(time_ns, oscillators.locked_state(), np.zeros((4, 2))).serialized)
         return True
 
     def told_problems() -> str:

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, LocalPublisher
+from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, SuitePublisher
 
 
 class Outside:
@@ -35,7 +35,7 @@ def test_messages_that_callbacks_publish_wait_for_their_turn() -> None:
     local.attach('first', lambda message: seen.append(('witness', message)))
     local.attach('second', lambda message: seen.append(('end', message)))
     outside = Outside()
-    LocalPublisher(outside, 'first', local).publish('x')  # type: ignore[arg-type]
+    SuitePublisher(outside, 'first', local).publish('x')  # type: ignore[arg-type]
     assert seen == [('relay', 'x'), ('witness', 'x'), ('end', 'xx')]
     assert outside.messages == ['x']
 

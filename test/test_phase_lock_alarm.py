@@ -40,7 +40,7 @@ def test_a_disturbed_oscillator_raises_an_alarm_and_its_return_ends_it(ros: Ros)
 
     def run(count: int) -> None:
         for tick in range(node.health.ticks + 1, node.health.ticks + count + 1):
-            publisher.publish(writer.fill(tick * TICK_NS, reference))
+            publisher.publish(writer.fill(tick * TICK_NS, reference).serialized)
             ros.spin_until(partial(has_run, tick))
 
     def has_run(tick: int) -> bool:
@@ -86,7 +86,7 @@ def test_ticks_go_on_while_a_change_is_judged(ros: Ros) -> None:
         """Nobody spins the node: what runs its ticks is the look for the nearest value."""
         nonlocal sent
         sent += 1
-        publisher.publish(writer.fill(sent * TICK_NS, np.zeros(3)))
+        publisher.publish(writer.fill(sent * TICK_NS, np.zeros(3)).serialized)
         (result,) = node.set_parameters([Parameter('cadence_scale', value=4.0)])
         assert not result.successful
         assert 'nearest value' in result.reason

@@ -129,11 +129,11 @@ def test_sensors_that_fall_silent_by_their_stamps_stop_the_gait(
     def tick(imu: bool) -> None:
         at['ns'] += 5 * TICK_NS
         robot.fill(standing_state(quadruped(), at['ns']))
-        say['foot_contacts'].publish(robot.foot_contacts)
+        say['foot_contacts'].publish(robot.foot_contacts.serialized)
         if imu:
-            say['imu'].publish(robot.imu)
-        say['reference'].publish(reference.fill(at['ns'], np.zeros(3)))
-        say['canonical_state'].publish(oscillators.fill(at['ns'], x, rate))
+            say['imu'].publish(robot.imu.serialized)
+        say['reference'].publish(reference.fill(at['ns'], np.zeros(3)).serialized)
+        say['canonical_state'].publish(oscillators.fill(at['ns'], x, rate).serialized)
 
     def last() -> dict[str, str]:
         return read_inhibition_state(told[-1]).values if told else {}

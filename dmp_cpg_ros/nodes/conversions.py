@@ -21,14 +21,14 @@ from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, Joint
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.message_values import (
     Array,
+    checked,
     checked_numbers,
-    finite_list,
     frame_of,
     header_ns,
-    set_stamp,
 )
 from dmp_cpg_ros.nodes.robot_state_messages import BASE_FRAME
-from dmp_cpg_ros.nodes.serialized_messages import SerializedTwist
+from dmp_cpg_ros.nodes.serialized_messages import SerializedJointState, SerializedTwist
+from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraft
 
 CANONICAL_NAMES = tuple(f'{leg}_x{i}' for leg in LEGS for i in (1, 2))
 SHIFT_NAMES = tuple(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xyz')
@@ -62,17 +62,18 @@ class ReferenceWriter:
     """Writes ``reference``."""
 
     def __init__(self) -> None:
-        """Build the message."""
-        self.message = TwistStamped()
-        self.message.header.frame_id = BASE_FRAME
+        """Lay the message out."""
+        draft = SerializedDraft()
+        draft.text(BASE_FRAME)
+        self._message = RefilledMessage(draft, [draft.doubles(6)])
+        self._numbers = np.zeros(6)
 
-    def fill(self, time_ns: int, r: Array) -> TwistStamped:
+    def fill(self, time_ns: int, r: Array) -> SerializedTwist:
         """Refill with r = (v_x, v_y, γ), ndarray (3,); raises DataError when it is not finite."""
-        v_x, v_y, gamma = finite_list(r, 'reference')
-        twist = self.message.twist
-        twist.linear.x, twist.linear.y, twist.angular.z = v_x, v_y, gamma
-        set_stamp(self.message.header.stamp, time_ns)
-        return self.message
+        checked(r, 'reference')
+        numbers = self._numbers
+        numbers[:2], numbers[5] = r[:2], r[2]
+        return SerializedTwist(self._message.filled(time_ns, [numbers.tobytes()]))
 
 
 def read_reference(message: TwistStamped | SerializedTwist) -> Array:
@@ -87,15 +88,15 @@ class CanonicalStateWriter:
     """Writes ``canonical_state``."""
 
     def __init__(self) -> None:
-        """Build the message."""
+        """Lay the message out."""
         self._writer = JointStateWriter(CANONICAL_NAMES, ('position', 'velocity'))
 
-    def fill(self, time_ns: int, x: Array, x_dot: Array, gait: str = '') -> JointState:
+    def fill(self, time_ns: int, x: Array, x_dot: Array, gait: str = '',
+             ) -> SerializedJointState:
         """Refill with states and rates [1/s], ndarrays (4, 2), and the word of the gait in which
         their phases are to be read; raises DataError.
         """
-        self._writer.message.header.frame_id = gait
-        return self._writer.fill(time_ns, x, x_dot)
+        return self._writer.fill(time_ns, x, x_dot, frame=gait)
 
 
 class CanonicalStateReader:
@@ -105,7 +106,7 @@ class CanonicalStateReader:
         """Prepare the order."""
         self._reader = JointStateReader(CANONICAL_NAMES, ('position', 'velocity'))
 
-    def read(self, message: JointState) -> tuple[Array, Array]:
+    def read(self, message: JointState | SerializedJointState) -> tuple[Array, Array]:
         """States x and rates ẋ [1/s], ndarrays (4, 2); raises DataError."""
         x, x_dot = self._reader.read(message)
         return x.reshape(len(LEGS), 2), x_dot.reshape(len(LEGS), 2)
@@ -115,10 +116,10 @@ class JointTargetsWriter:
     """Writes the ``joint_targets`` of one leg."""
 
     def __init__(self, leg: str) -> None:
-        """Build the message of a leg."""
+        """Lay the message of a leg out."""
         self._writer = JointStateWriter([f'{leg}_{joint}' for joint in JOINTS_OF_LEG], FIELDS)
 
-    def fill(self, time_ns: int, targets: JointTargets) -> JointState:
+    def fill(self, time_ns: int, targets: JointTargets) -> SerializedJointState:
         """Refill with the targets of the leg's joints; raises DataError."""
         return self._writer.fill(time_ns, targets.position, targets.velocity, targets.effort)
 
@@ -132,7 +133,7 @@ class JointTargetsReader:
             leg: JointStateReader([f'{leg}_{joint}' for joint in JOINTS_OF_LEG], FIELDS)
             for leg in LEGS}
 
-    def read(self, message: JointState) -> tuple[str, JointTargets]:
+    def read(self, message: JointState | SerializedJointState) -> tuple[str, JointTargets]:
         """Name of the leg and its targets; raises DataError, also for names of no leg."""
         names = message.name
         leg = names[0].partition('_')[0] if names else ''
@@ -150,21 +151,20 @@ class PostureFeedbackWriter:
     """
 
     def __init__(self) -> None:
-        """Build the message."""
+        """Lay the message out."""
         names = JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES
         self._writer = JointStateWriter(names, FIELDS)
-        self._message = self._writer.message
         self._position, self._velocity, self._effort = (np.zeros(len(names)) for _ in FIELDS)
 
-    def fill(self, time_ns: int, feedback: PostureFeedback) -> JointState:
+    def fill(self, time_ns: int, feedback: PostureFeedback) -> SerializedJointState:
         """Refill with a feedback; raises DataError when it is not finite."""
         self._position[_JOINTS] = feedback.measured
         self._position[_FEET] = feedback.shift_in_base.reshape(-1)
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
         self._effort[_JOINTS] = feedback.torque
-        self._message.header.frame_id = feedback.mode
-        return self._writer.fill(time_ns, self._position, self._velocity, self._effort)
+        return self._writer.fill(
+            time_ns, self._position, self._velocity, self._effort, frame=feedback.mode)
 
 
 class PostureFeedbackReader:
@@ -174,7 +174,7 @@ class PostureFeedbackReader:
         """Prepare the order."""
         self._reader = JointStateReader(JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES, FIELDS)
 
-    def read(self, message: JointState) -> PostureFeedback:
+    def read(self, message: JointState | SerializedJointState) -> PostureFeedback:
         """Read the feedback; raises DataError."""
         position, velocity, effort = self._reader.read(message)
         return PostureFeedback(

@@ -2,13 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """``JointState`` messages as arrays, by name.
 
-Writers keep one message and refill its arrays, because building a message costs more than all
-else. Values pass bit for bit.
+Values pass bit for bit.
 """
 
 from __future__ import annotations
 
-import array
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,7 +14,9 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.message_values import Array, checked, set_stamp
+from dmp_cpg_ros.nodes.message_values import Array, checked
+from dmp_cpg_ros.nodes.serialized_messages import SerializedJointState
+from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraft
 
 FIELDS = ('position', 'velocity', 'effort')
 """The arrays of a ``JointState``."""
@@ -78,7 +78,7 @@ class JointStateReader:
         self._order, self._fields = NameOrder(names), tuple(fields)
         self._strict = strict
 
-    def read(self, message: JointState) -> list[Array]:
+    def read(self, message: JointState | SerializedJointState) -> list[Array]:
         """Arrays (n,) of the needed fields in our order; raises DataError."""
         names = message.name
         index, size = self._order.index(names), len(names)
@@ -94,7 +94,7 @@ class JointStateReader:
 
 
 class JointStateWriter:
-    """One ``JointState`` message whose arrays are refilled.
+    """A ``JointState`` whose arrays are refilled.
 
     Parameters
     ----------
@@ -107,16 +107,11 @@ class JointStateWriter:
     """
 
     def __init__(self, names: Sequence[str], fields: Sequence[str], frame: str = '') -> None:
-        """Build the message; values are zero until the first fill."""
-        self.message = JointState(name=list(names))
-        self.message.header.frame_id = frame
-        self._fields = tuple(fields)
-        self._views: list[Array] = []
-        for field in self._fields:
-            setattr(self.message, field, array.array('d', bytes(8 * len(names))))
-            self._views.append(np.frombuffer(getattr(self.message, field)))
+        """Lay the message out."""
+        self._names, self._fields = tuple(names), tuple(fields)
+        self._lay_out(frame)
 
-    def fill(self, time_ns: int, *values: Array) -> JointState:
+    def fill(self, time_ns: int, *values: Array, frame: str | None = None) -> SerializedJointState:
         """Refill the message.
 
         Parameters
@@ -125,18 +120,34 @@ class JointStateWriter:
             Stamp [ns].
         *values : ndarrays
             One per field, of any shape, entries in the order of the names.
+        frame : str, optional
+            Frame of the header from now on.
 
         Returns
         -------
-        JointState
-            The same message at every call.
+        SerializedJointState
 
         Raises
         ------
         DataError
             If a number is not finite: nothing of that kind leaves a node.
         """
-        for view, new, field in zip(self._views, values, self._fields, strict=True):
-            view[:] = checked(new.reshape(-1), field)
-        set_stamp(self.message.header.stamp, time_ns)
-        return self.message
+        if frame is not None and frame != self._frame:
+            self._lay_out(frame)
+        return self._like.refilled(self._message.filled(time_ns, [
+            checked(new.reshape(-1), field).tobytes()
+            for new, field in zip(values, self._fields, strict=True)]), time_ns)
+
+    def _lay_out(self, frame: str) -> None:
+        self._frame, draft, places = frame, SerializedDraft(), []
+        draft.text(frame)
+        draft.count(len(self._names))
+        for name in self._names:
+            draft.text(name)
+        for field in FIELDS:
+            number = len(self._names) if field in self._fields else 0
+            draft.count(number)
+            if number:
+                places.append(draft.doubles(number))
+        self._message = RefilledMessage(draft, places)
+        self._like = SerializedJointState(bytes(draft.data))

@@ -15,6 +15,8 @@ from typing import Any
 
 from rclpy.publisher import Publisher
 
+from dmp_cpg_ros.nodes.serialized_messages import Serialized
+
 
 class LocalDelivery:
     """Readers by topic, and the queue of what is under way.
@@ -62,8 +64,8 @@ class LocalDelivery:
             queue.clear()
 
 
-class LocalPublisher:
-    """A publisher whose messages also go to the readers in this process.
+class SuitePublisher:
+    """A publisher of messages and of serialized ones, also to the readers in this process.
 
     Parameters
     ----------
@@ -71,15 +73,17 @@ class LocalPublisher:
         Publishes to the world outside.
     topic : str
         Name of the topic in the table of interfaces.
-    local : LocalDelivery
-        The process's delivery.
+    local : LocalDelivery, optional
+        The process's delivery, where several nodes share it.
     """
 
-    def __init__(self, publisher: Publisher, topic: str, local: LocalDelivery) -> None:
+    def __init__(self, publisher: Publisher, topic: str, local: LocalDelivery | None) -> None:
         """Keep the parts."""
         self._publisher, self._topic, self._local = publisher, topic, local
 
     def publish(self, message: Any) -> None:
         """Publish outside, then inside."""
-        self._publisher.publish(message)
-        self._local.publish(self._topic, message)
+        self._publisher.publish(
+            message.serialized if isinstance(message, Serialized) else message)
+        if self._local is not None:
+            self._local.publish(self._topic, message)

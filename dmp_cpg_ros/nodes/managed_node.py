@@ -21,7 +21,7 @@ from rclpy.subscription import Subscription
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.diagnostics import NodeHealth
 from dmp_cpg_ros.nodes.interfaces import Interface, interface, partners
-from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, LocalPublisher
+from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, SuitePublisher
 from dmp_cpg_ros.nodes.parameterized_node import ParameterizedNode
 from dmp_cpg_ros.nodes.readiness import missing_connections
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
@@ -79,15 +79,13 @@ class ManagedNode(ParameterizedNode):
 
     # Topics and services -----------------------------------------------------------------------
 
-    def publisher(self, name: str) -> Publisher | LocalPublisher:
+    def publisher(self, name: str) -> SuitePublisher:
         """Create a publisher of an interface of the table."""
         topic = interface(name)
         publisher = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._entities.append(publisher)
         self._outputs.append((topic, publisher))
-        if self.local is None:
-            return publisher
-        return LocalPublisher(publisher, topic.name, self.local)
+        return SuitePublisher(publisher, topic.name, self.local)
 
     def listen(self, topic: str | Interface, callback: Callable[[Any], None], *,
                command: bool = False, raw: bool = False,

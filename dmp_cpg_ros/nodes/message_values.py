@@ -86,8 +86,3 @@ def checked_numbers(values: tuple[float, ...], what: str) -> tuple[float, ...]:
         if not -LARGEST <= value <= LARGEST:
             raise DataError(f'{what} = {values} must be finite and at most {LARGEST:g}')
     return values
-
-
-def finite_list(values: Array, what: str) -> list[float]:
-    """Return an array as a list, or raise DataError as :func:`checked` does."""
-    return list(checked(values, what).tolist())

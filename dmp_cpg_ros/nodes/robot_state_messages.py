@@ -16,8 +16,13 @@ from dmp_cpg_ros.core.body_estimate import BodyEstimate
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
-from dmp_cpg_ros.nodes.message_values import Array, checked, finite_list, set_stamp
-from dmp_cpg_ros.nodes.serialized_messages import SerializedImu
+from dmp_cpg_ros.nodes.message_values import Array, checked, set_stamp
+from dmp_cpg_ros.nodes.serialized_messages import (
+    SerializedImu,
+    SerializedJointState,
+    SerializedOdometry,
+)
+from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraft
 
 BASE_FRAME, WORLD_FRAME = 'base_link', 'odom'
 
@@ -36,36 +41,77 @@ class RobotStateWriter:
         Valid after :meth:`fill`.
     """
 
+    imu: SerializedImu
+    odom: SerializedOdometry
+    foot_contacts: SerializedJointState
+    joint_states: SerializedJointState
+
     def __init__(self) -> None:
-        """Build the messages."""
-        self.clock, self.imu, self.odom = Clock(), Imu(), Odometry()
-        self.imu.header.frame_id = BASE_FRAME
-        self.imu.orientation_covariance[0] = -1.0  # says that there is no orientation
-        self.odom.header.frame_id, self.odom.child_frame_id = WORLD_FRAME, BASE_FRAME
+        """Lay the messages out."""
+        self.clock = Clock()
+        self._imu, self._odom = _imu_message(), OdometryMessage()
         self._joints = JointStateWriter(JOINT_NAMES, FIELDS, BASE_FRAME)
         self._feet = JointStateWriter(FOOT_NAMES, ('effort',), BASE_FRAME)
-        self.joint_states, self.foot_contacts = self._joints.message, self._feet.message
 
     def fill(self, state: RobotState) -> None:
         """Refill all messages from a state; raises DataError when a number is not finite."""
         time_ns = state.time_ns
-        self._joints.fill(time_ns, state.joint_position, state.joint_velocity, state.joint_effort)
-        self._feet.fill(time_ns, state.foot_force)
+        self.joint_states = self._joints.fill(
+            time_ns, state.joint_position, state.joint_velocity, state.joint_effort)
+        self.foot_contacts = self._feet.fill(time_ns, state.foot_force)
         set_stamp(self.clock.clock, time_ns)
-        set_stamp(self.imu.header.stamp, time_ns)
-        set_stamp(self.odom.header.stamp, time_ns)
-        rate = finite_list(state.base_rate_in_base, 'base_rate_in_base')
-        quaternion = finite_list(state.base_quaternion, 'base_quaternion')
-        _set_vector(self.imu.angular_velocity,
-                    finite_list(state.measured_rate_in_base, 'measured_rate_in_base'))
-        _set_vector(self.imu.linear_acceleration,
-                    finite_list(state.acceleration_in_base, 'acceleration_in_base'))
-        _set_vector(self.odom.pose.pose.position,
-                    finite_list(state.base_position_in_world, 'base_position_in_world'))
-        _set_quaternion(self.odom.pose.pose.orientation, quaternion)
-        _set_vector(self.odom.twist.twist.linear,
-                    finite_list(state.base_velocity_in_base, 'base_velocity_in_base'))
-        _set_vector(self.odom.twist.twist.angular, rate)
+        self.imu = SerializedImu(self._imu.filled(time_ns, (
+            checked(state.measured_rate_in_base, 'measured_rate_in_base').tobytes(),
+            checked(state.acceleration_in_base, 'acceleration_in_base').tobytes())))
+        self.odom = self._odom.fill(
+            time_ns,
+            checked(state.base_position_in_world, 'base_position_in_world'),
+            checked(state.base_quaternion, 'base_quaternion'),
+            checked(state.base_velocity_in_base, 'base_velocity_in_base'),
+            checked(state.base_rate_in_base, 'base_rate_in_base'))
+
+
+def _imu_message() -> RefilledMessage:
+    """Lay an ``Imu`` out whose orientation is marked as unknown."""
+    draft = SerializedDraft()
+    draft.text(BASE_FRAME)
+    draft.doubles(4)
+    covariance = draft.doubles(9)
+    draft.data[covariance] = np.array((-1.0, *[0.0] * 8)).tobytes()
+    rate = draft.doubles(3)
+    draft.doubles(9)
+    force = draft.doubles(3)
+    draft.doubles(9)
+    return RefilledMessage(draft, [rate, force])
+
+
+class OdometryMessage:
+    """An ``Odometry`` of ``base_link`` in ``odom`` that is refilled."""
+
+    def __init__(self) -> None:
+        """Lay the message out."""
+        draft = SerializedDraft()
+        draft.text(WORLD_FRAME)
+        draft.text(BASE_FRAME)
+        position, quaternion, _ = draft.doubles(3), draft.doubles(4), draft.doubles(36)
+        velocity, rate, self._covariance = draft.doubles(3), draft.doubles(3), draft.doubles(36)
+        self._message = RefilledMessage(
+            draft, [position, quaternion, velocity, rate, self._covariance])
+        self._no_covariance = bytes(8 * 36)
+
+    def fill(self, time_ns: int, position: Array, quaternion: Array, velocity: Array,
+             rate: Array, velocity_variance: Array | None = None) -> SerializedOdometry:
+        """Refill with position [m], quaternion x, y, z, w, velocity [m/s] and turn rate [rad/s] in
+        the base's frame, ndarrays of float64, and with the variances of the velocity [m²/s²].
+        """
+        covariance = self._no_covariance
+        if velocity_variance is not None:
+            diagonal = np.zeros(36)
+            diagonal[:15:7] = velocity_variance
+            covariance = diagonal.tobytes()
+        return SerializedOdometry(self._message.filled(time_ns, (
+            position.tobytes(), quaternion.tobytes(), velocity.tobytes(), rate.tobytes(),
+            covariance)))
 
 
 class JointsReader:
@@ -76,7 +122,7 @@ class JointsReader:
         self._full = JointStateReader(JOINT_NAMES, FIELDS)
         self._without_effort = JointStateReader(JOINT_NAMES, ('position', 'velocity'))
 
-    def read(self, message: JointState) -> tuple[Array, Array, Array]:
+    def read(self, message: JointState | SerializedJointState) -> tuple[Array, Array, Array]:
         """Position [rad], velocity [rad/s] and effort [N m] (0 where absent), each (12,)."""
         if len(message.effort):
             position, velocity, effort = self._full.read(message)
@@ -98,7 +144,7 @@ class FootContactsReader:
         """Prepare the order of the feet."""
         self._reader = JointStateReader(FOOT_NAMES, ('effort',), strict=strict)
 
-    def read(self, message: JointState) -> Array:
+    def read(self, message: JointState | SerializedJointState) -> Array:
         """Normal forces, ndarray (4,) [N]."""
         return self._reader.read(message)[0]
 
@@ -146,21 +192,18 @@ class EstimatedOdometryWriter:
     """Writes ``estimated_odom``."""
 
     def __init__(self) -> None:
-        """Build the message."""
-        self.message = Odometry()
-        self.message.header.frame_id, self.message.child_frame_id = WORLD_FRAME, BASE_FRAME
+        """Lay the message out."""
+        self._message = OdometryMessage()
 
-    def fill(self, estimate: BodyEstimate) -> Odometry:
+    def fill(self, estimate: BodyEstimate) -> SerializedOdometry:
         """Refill with an estimate; of the covariances only the velocity's variances are known."""
-        message = self.message
-        set_stamp(message.header.stamp, estimate.time_ns)
-        pose, twist = message.pose.pose, message.twist.twist
-        _set_vector(pose.position, finite_list(estimate.position_in_world, 'position'))
-        _set_quaternion(pose.orientation, finite_list(estimate.quaternion, 'quaternion'))
-        _set_vector(twist.linear, finite_list(estimate.velocity_in_base, 'velocity'))
-        _set_vector(twist.angular, finite_list(estimate.rate_in_base, 'rate'))
-        message.twist.covariance[:15:7] = estimate.velocity_variance
-        return message
+        return self._message.fill(
+            estimate.time_ns,
+            checked(estimate.position_in_world, 'position'),
+            checked(estimate.quaternion, 'quaternion'),
+            checked(estimate.velocity_in_base, 'velocity'),
+            checked(estimate.rate_in_base, 'rate'),
+            estimate.velocity_variance)
 
 
 def robot_state(time_ns: int, joints: tuple[Array, Array, Array], base: BaseMotion,
@@ -183,11 +226,3 @@ def _quaternion(q: Any) -> Array:
     if not abs(quaternion.dot(quaternion) - 1.0) < 0.01:
         raise DataError(f'quaternion {quaternion} must have length 1')
     return quaternion
-
-
-def _set_vector(vector: Any, values: list[float]) -> None:
-    vector.x, vector.y, vector.z = values
-
-
-def _set_quaternion(quaternion: Any, values: list[float]) -> None:
-    quaternion.x, quaternion.y, quaternion.z, quaternion.w = values

@@ -14,10 +14,11 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu, JointState
 
@@ -27,27 +28,45 @@ from dmp_cpg_ros.nodes.message_values import Array, stamp_in_ns
 CDR_LITTLE_ENDIAN = b'\x00\x01'
 """First two bytes of a message that this module reads itself."""
 
-_BODY = 4
+BODY = 4
 """Where a message begins: behind the bytes that say how it is encoded."""
+
+
+class Serialized:
+    """A message known by its bytes.
+
+    Attributes
+    ----------
+    serialized : bytes
+        The message.
+    stamp_ns : int
+        Stamp of its header [ns].
+    """
+
+    __slots__ = ('serialized', 'stamp_ns')
+    KIND: ClassVar[type]
+
+    serialized: bytes
+    stamp_ns: int
+
 
 _HEADER, _COUNT = struct.Struct('<iII'), struct.Struct('<I')
 _TWIST, _IMU = struct.Struct('<6d'), struct.Struct('<104x3d72x3d')
 
 
-class SerializedJointState:
+class SerializedJointState(Serialized):
     """Stamp, names and arrays of a serialized ``JointState``.
 
     Attributes
     ----------
-    stamp_ns : int
-        [ns]
     frame_id : str
         Frame of the header.
     name : list of str
         Names; the same list object for the same names.
     """
 
-    __slots__ = ('_data', '_places', 'frame_id', 'name', 'stamp_ns')
+    __slots__ = ('_places', 'frame_id', 'name')
+    KIND = JointState
 
     def __init__(self, data: bytes) -> None:
         """Read the bytes; raises struct.error or ValueError when they are cut short."""
@@ -55,7 +74,14 @@ class SerializedJointState:
         self.name, at = _names(data, at)
         first = _doubles(data, at)
         second = _doubles(data, first[1])
-        self._data, self._places = data, (first, second, _doubles(data, second[1]))
+        self.serialized, self._places = data, (first, second, _doubles(data, second[1]))
+
+    def refilled(self, data: bytes, stamp_ns: int) -> SerializedJointState:
+        """Return a message of the same layout, without reading that again."""
+        message = SerializedJointState.__new__(SerializedJointState)
+        message.serialized, message.stamp_ns = data, stamp_ns
+        message.frame_id, message.name, message._places = self.frame_id, self.name, self._places
+        return message
 
     @property
     def position(self) -> Array:
@@ -74,54 +100,64 @@ class SerializedJointState:
 
     def _array(self, which: int) -> Array:
         begin, end = self._places[which]
-        return np.frombuffer(self._data[begin:end])
+        return np.frombuffer(self.serialized[begin:end])
 
 
-class SerializedTwist:
+class SerializedTwist(Serialized):
     """Stamp and numbers of a serialized ``TwistStamped``.
 
     Attributes
     ----------
-    stamp_ns : int
-        [ns]
     numbers : tuple of float
         Linear x, y, z [m/s], angular x, y, z [rad/s].
     """
 
-    __slots__ = ('numbers', 'stamp_ns')
+    __slots__ = ('numbers',)
+    KIND = TwistStamped
 
     def __init__(self, data: bytes) -> None:
         """Read the bytes; raises struct.error when they are cut short."""
+        self.serialized = data
         self.stamp_ns, _, at = _header(data)
-        self.numbers: tuple[float, ...] = _TWIST.unpack_from(data, _aligned(at, 8))
+        self.numbers: tuple[float, ...] = _TWIST.unpack_from(data, aligned(at, 8))
 
 
-class SerializedImu:
+class SerializedImu(Serialized):
     """Stamp and measurements of a serialized ``Imu``.
 
     Attributes
     ----------
-    stamp_ns : int
-        [ns]
     rate : tuple of float
         Angular velocity [rad/s].
     force : tuple of float
         Linear acceleration [m/s^2].
     """
 
-    __slots__ = ('force', 'rate', 'stamp_ns')
+    __slots__ = ('force', 'rate')
+    KIND = Imu
 
     def __init__(self, data: bytes) -> None:
         """Read the bytes; raises struct.error when they are cut short."""
+        self.serialized = data
         self.stamp_ns, _, at = _header(data)
-        numbers = _IMU.unpack_from(data, _aligned(at, 8))
+        numbers = _IMU.unpack_from(data, aligned(at, 8))
         self.rate, self.force = numbers[:3], numbers[3:]
 
 
+class SerializedOdometry(Serialized):
+    """A serialized ``Odometry``, which the suite only writes."""
+
+    __slots__ = ()
+    KIND = Odometry
+
+    def __init__(self, data: bytes) -> None:
+        """Read the stamp; raises struct.error when the bytes are cut short."""
+        self.serialized = data
+        self.stamp_ns = _header(data)[0]
+
+
 _READERS: dict[type, Callable[[bytes], Any]] = {
-    JointState: SerializedJointState,
-    TwistStamped: SerializedTwist,
-    Imu: SerializedImu,
+    kind.KIND: kind for kind in (SerializedJointState, SerializedTwist, SerializedImu)
 }
 
 
@@ -155,15 +191,15 @@ def serialized_reader(kind: type) -> Callable[[bytes], Any] | None:
     return reader
 
 
-def _aligned(at: int, size: int) -> int:
-    """Place of the next primitive of a size of 4 or 8 bytes."""
-    return at + (_BODY - at) % size
+def aligned(at: int, size: int) -> int:
+    """Place of the next primitive of a size of 4 or 8 bytes, at or behind a place."""
+    return at + (BODY - at) % size
 
 
 def _header(data: bytes) -> tuple[int, str, int]:
     """Stamp [ns] and frame of the header, and where what follows it begins."""
-    seconds, rest, length = _HEADER.unpack_from(data, _BODY)
-    begin = _BODY + _HEADER.size
+    seconds, rest, length = _HEADER.unpack_from(data, BODY)
+    begin = BODY + _HEADER.size
     end = begin + length
     return stamp_in_ns(seconds, rest), data[begin:end - 1].decode() if length else '', end
 
@@ -183,7 +219,7 @@ def _names(data: bytes, at: int) -> tuple[list[str], int]:
     Senders repeat their names in every message, so these are compared with known ones; the
     bytes between texts are arbitrary and not compared.
     """
-    at = _aligned(at, 4)
+    at = aligned(at, 4)
     known = _known_names.get(data[at:at + _KEY])
     if known is not None:
         end = at + known.layout.size
@@ -208,7 +244,7 @@ def _new_names(data: bytes, begin: int) -> tuple[list[str], int]:
     at, layout, names = begin + 4, '<I', []
     content: list[int | bytes] = [count]
     for _ in range(count):
-        here = _aligned(at, 4)
+        here = aligned(at, 4)
         (length,) = _COUNT.unpack_from(data, here)
         raw = data[here + 4:here + 4 + length]
         if len(raw) < max(length, 1):
@@ -225,12 +261,12 @@ def _new_names(data: bytes, begin: int) -> tuple[list[str], int]:
 
 def _doubles(data: bytes, at: int) -> tuple[int, int]:
     """Begin and end of a sequence of doubles."""
-    at = _aligned(at, 4)
+    at = aligned(at, 4)
     (count,) = _COUNT.unpack_from(data, at)
     at += 4
     if not count:
         return at, at
-    at = _aligned(at, 8)
+    at = aligned(at, 8)
     end = at + 8 * count
     if end > len(data):
         raise ValueError('an array is cut short')
