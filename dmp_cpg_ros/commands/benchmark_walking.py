@@ -4,9 +4,9 @@
 
 speeds: steady velocities against the commanded ones. pushes: largest speed change survived, in
 eight directions at every phase. rough: share of seeds that cross 5 m of rough ground. contacts:
-the same with and without what listens to early and late touchdown. gaits: every ordered pair of
-gaits changed while moving. robots: other robots, with their files alone; those of the extra
-`robots` are left out where it is not installed.
+the same with and without the feedback of touchdown and the stumbling reflex. gaits: every ordered
+pair of gaits changed while moving. robots: other robots, with their files alone; those of the
+extra `robots` are left out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """

@@ -93,6 +93,10 @@ class FootPath:
             (x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing),
         )
 
+    def swung(self, cycle_position: float) -> float:
+        """Share of the swing that has passed; outside of [0, 1] in stance."""
+        return cycle_position / (1.0 - self.duty) + 0.5
+
     def _stance(self, t: float) -> tuple[float, float, float, float]:
         """Planar position and velocity of a foot that stands, t seconds after mid-stance."""
         angle = self.gamma * t

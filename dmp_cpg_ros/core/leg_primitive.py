@@ -23,9 +23,10 @@ from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.phase import scalar_phase, scalar_phase_rate
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS, JointTargets
+from dmp_cpg_ros.core.stumble_reflex import Stumble, stumble_step, way_of, yielding
 from dmp_cpg_ros.core.swing_activity import activity_step
 from dmp_cpg_ros.core.transformation import TransformationState, TransformationSystem
-from dmp_cpg_ros.core.triples import Matrix, Triple, moved, pair, plus, triple
+from dmp_cpg_ros.core.triples import Matrix, Triple, minus, moved, pair, plus, triple
 
 Array = NDArray[np.float64]
 
@@ -76,6 +77,20 @@ class LegParameters(Parameters):
         minimum=0.1,
         maximum=1e3,
     )
+    stumble_lift: float = parameter(
+        0.17,
+        'additional height of a swinging foot that something holds up, as a fraction of the '
+        'standing height; 0: no reflex',
+        minimum=0.0,
+        maximum=0.4,
+    )
+    stumble_lag: float = parameter(
+        0.035,
+        'distance from its target at which a swinging foot that stands still has met '
+        'something, as a fraction of the standing height',
+        minimum=0.005,
+        maximum=1.0,
+    )
 
 
 @dataclass(frozen=True)
@@ -90,11 +105,14 @@ class LegState:
         Swing activity a in [0, 1].
     shift_in_base : ndarray (3,)
         Shift of the foot's path that acts now [m].
+    stumble : Stumble
+        What the stumbling reflex does.
     """
 
     joints: TransformationState
     activity: float
     shift_in_base: Array
+    stumble: Stumble = Stumble()
 
 
 @dataclass(frozen=True)
@@ -149,6 +167,8 @@ class LegPrimitive:
         self.shift_rates = ShiftRates(
             parameters.placement_rate, parameters.yielding_rate, parameters.levelling_rate)
         self.clearance = parameters.clearance * description.stance_height
+        self.stumble_lift = parameters.stumble_lift * description.stance_height
+        self.stumble_lag = parameters.stumble_lag * description.stance_height
         self.transformation = TransformationSystem(
             parameters.stiffness,
             parameters.damping,
@@ -200,18 +220,9 @@ class LegPrimitive:
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
         swinging = abs(position) < 0.5 * (1.0 - duty)
-        shift = triple(state.shift_in_base.tolist())
-        if dt <= 0.0:
-            shift_rate = (0.0, 0.0, 0.0)
-        elif swinging:
-            height, _ = swing_height(position / (1.0 - duty) + 0.5)
-            shift_rate = self.shift_rates.in_swing(
-                shift, triple(feedback.shift_in_base.tolist()), height, activity, dt)
-        else:
-            shift_rate = self.shift_rates.in_stance(
-                shift, pair(feedback.drift_in_base.tolist()), self._away(state, feedback),
-                activity, dt)
-        shift = moved(shift, shift_rate, dt)
+        at = self.kinematics.foot(feedback.joint_position)
+        target = self.kinematics.foot(state.joints.position)
+        away = minus(at, target)
         more_x, more_y, more_gamma = feedback.correction.tolist()
         path = FootPath(
             self._foothold,
@@ -220,25 +231,46 @@ class LegPrimitive:
             gamma + more_gamma,
             omega,
             duty,
-            activity * self.clearance,
+            activity * (self.clearance + (self.stumble_lift if state.stumble.wary else 0.0)),
             self.rolling,
         )
         foot, slope = path.at(position)
+        path_velocity = moved((0.0, 0.0, 0.0), slope, rate / (2.0 * pi))
+        shift, stumble = triple(state.shift_in_base.tolist()), state.stumble
+        if dt <= 0.0:
+            shift_rate = (0.0, 0.0, 0.0)
+        elif swinging:
+            swung = path.swung(position)
+            stumble = self._stumble(state, path, swung, at, target, activity, dt)
+            height, _ = swing_height(swung)
+            shift_rate = self.shift_rates.in_swing(
+                shift, triple(feedback.shift_in_base.tolist()), height, activity, dt)
+            shift_rate = yielding(stumble, shift_rate, path_velocity, away)
+        else:
+            stumble = stumble_step(stumble, None, 0.0, 0.0, dt)
+            shift_rate = self.shift_rates.in_stance(
+                shift, pair(feedback.drift_in_base.tolist()), away[:2], activity, dt)
+        shift = moved(shift, shift_rate, dt)
         bounce = gait.bounce(position, duty, omega)
-        foot = plus(plus(foot, shift), (0.0, 0.0, -activity * bounce.height))
-        velocity = moved(shift_rate, slope, rate / (2.0 * pi))
+        foot = plus(plus(foot, shift), (0.0, 0.0, stumble.height - activity * bounce.height))
+        velocity = plus(plus(shift_rate, path_velocity), (0.0, 0.0, stumble.rate))
         velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
         angles = self.kinematics.angles(foot)
         _, jacobian = self.kinematics.foot_and_jacobian(angles)
         goal, goal_velocity = np.array(angles), np.array(_joint_velocity(jacobian, velocity))
         joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
-        return LegState(joints, activity, np.array(shift)), goal, goal_velocity
+        return LegState(joints, activity, np.array(shift), stumble), goal, goal_velocity
 
-    def _away(self, state: LegState, feedback: LegFeedback) -> tuple[float, float]:
-        """Where the foot is horizontally relative to its target [m]."""
-        x, y, _ = self.kinematics.foot(feedback.joint_position)
-        target_x, target_y, _ = self.kinematics.foot(state.joints.position)
-        return x - target_x, y - target_y
+    def _stumble(
+        self, state: LegState, path: FootPath, swung: float, at: Triple, target: Triple,
+        activity: float, dt: float,
+    ) -> Stumble:
+        """What the stumbling reflex does to the swinging foot."""
+        if self.stumble_lift == 0.0:
+            return state.stumble
+        way = way_of(path, swung, at, target)
+        return stumble_step(
+            state.stumble, way, activity * self.stumble_lift, self.stumble_lag, dt)
 
     def targets(
         self,

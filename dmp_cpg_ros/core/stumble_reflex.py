@@ -1,0 +1,242 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The stumbling reflex: a swinging foot that is held up by an obstacle is lifted over it.
+
+Cats lift a paw higher when its back touches something while it swings (Forssberg 1979); with
+oscillators as here it took robots over steps blind (Focchi et al. 2013; Ajallooeian et al. 2013).
+The touch is felt by the joints: the foot has fallen behind its target along its way, further than
+targets that act late would leave it, and stands still over the ground. That needs no contact
+sensor, and no message beyond the measured angles, which reach the legs with the posture's
+feedback.
+
+A foot that tripped yields at once, so that it neither pushes the body back nor is wedged by
+friction, rises, and goes on when it is up. What comes too late in a swing to be cleared is cleared
+by the next ones: for ``WARY`` swings the foot steps as high from the start.
+
+A foot that comes down on something high stands still as well, above its target. It yields, too,
+and its path comes back to the height of the others over the stance, so that it does not throw the
+body up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, hypot, pi
+
+from dmp_cpg_ros.core.foot_path import LOWERING, FootPath
+from dmp_cpg_ros.core.triples import Triple
+
+SLOWEST = 0.02
+"""Speed of the body over a foot below which the foot feels nothing [m/s]."""
+
+FEELING = (0.3, 0.85)
+"""Shares of the swing between which the foot feels what holds it up."""
+
+STANDSTILL = 0.35
+"""Speed over the ground, as a share of the swing's mean, below which a foot is held up."""
+
+TOUCHING = 0.75
+"""Share of the swing from which a foot may feel the ground under it."""
+
+SETTLED = 0.6
+"""Speed downwards, as a share of the mean, below which a foot that should come down has landed."""
+
+LATENCY = 0.02
+"""Time by which targets may act late without being taken for an obstacle [s]."""
+
+LANDING = 0.35
+"""Share of the swing, at its end, in which the additional height is given back."""
+
+RISEN = 0.7
+"""Share of the additional height from which a foot that tripped goes on."""
+
+QUICKNESS = 60.0
+"""Rate at which the height goes to what is wanted [1/s]."""
+
+FOLLOWING = 120.0
+"""Rate at which the foot's speed is followed [1/s]."""
+
+YIELDING = 40.0
+"""Rate at which the target of a foot that yields goes to where the foot is [1/s]."""
+
+WARY = 2
+"""Swings after a stumble in which the foot steps higher from the start."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """Where a swinging foot is on its way, in the direction in which the body is to go over it.
+
+    Attributes
+    ----------
+    swung : float
+        Share of the swing that has passed, in [0, 1).
+    place, level : float
+        Measured place along the way, and height, in the base [m].
+    target_place, target_level : float
+        The same of its target [m].
+    body_speed : float
+        Speed of the body over this foot [m/s].
+    swing_speed, sinking_speed : float
+        Mean speed of the swing over the ground, and mean speed with which it comes down [m/s].
+    """
+
+    swung: float
+    place: float
+    level: float
+    target_place: float
+    target_level: float
+    body_speed: float
+    swing_speed: float
+    sinking_speed: float
+
+
+@dataclass(frozen=True)
+class Stumble:
+    """What the reflex does to one foot.
+
+    Attributes
+    ----------
+    tripped : bool
+        Whether something held the foot up in this swing.
+    landed : bool
+        Whether it came down early in this swing.
+    yields : bool
+        Whether the foot yields now instead of following its path.
+    wary : int
+        Number of swings, with the present one, in which the foot steps higher from the start.
+    raised : float
+        Height to which the foot has been raised in this swing [m].
+    height : float
+        Additional height that acts now: what of it is not given back yet [m].
+    rate : float
+        Its mean rate over the last tick [m/s].
+    way : Way or None
+        Of the swinging foot at the last tick; None in stance.
+    speed, sinking : float
+        Its speed over the ground, and downwards in the base, followed [m/s].
+    """
+
+    tripped: bool = False
+    landed: bool = False
+    yields: bool = False
+    wary: int = 0
+    raised: float = 0.0
+    height: float = 0.0
+    rate: float = 0.0
+    way: Way | None = None
+    speed: float = 0.0
+    sinking: float = 0.0
+
+
+def stumble_step(
+    before: Stumble, way: Way | None, lift: float, threshold: float, dt: float
+) -> Stumble:
+    """Advance the reflex of one foot.
+
+    Parameters
+    ----------
+    before : Stumble
+        One tick before.
+    way : Way or None
+        Of a swinging foot; None in stance.
+    lift : float
+        Additional height of a foot that has tripped [m].
+    threshold : float
+        Distance from its target at which a foot that stands still has tripped or landed [m].
+    dt : float
+        Time since the last tick [s].
+
+    Returns
+    -------
+    Stumble
+    """
+    if dt <= 0.0:
+        return before
+    if way is None:
+        return _in_stance(before, dt)
+    last = before.way
+    if last is None:  # the foot has time to set off
+        return Stumble(wary=before.wary, way=way, speed=way.swing_speed)
+    share = 1.0 - exp(-FOLLOWING * dt)
+    moved = (way.place - last.place) / dt + way.body_speed
+    speed = before.speed + share * (moved - before.speed)
+    sinking = before.sinking + share * ((last.level - way.level) / dt - before.sinking)
+    late = LATENCY / dt
+    above = way.level - way.target_level
+    tripped = before.tripped or (
+        not before.landed
+        and FEELING[0] < way.swung < FEELING[1]
+        and speed < STANDSTILL * way.swing_speed
+        and way.target_place - way.place > max(
+            threshold + late * max(0.0, way.target_place - last.target_place), 2.0 * above)
+    )
+    landed = before.landed or (
+        way.swung > TOUCHING
+        and sinking < SETTLED * way.sinking_speed
+        and above > threshold + late * max(0.0, last.target_level - way.target_level)
+    )
+    raised = lift + (before.raised - lift) * exp(-QUICKNESS * dt) if tripped else before.raised
+    left = min(1.0, (1.0 - way.swung) / LANDING)
+    height = raised * left * left * (3.0 - 2.0 * left)
+    yields = landed or (tripped and raised < RISEN * lift)
+    return Stumble(tripped, landed, yields, before.wary, raised, height,
+                   (height - before.height) / dt, way, speed, sinking)
+
+
+def _in_stance(before: Stumble, dt: float) -> Stumble:
+    """What is left of a swing: wariness, and the rate that takes the last height back."""
+    if before.way is None:
+        return before if before.rate == 0.0 else Stumble(wary=before.wary)
+    wary = WARY if before.tripped else max(0, before.wary - 1)
+    return Stumble(wary=wary, rate=-before.height / dt)
+
+
+def way_of(path: FootPath, swung: float, foot: Triple, target: Triple) -> Way | None:
+    """Way of a swinging foot; None where the body hardly moves over it.
+
+    Parameters
+    ----------
+    path : FootPath
+        Of the foot.
+    swung : float
+        Share of the swing that has passed.
+    foot, target : tuple of float
+        Measured and wanted place in the base [m].
+    """
+    x, y, _ = path.foothold_in_base
+    along, across = path.v_x - path.gamma * y, path.v_y + path.gamma * x
+    body_speed = hypot(along, across)
+    if body_speed < SLOWEST:
+        return None
+    along, across, swing = along / body_speed, across / body_speed, 1.0 - path.duty
+    return Way(
+        swung,
+        along * foot[0] + across * foot[1],
+        foot[2],
+        along * target[0] + across * target[1],
+        target[2],
+        body_speed,
+        body_speed / swing,
+        path.clearance * path.omega / (2.0 * pi * swing * LOWERING),
+    )
+
+
+def yielding(stumble: Stumble, shift_rate: Triple, velocity: Triple, away: Triple) -> Triple:
+    """Rate of the shift of a swinging foot's path [m/s].
+
+    Parameters
+    ----------
+    stumble : Stumble
+        What the reflex does.
+    shift_rate : tuple of float
+        Rate without it [m/s].
+    velocity : tuple of float
+        Of the foot's path, against which the shift of a foot that yields works [m/s].
+    away : tuple of float
+        Where the foot is relative to its target [m].
+    """
+    if not stumble.yields:
+        return shift_rate
+    x, y, z = (YIELDING * a - v for a, v in zip(away, velocity, strict=True))
+    return x, y, z if stumble.landed else shift_rate[2]

@@ -1,0 +1,175 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The stumbling reflex: when it acts, how high, and that the foot is down again at touchdown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from dmp_cpg_ros.core.foot_path import FootPath
+from dmp_cpg_ros.core.leg_primitive import LegFeedback, LegParameters, LegPrimitive, LegState
+from dmp_cpg_ros.core.phase import state_at
+from dmp_cpg_ros.core.stumble_reflex import (
+    LATENCY,
+    WARY,
+    Stumble,
+    stumble_step,
+    way_of,
+    yielding,
+)
+from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.suite import load_gait, load_suite
+
+LIFT, THRESHOLD, TICK = 0.05, 0.01, 0.004
+DUTY, HEIGHT = 0.6, 0.05
+
+Met = Callable[[float, np.ndarray], np.ndarray]
+
+
+def free(t: float, foot: np.ndarray) -> np.ndarray:
+    """Nothing is in the foot's way."""
+    return foot
+
+
+def walked(swing: float, met: Met, speed: float = 0.5, late: float = 0.0,
+           swings: int = 1) -> list[Stumble]:
+    """Reflex of a foot that follows its path, ``late`` seconds after it, but for what it met.
+
+    ``met`` takes the time since the swing began [s] and the foot in the world, with the body's
+    speed taken out, and says where the foot is.
+    """
+    omega = 2.0 * np.pi * (1.0 - DUTY) / swing
+    path = FootPath((0.2, 0.1, -0.26), speed, 0.0, 0.0, omega, DUTY, HEIGHT)
+    period, states = swing / (1.0 - DUTY), [Stumble()]
+
+    def foot_at(t: float) -> np.ndarray:
+        cycle = t / period - 0.5 * (1.0 - DUTY)
+        return np.array(path.at((cycle + 0.5) % 1.0 - 0.5)[0])
+
+    for k in range(round(swings * period / TICK)):
+        t = k * TICK
+        into = t % period
+        way = None
+        if into < swing:
+            body = np.array((speed * into, 0.0, 0.0))
+            foot = met(into, foot_at(t - late) + body) - body
+            way = way_of(path, into / swing, tuple(foot), tuple(foot_at(t)))
+        states.append(stumble_step(states[-1], way, LIFT, THRESHOLD, TICK))
+    return states
+
+
+def riser(at: float) -> Met:
+    """A wall ahead of the foot, as far as it is into its swing at ``at`` of its way."""
+    return lambda t, foot: np.minimum(foot, (at, np.inf, np.inf))
+
+
+def ground(height: float) -> Met:
+    """Ground that is higher than where the foot left it."""
+    return lambda t, foot: np.maximum(foot, (-np.inf, -np.inf, height - 0.26))
+
+
+@pytest.mark.parametrize('late', (0.0, LATENCY))
+@pytest.mark.parametrize('speed', (0.1, 0.5, 1.5))
+@pytest.mark.parametrize('swing', (0.12, 0.2, 0.4))
+def test_a_foot_that_nothing_meets_is_left_alone_also_where_targets_act_late(
+    swing: float, speed: float, late: float
+) -> None:
+    states = walked(swing, free, speed, late)
+    assert not any(s.tripped or s.landed or s.height for s in states)
+
+
+@pytest.mark.parametrize('swing', (0.15, 0.2, 0.4))
+@pytest.mark.parametrize('place', (0.18, 0.2, 0.22))
+def test_a_foot_that_trips_is_lifted_and_down_again_at_touchdown(
+    swing: float, place: float
+) -> None:
+    states = walked(swing, riser(place), 1.0)
+    height = np.array([s.height for s in states])
+    steps = round(swing / TICK)
+    assert any(s.tripped for s in states)
+    assert 0.3 * LIFT < height.max() <= LIFT and height.min() >= 0.0
+    assert height[steps] < 0.2 * LIFT and not height[steps + 2:].any()
+    np.testing.assert_allclose(np.cumsum([s.rate * TICK for s in states]), height, atol=1e-12)
+
+
+def test_the_swings_after_a_stumble_step_higher_and_then_no_more() -> None:
+    swing, first = 0.2, 0.2 / (1.0 - DUTY)
+    tripping: list[bool] = []
+
+    def once(t: float, foot: np.ndarray) -> np.ndarray:
+        tripping.append(t == 0.0)
+        return riser(0.2)(t, foot) if sum(tripping) == 1 else foot
+
+    states = walked(swing, once, 1.0, swings=WARY + 3)
+    period = round(first / TICK)
+    wary = [states[(i + 1) * period - 2].wary for i in range(WARY + 2)]
+    assert wary == [*range(WARY, -1, -1), 0]
+
+
+@pytest.mark.parametrize('height', (0.025, 0.04))
+@pytest.mark.parametrize('late', (0.0, 0.01))
+def test_a_foot_that_lands_early_yields_and_is_not_lifted(height: float, late: float) -> None:
+    states = walked(0.3, ground(height), 0.3, late)
+    assert any(s.landed and s.yields for s in states)
+    assert not any(s.tripped or s.height for s in states)
+
+
+def test_a_foot_that_yields_brings_its_target_to_where_it_is() -> None:
+    stumble, velocity = Stumble(tripped=True, yields=True), (1.5, 0.2, -0.5)
+    foot, target = np.array((0.1, 0.0, 0.0)), np.array((0.15, 0.01, -0.02))
+    wanted = (0.0, 0.0, 0.3)
+    for landed, axes in ((False, 2), (True, 3)):
+        held, at = Stumble(landed=landed, tripped=not landed, yields=True), target.copy()
+        for _ in range(50):
+            away = tuple(foot - at)
+            rate = np.array(yielding(held, wanted, velocity, away))
+            at = at + (rate + velocity) * TICK
+        np.testing.assert_allclose(at[:axes], foot[:axes], atol=1e-4)
+    assert yielding(stumble, wanted, velocity, (0.0, 0.0, 0.0))[2] == wanted[2]
+    assert yielding(Stumble(), wanted, velocity, (1.0, 1.0, 1.0)) == wanted
+
+
+def test_a_standing_foot_feels_nothing() -> None:
+    standing = stumble_step(Stumble(), None, LIFT, THRESHOLD, TICK)
+    assert standing == Stumble()
+
+
+def leg_and_state(lift: float) -> tuple[LegPrimitive, LegState]:
+    """A leg of the package's robot."""
+    suite = load_suite()
+    leg = LegPrimitive('fl', load_description(suite.robot_file), load_gait('trot'),
+                       LegParameters(stumble_lift=lift))
+    return leg, leg.initial_state()
+
+
+@pytest.mark.parametrize('blocked', (False, True))
+def test_the_leg_feels_an_obstacle_by_its_joints(blocked: bool) -> None:
+    """A foot that is where it should be moves as without the reflex, to the last bit."""
+    (without, state_0), (leg, state) = leg_and_state(0.0), leg_and_state(0.17)
+    r = np.array((0.5, 0.0, 0.0))
+    omega = leg.gait.omega(leg.scale.foot_speed(0.5, 0.0, 0.0), leg.scale)
+    highest = highest_0 = -np.inf
+    wall = float(leg.foothold_in_base[0])
+    for k in range(500):
+        x = state_at(np.array(omega * k * TICK))
+        x_dot = omega * np.array((x[1], -x[0]))
+        measured = state.joints.position
+        if blocked:
+            foot = np.array(leg.kinematics.foot(measured))
+            free_way = foot[0] < leg.foothold_in_base[0]  # a wall stands below the hip
+            wall = leg.foothold_in_base[0] if free_way else wall - r[0] * TICK
+            foot[0] = min(foot[0], wall)
+            measured = leg.kinematics.inverse(foot)
+        feedback = LegFeedback(measured, np.zeros(3), np.zeros(2), np.zeros(3))
+        state, goal, _ = leg.step(state, x, x_dot, r, feedback, TICK)
+        state_0, goal_0, _ = without.step(state_0, x, x_dot, r, feedback, TICK)
+        if not blocked:
+            np.testing.assert_array_equal(goal, goal_0)
+        if k > 150:
+            highest = max(highest, leg.kinematics.foot(goal)[2])
+            highest_0 = max(highest_0, leg.kinematics.foot(goal_0)[2])
+    if blocked:
+        assert highest - highest_0 > 0.5 * leg.stumble_lift
