@@ -194,7 +194,8 @@ class BodyEstimator:
         if still > STILL_TIME:
             state = settle(state, rate, STILL_DEVIATION)
         problems = _problems(legs, contacts, seeing)
-        if not isfinite(float(state.covariance.sum() + state.velocity_in_base.sum())):
+        covariance, velocity = state.covariance.ravel(), state.velocity_in_base
+        if not isfinite(covariance.dot(covariance) + velocity.dot(velocity)):
             problems = (*problems, 'filter')
             state = memory.filter
         terrain, estimate = self._finished(

@@ -146,14 +146,12 @@ class BodyModes:
         ModeState
         """
         begun = time_ns if state.begun_ns < 0 else state.begun_ns
-        state = updated(state, time_ns=time_ns, condition=condition, begun_ns=begun)
+        fall, sign = state.fall, ''
         if state.mode not in ('damped', 'recovering'):
-            fall, sign = self._detector.step(
-                state.fall, condition, time_ns, state.mode in BALANCED
-            )
-            state = updated(state, fall=fall)
-            if sign:
-                return self._fallen(state, f'fell at {time_ns * 1e-9:.3f} s: {sign}')
+            fall, sign = self._detector.step(fall, condition, time_ns, state.mode in BALANCED)
+        state = updated(state, time_ns=time_ns, condition=condition, begun_ns=begun, fall=fall)
+        if sign:
+            return self._fallen(state, f'fell at {time_ns * 1e-9:.3f} s: {sign}')
         if state.mode == 'stopping':
             return self._stopped(state, at_rest)
         if state.movements and self._elapsed(state) >= self._time_of(state.movements[0]):

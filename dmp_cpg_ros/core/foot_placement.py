@@ -123,20 +123,17 @@ class FootPlacement:
             [m]
         """
         capture = p.placement_gain * (self._leg_length / GRAVITY) ** 0.5
-        over, wanted = self.over_feet(measured), self.over_feet(planned)
-        down = self.within_reach(
-            [
-                (half_stance * x + capture * (x - wanted_x),
-                 half_stance * y + capture * (y - wanted_y))
-                for (x, y), (wanted_x, wanted_y) in zip(over, wanted, strict=True)
-            ],
-            p.reach,
-        )
-        return [
-            (x - half_stance * wanted_x, _on_own_side(y, place) - half_stance * wanted_y)
-            for (x, y), (wanted_x, wanted_y), (_, place, _) in zip(
-                down, wanted, self._footholds, strict=True)
-        ]
+        way = half_stance + capture
+        wanted, wished = self.over_feet(planned), []
+        for (x, y), (wanted_x, wanted_y) in zip(self.over_feet(measured), wanted, strict=True):
+            wished.append((way * x - capture * wanted_x, way * y - capture * wanted_y))
+        shift = []
+        for (x, y), (wanted_x, wanted_y), (_, place, _) in zip(
+            self.within_reach(wished, p.reach), wanted, self._footholds, strict=True
+        ):
+            y = _on_own_side(y, place)
+            shift.append((x - half_stance * wanted_x, y - half_stance * wanted_y))
+        return shift
 
     def raised(
         self, p: PostureParameters, shift: Sequence[Pair], R_ground_base: Matrix

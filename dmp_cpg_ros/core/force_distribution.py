@@ -62,10 +62,10 @@ def distribute(
     if total <= 0.0:
         return [(0.0, 0.0, 0.0)] * len(feet)
     pull, turn = _multipliers(force, moment, feet, load, total, importance)
-    forces = []
+    (pull_x, pull_y, pull_z), forces = pull, []
     for foot, share in zip(feet, load, strict=True):
         x, y, z = cross(turn, foot)
-        x, y, z = share * (pull[0] + x), share * (pull[1] + y), share * (pull[2] + z)
+        x, y, z = share * (pull_x + x), share * (pull_y + y), share * (pull_z + z)
         z = min(max(z, 0.0), largest * share)
         tangential, allowed = sqrt(x * x + y * y), friction * z
         if tangential > allowed:
@@ -80,10 +80,10 @@ def _multipliers(
 ) -> tuple[Triple, Triple]:
     """λ and κ of the module's text."""
     damping = REGULARISATION * max(total / len(feet), 1e-9)
-    c_x, c_y, c_z = (
-        sum(share * foot[axis] for share, foot in zip(load, feet, strict=True)) / total
-        for axis in range(3)
-    )
+    c_x = c_y = c_z = 0.0
+    for (x, y, z), share in zip(feet, load, strict=True):
+        c_x, c_y, c_z = c_x + share * x, c_y + share * y, c_z + share * z
+    c_x, c_y, c_z = c_x / total, c_y / total, c_z / total
     # what damping leaves of the moments of c itself
     left = total * damping / (total + damping)
     xx, yy, zz = left * c_x * c_x, left * c_y * c_y, left * c_z * c_z
@@ -92,7 +92,8 @@ def _multipliers(
         x, y, z = x - c_x, y - c_y, z - c_z
         xx, yy, zz = xx + share * x * x, yy + share * y * y, zz + share * z * z
         xy, xz, yz = xy + share * x * y, xz + share * x * z, yz + share * y * z
-    a, b, c = (damping / (weight * weight) for weight in importance)
+    d_x, d_y, d_z = importance
+    a, b, c = damping / (d_x * d_x), damping / (d_y * d_y), damping / (d_z * d_z)
     spread = ((yy + zz + a, -xy, -xz), (-xy, xx + zz + b, -yz), (-xz, -yz, xx + yy + c))
     given = total / (total + damping)  # of the force's moment about the centre of mass
     x, y, z = cross((c_x, c_y, c_z), force)

@@ -232,7 +232,8 @@ class GaitSupervisor:
         if not self.parameters.auto_inhibit:
             return state
         if any(command):
-            state = updated(state, idle_ns=-1)
+            if state.idle_ns >= 0:
+                state = updated(state, idle_ns=-1)
             return self.request(state, False, True) if state.asked and state.automatic else state
         if state.idle_ns < 0:
             state = updated(state, idle_ns=state.time_ns)
@@ -299,7 +300,9 @@ class GaitSupervisor:
         swinging = min(state.activity.tolist())
         if state.word == 'releasing' and not (locked and swinging >= LOCKED_ACTIVITY):
             return state
-        word = 'walking' if locked and speed > REST_SPEED else 'free'
+        word, measured_s = 'walking' if locked and speed > REST_SPEED else 'free', state.measured_s
+        if word == state.word and isfinite(measured_s):
+            return state
         return updated(state, word=word, measured_s=self._measured(state))
 
     @staticmethod

@@ -233,9 +233,11 @@ class PostureController:
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
         torques: list[float] = []
         for on_foot, (_, J), limits in zip(forces, legs, self._torque_limit, strict=True):
-            in_base = transposed_times(body.R_ground_base, on_foot)
-            torques += [
-                min(max(-torque, -limit), limit)
-                for torque, limit in zip(transposed_times(J, in_base), limits, strict=True)
-            ]
+            a, b, c = transposed_times(J, transposed_times(body.R_ground_base, on_foot))
+            most_a, most_b, most_c = limits
+            torques += (
+                min(max(-a, -most_a), most_a),
+                min(max(-b, -most_b), most_b),
+                min(max(-c, -most_c), most_c),
+            )
         return np.array(torques)

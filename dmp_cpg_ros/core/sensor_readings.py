@@ -5,11 +5,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JOINTS_OF_LEG, RobotState
+from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, RobotState
 
 Array = NDArray[np.float64]
 
@@ -19,6 +20,7 @@ FASTEST_TURN, HARDEST_BLOW = 100.0, 1000.0
 FASTEST_JOINT, LARGEST_FORCE = 200.0, 1e5
 """Readings beyond these are faults of joint and contact sensors [rad/s], [N]."""
 
+_ALL_LEGS = (True,) * len(LEGS)
 _FIRST_JOINT = range(0, len(JOINT_NAMES), len(JOINTS_OF_LEG))
 
 
@@ -56,6 +58,8 @@ class SensorReadings:
     def usable_legs(self) -> tuple[bool, ...]:
         """Whether angles and velocities of each leg's joints are possible."""
         q, q_dot = self.joint_position.tolist(), self.joint_velocity.tolist()
+        if _within(q, FASTEST_JOINT) and _within(q_dot, FASTEST_JOINT):
+            return _ALL_LEGS
         return tuple(
             _within(q[i : i + 3], FASTEST_JOINT) and _within(q_dot[i : i + 3], FASTEST_JOINT)
             for i in _FIRST_JOINT
@@ -69,11 +73,8 @@ class SensorReadings:
 
 
 def _within(values: list[float], limit: float) -> bool:
-    """Whether no value is beyond a limit; NaN is neither smaller nor larger than anything."""
-    for value in values:
-        if not -limit <= value <= limit:
-            return False
-    return True
+    """Whether no value is beyond a limit, and none is NaN, which makes the sum NaN."""
+    return max(values) <= limit and min(values) >= -limit and not isnan(sum(values))
 
 
 def readings_of(state: RobotState) -> SensorReadings:

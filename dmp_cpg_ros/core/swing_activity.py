@@ -50,8 +50,10 @@ def activities_step(
     dt: float,
 ) -> NDArray[np.float64]:
     """As :func:`activity_step` for a few legs, (n,), without arithmetic on arrays."""
-    return np.array([
-        activity_step(activity, phase_rate, omega, rate, dt)
-        for activity, phase_rate, omega in zip(
-            activities.tolist(), phase_rates, omegas, strict=True)
-    ])
+    kept, after = exp(-rate * dt), []
+    for activity, phase_rate, omega in zip(
+        activities.tolist(), phase_rates, omegas, strict=True
+    ):
+        wanted = min(max(phase_rate / omega, 0.0), 1.0)
+        after.append(wanted + (activity - wanted) * kept)
+    return np.array(after)
