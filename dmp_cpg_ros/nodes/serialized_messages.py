@@ -65,7 +65,7 @@ class SerializedJointState(Serialized):
         Names; the same list object for the same names.
     """
 
-    __slots__ = ('_places', 'frame_id', 'name')
+    __slots__ = ('_arrays', '_places', 'frame_id', 'name')
     KIND = JointState
 
     def __init__(self, data: bytes) -> None:
@@ -75,12 +75,14 @@ class SerializedJointState(Serialized):
         first = _doubles(data, at)
         second = _doubles(data, first[1])
         self.serialized, self._places = data, (first, second, _doubles(data, second[1]))
+        self._arrays: list[Array | None] = [None, None, None]
 
     def refilled(self, data: bytes, stamp_ns: int) -> SerializedJointState:
         """Return a message of the same layout, without reading that again."""
         message = SerializedJointState.__new__(SerializedJointState)
         message.serialized, message.stamp_ns = data, stamp_ns
         message.frame_id, message.name, message._places = self.frame_id, self.name, self._places
+        message._arrays = [None, None, None]
         return message
 
     @property
@@ -99,8 +101,11 @@ class SerializedJointState(Serialized):
         return self._array(2)
 
     def _array(self, which: int) -> Array:
-        begin, end = self._places[which]
-        return np.frombuffer(self.serialized[begin:end])
+        array = self._arrays[which]
+        if array is None:
+            begin, end = self._places[which]
+            array = self._arrays[which] = np.frombuffer(self.serialized[begin:end])
+        return array
 
 
 class SerializedTwist(Serialized):
