@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The stumbling reflex: when it acts, how high, and that the foot is down again at touchdown."""
+"""The stumbling reflex: when it acts, how high, and that the foot comes down again."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from dmp_cpg_ros.core.foot_path import FootPath
 from dmp_cpg_ros.core.leg_primitive import LegFeedback, LegParameters, LegPrimitive, LegState
 from dmp_cpg_ros.core.phase import state_at
 from dmp_cpg_ros.core.stumble_reflex import (
+    GENTLENESS,
     LATENCY,
     WARY,
     Stumble,
@@ -83,7 +84,7 @@ def test_a_foot_that_nothing_meets_is_left_alone_also_where_targets_act_late(
 
 @pytest.mark.parametrize('swing', (0.15, 0.2, 0.4))
 @pytest.mark.parametrize('place', (0.18, 0.2, 0.22))
-def test_a_foot_that_trips_is_lifted_and_down_again_at_touchdown(
+def test_a_foot_that_trips_is_lifted_and_comes_down_gently(
     swing: float, place: float
 ) -> None:
     states = walked(swing, riser(place), 1.0)
@@ -91,7 +92,8 @@ def test_a_foot_that_trips_is_lifted_and_down_again_at_touchdown(
     steps = round(swing / TICK)
     assert any(s.tripped for s in states)
     assert 0.3 * LIFT < height.max() <= LIFT and height.min() >= 0.0
-    assert height[steps] < 0.2 * LIFT and not height[steps + 2:].any()
+    assert np.diff(height).min() >= -1.001 * GENTLENESS * LIFT * TICK  # it comes down gently
+    assert not height[steps + round(1.0 / GENTLENESS / TICK) + 1:].any()
     np.testing.assert_allclose(np.cumsum([s.rate * TICK for s in states]), height, atol=1e-12)
 
 
@@ -148,7 +150,7 @@ def leg_and_state(lift: float) -> tuple[LegPrimitive, LegState]:
 @pytest.mark.parametrize('blocked', (False, True))
 def test_the_leg_feels_an_obstacle_by_its_joints(blocked: bool) -> None:
     """A foot that is where it should be moves as without the reflex, to the last bit."""
-    (without, state_0), (leg, state) = leg_and_state(0.0), leg_and_state(0.17)
+    (without, state_0), (leg, state) = leg_and_state(0.0), leg_and_state(0.13)
     r = np.array((0.5, 0.0, 0.0))
     omega = leg.gait.omega(leg.scale.foot_speed(0.5, 0.0, 0.0), leg.scale)
     highest = highest_0 = -np.inf

@@ -25,8 +25,8 @@ GROUNDS: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = (
 FEELING: tuple[tuple[str, Values], ...] = (
     ('nothing', (('contact_feedback', False), ('stumble_lift', 0.0))),
     ('touchdown, in the phase', (('contact_feedback', True), ('stumble_lift', 0.0))),
-    ('obstacles, in the swing', (('contact_feedback', False), ('stumble_lift', 0.17))),
-    ('both', (('contact_feedback', True), ('stumble_lift', 0.17))),
+    ('obstacles, in the swing', (('contact_feedback', False), ('stumble_lift', 0.13))),
+    ('both', (('contact_feedback', True), ('stumble_lift', 0.13))),
 )
 """What is felt, and the parameters that make it."""
 

@@ -78,7 +78,7 @@ class LegParameters(Parameters):
         maximum=1e3,
     )
     stumble_lift: float = parameter(
-        0.17,
+        0.13,
         'additional height of a swinging foot that something holds up, as a fraction of the '
         'standing height; 0: no reflex',
         minimum=0.0,
@@ -247,7 +247,7 @@ class LegPrimitive:
                 shift, triple(feedback.shift_in_base.tolist()), height, activity, dt)
             shift_rate = yielding(stumble, shift_rate, path_velocity, away)
         else:
-            stumble = stumble_step(stumble, None, 0.0, 0.0, dt)
+            stumble = stumble_step(stumble, None, self.stumble_lift, self.stumble_lag, dt)
             shift_rate = self.shift_rates.in_stance(
                 shift, pair(feedback.drift_in_base.tolist()), away[:2], activity, dt)
         shift = moved(shift, shift_rate, dt)

@@ -44,8 +44,13 @@ SETTLED = 0.6
 LATENCY = 0.02
 """Time by which targets may act late without being taken for an obstacle [s]."""
 
-LANDING = 0.35
-"""Share of the swing, at its end, in which the additional height is given back."""
+HIGH = 0.65
+"""Share of the swing up to which a foot that tripped stays raised."""
+
+GENTLENESS = 8.0
+"""Share of the additional height that is given back per second [1/s]; also in stance, for a foot
+that comes down fast on something high throws the body up.
+"""
 
 RISEN = 0.7
 """Share of the additional height from which a foot that tripped goes on."""
@@ -105,10 +110,10 @@ class Stumble:
         Whether the foot yields now instead of following its path.
     wary : int
         Number of swings, with the present one, in which the foot steps higher from the start.
-    raised : float
-        Height to which the foot has been raised in this swing [m].
+    up : bool
+        Whether the foot that tripped has been raised.
     height : float
-        Additional height that acts now: what of it is not given back yet [m].
+        Additional height that acts now [m].
     rate : float
         Its mean rate over the last tick [m/s].
     way : Way or None
@@ -121,7 +126,7 @@ class Stumble:
     landed: bool = False
     yields: bool = False
     wary: int = 0
-    raised: float = 0.0
+    up: bool = False
     height: float = 0.0
     rate: float = 0.0
     way: Way | None = None
@@ -154,10 +159,10 @@ def stumble_step(
     if dt <= 0.0:
         return before
     if way is None:
-        return _in_stance(before, dt)
+        return _in_stance(before, lift, dt)
     last = before.way
     if last is None:  # the foot has time to set off
-        return Stumble(wary=before.wary, way=way, speed=way.swing_speed)
+        return Stumble(wary=before.wary, height=before.height, way=way, speed=way.swing_speed)
     share = 1.0 - exp(-FOLLOWING * dt)
     moved = (way.place - last.place) / dt + way.body_speed
     speed = before.speed + share * (moved - before.speed)
@@ -176,20 +181,25 @@ def stumble_step(
         and sinking < SETTLED * way.sinking_speed
         and above > threshold + late * max(0.0, last.target_level - way.target_level)
     )
-    raised = lift + (before.raised - lift) * exp(-QUICKNESS * dt) if tripped else before.raised
-    left = min(1.0, (1.0 - way.swung) / LANDING)
-    height = raised * left * left * (3.0 - 2.0 * left)
-    yields = landed or (tripped and raised < RISEN * lift)
-    return Stumble(tripped, landed, yields, before.wary, raised, height,
+    height, up = before.height, before.up or before.height >= RISEN * lift
+    if tripped and not landed and (not up or way.swung < HIGH):
+        height = lift + (height - lift) * exp(-QUICKNESS * dt)
+    elif not landed:
+        height = max(0.0, height - GENTLENESS * lift * dt)
+    yields = landed or (tripped and not up)
+    return Stumble(tripped, landed, yields, before.wary, up, height,
                    (height - before.height) / dt, way, speed, sinking)
 
 
-def _in_stance(before: Stumble, dt: float) -> Stumble:
-    """What is left of a swing: wariness, and the rate that takes the last height back."""
-    if before.way is None:
-        return before if before.rate == 0.0 else Stumble(wary=before.wary)
-    wary = WARY if before.tripped else max(0, before.wary - 1)
-    return Stumble(wary=wary, rate=-before.height / dt)
+def _in_stance(before: Stumble, lift: float, dt: float) -> Stumble:
+    """What is left of a swing: wariness, and a height that is given back gently."""
+    if before.way is None and before.rate == 0.0:
+        return before
+    height = max(0.0, before.height - GENTLENESS * lift * dt)
+    wary = before.wary
+    if before.way is not None:
+        wary = WARY if before.tripped else max(0, wary - 1)
+    return Stumble(wary=wary, height=height, rate=(height - before.height) / dt)
 
 
 def way_of(path: FootPath, swung: float, foot: Triple, target: Triple) -> Way | None:
