@@ -32,6 +32,9 @@ from dmp_cpg_ros.nodes.scheduling import schedule
 FOREVER_S = 1e6
 """A bounded wait: unbounded ones of the events executor do not work in some builds [s]."""
 
+YOUNG_OBJECTS = 20_000
+"""New objects after which the garbage collector looks for cycles; Python's own figure is 700."""
+
 OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
 
@@ -82,9 +85,11 @@ def spin(nodes: Node | Sequence[Node], kind: str = 'events', until: Future | Non
     nodes = [nodes] if isinstance(nodes, Node) else list(nodes)
     context, until = nodes[0].context, until or Future()
     executor = make_executor(kind, context)
-    # What start-up made stays; without this the collector would look through it in mid-tick.
+    # What start-up made stays; without this the collector would look through it in mid-tick. Ticks
+    # leave no cycles behind, so it need not look often at what they make.
     gc.collect()
     gc.freeze()
+    gc.set_threshold(YOUNG_OBJECTS)
     try:
         for node in nodes:
             executor.add_node(node)

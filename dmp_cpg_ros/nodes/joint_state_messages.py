@@ -82,6 +82,10 @@ class JointStateReader:
         """Arrays (n,) of the needed fields in our order; raises DataError."""
         names = message.name
         index, size = self._order.index(names), len(names)
+        if index is None and self._strict and isinstance(message, SerializedJointState):
+            found = [message.checked(field) for field in self._fields]
+            if all(values.shape[0] == size for values in found):
+                return found
         arrays = []
         for field in self._fields:
             values = np.frombuffer(getattr(message, field)) if size else np.empty(0)

@@ -23,7 +23,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu, JointState
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.message_values import Array, stamp_in_ns
+from dmp_cpg_ros.nodes.message_values import Array, checked, stamp_in_ns
 
 CDR_LITTLE_ENDIAN = b'\x00\x01'
 """First two bytes of a message that this module reads itself."""
@@ -65,7 +65,7 @@ class SerializedJointState(Serialized):
         Names; the same list object for the same names.
     """
 
-    __slots__ = ('_arrays', '_places', 'frame_id', 'name')
+    __slots__ = ('_arrays', '_places', '_sound', 'frame_id', 'name')
     KIND = JointState
 
     def __init__(self, data: bytes) -> None:
@@ -76,13 +76,14 @@ class SerializedJointState(Serialized):
         second = _doubles(data, first[1])
         self.serialized, self._places = data, (first, second, _doubles(data, second[1]))
         self._arrays: list[Array | None] = [None, None, None]
+        self._sound: set[str] = set()
 
     def refilled(self, data: bytes, stamp_ns: int) -> SerializedJointState:
         """Return a message of the same layout, without reading that again."""
         message = SerializedJointState.__new__(SerializedJointState)
         message.serialized, message.stamp_ns = data, stamp_ns
         message.frame_id, message.name, message._places = self.frame_id, self.name, self._places
-        message._arrays = [None, None, None]
+        message._arrays, message._sound = [None, None, None], set()
         return message
 
     @property
@@ -99,6 +100,14 @@ class SerializedJointState(Serialized):
     def effort(self) -> Array:
         """Efforts."""
         return self._array(2)
+
+    def checked(self, field: str) -> Array:
+        """An array whose numbers are finite, checked once for all readers; raises DataError."""
+        array: Array = getattr(self, field)
+        if field not in self._sound:
+            checked(array, field)
+            self._sound.add(field)
+        return array
 
     def _array(self, which: int) -> Array:
         array = self._arrays[which]
