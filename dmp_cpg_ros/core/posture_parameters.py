@@ -49,7 +49,7 @@ class PostureParameters(Parameters):
         maximum=100.0,
     )
     friction: float = parameter(
-        0.6, 'friction coefficient that the forces respect', minimum=0.05, maximum=2.0
+        0.45, 'friction coefficient that the forces respect', minimum=0.05, maximum=2.0
     )
     load_transfer: float = parameter(
         0.08,
