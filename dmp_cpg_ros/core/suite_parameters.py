@@ -148,7 +148,7 @@ class RobotParameters(Parameters):
         maximum=10.0,
     )
     longest_lag: float = parameter(
-        0.04,
+        0.024,
         "real time: age of a leg's targets beyond which the simulation waits for newer "
         'ones, up to target_timeout of wall time; 0: it never waits',
         unit='s',

@@ -22,14 +22,18 @@ PENDING_TICKS = 16
 PATIENCE = 3
 """In real time: ticks in a row that an input may miss before ticks stop waiting for it."""
 
+HOLD_TICKS = 8
+"""In real time: later ticks that may be triggered while one waits for an input that is late."""
+
 
 class TickInputs:
     """Collects the inputs of each tick and calls back once per tick, in the order of the stamps.
 
     In lock-step a tick fires when every input with its stamp is there, and every delayed input
     with the stamp of the tick before (at the first tick delayed inputs are None). In real time it
-    fires the same way, or else, when the trigger of a later tick arrives, with the newest value of
-    each input that was lost.
+    fires the same way, or else with the newest value of each input that does not come: that was
+    lost, for a later one of its kind is there; that is silent; or for which ``HOLD_TICKS`` later
+    ticks have waited. A node that stalls so delays those behind it instead of being left behind.
 
     Parameters
     ----------
@@ -111,7 +115,7 @@ class TickInputs:
         if self._lock_step:
             self._fire_exact()
         else:
-            self._fire_newest(name == self._trigger, stamp_ns)
+            self._fire_newest()
         if len(self._pending) > PENDING_TICKS:
             del self._pending[min(self._pending)]
             self.incomplete += 1
@@ -139,19 +143,35 @@ class TickInputs:
                 tick[name] = None if last is None else self._late[name][last]
             self._fire(stamp, tick)
 
-    def _fire_newest(self, triggered: bool, stamp_ns: int) -> None:
-        """Real time: fire what a later trigger has overtaken, then this if it need not wait."""
-        if triggered and len(self._pending) > 1:
-            for stamp in sorted(self._pending):
-                if stamp < stamp_ns and stamp in self._pending:
-                    self._fire_incomplete(stamp)
-        tick = self._pending.get(stamp_ns)
-        if tick is None or self._trigger not in tick:
-            return
-        for name in self._others:
-            if name not in tick and self._missed[name] < PATIENCE:
+    def _fire_newest(self) -> None:
+        """Real time: fire, oldest first, each tick that has nothing to wait for any more."""
+        while self._pending:
+            stamp = min(self._pending)
+            if self._trigger in self._pending[stamp]:
+                if self._waits(stamp):
+                    return
+            elif not self._is_lost(self._trigger, stamp):
                 return
-        self._fire_incomplete(stamp_ns)
+            self._fire_incomplete(stamp)
+
+    def _waits(self, stamp: int) -> bool:
+        """Whether the tick, which has been triggered, lacks an input that may still come."""
+        arrived = self._pending[stamp]
+        if len(arrived) == len(self._inputs):
+            return False
+        if sum(self._trigger in tick for tick in self._pending.values()) > 1 + HOLD_TICKS:
+            return False
+        return any(
+            name not in arrived
+            and self._missed[name] < PATIENCE
+            and not self._is_lost(name, stamp)
+            for name in self._others
+        )
+
+    def _is_lost(self, name: str, stamp: int) -> bool:
+        """Whether an input of a tick cannot come: a later one came, and each keeps its order."""
+        newest = self._newest.get(name)
+        return newest is not None and newest[0] > stamp
 
     def _fire_incomplete(self, stamp: int) -> None:
         tick = self._pending[stamp]

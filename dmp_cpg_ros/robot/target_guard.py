@@ -5,13 +5,21 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
 from dmp_cpg_ros.robot.refuge import Refuge, Retreat
 
+CARRIED_NS = 24_000_000
+"""Age up to which late targets are carried on by their own velocity [ns]."""
+
 
 class TargetGuard:
     """The newest targets of the four legs, or a retreat when one of them is too old.
+
+    Targets hold at their stamp. Those that act later are carried on by their own velocity to the
+    time at which they act, as the joint would have moved if they had come in time; otherwise every
+    late message would hold the feet, and with them the body, back.
 
     Parameters
     ----------
@@ -61,8 +69,17 @@ class TargetGuard:
         """Targets of all joints, (12,) each, at a state of the robot."""
         if not self.silent(state.time_ns):
             self._retreat = None
-            return JointTargets(self._position.copy(), self._velocity.copy(), self._effort.copy())
+            return JointTargets(
+                self._carried(state.time_ns), self._velocity.copy(), self._effort.copy())
         if self._retreat is None:
             self._retreat = self._refuge.begin(state)
         self._retreat, targets = self._refuge.go_on(self._retreat, state)
         return targets
+
+    def _carried(self, now_ns: int) -> NDArray[np.float64]:
+        """Target angles (12,) at a time [rad]."""
+        ages = [max(0, now_ns - stamp) for stamp in self.stamps if stamp is not None]
+        if not any(ages):
+            return self._position.copy()
+        late = np.repeat([1e-9 * min(age, CARRIED_NS) for age in ages], len(JOINTS_OF_LEG))
+        return self._position + late * self._velocity
