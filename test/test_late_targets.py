@@ -1,0 +1,108 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Targets that act late are carried on, so that a busy machine does not hold the feet back."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.core.robot_state import LEGS, JointTargets
+from dmp_cpg_ros.core.suite_parameters import RobotParameters
+from dmp_cpg_ros.core.walking_loop import WalkingLoop
+from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
+from dmp_cpg_ros.robot.refuge import Refuge
+from dmp_cpg_ros.robot.target_guard import CARRIED_NS, TargetGuard
+from dmp_cpg_ros.suite import load_gaits, load_suite
+
+pytest.importorskip('mujoco')
+from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+
+TICK_NS = 4_000_000
+LONGEST = CARRIED_NS // TICK_NS
+SUITE = load_suite(None, {'auto_inhibit': False, 'cmd_vel_timeout': 0.0})
+
+
+def make_guard(description: object) -> TargetGuard:
+    return TargetGuard(Refuge(description), round(1e9 * RobotParameters().target_timeout))
+
+
+def accept(guard: TargetGuard, stamp_ns: int, targets: JointTargets) -> None:
+    for place, leg in enumerate(LEGS):
+        joints = slice(3 * place, 3 * place + 3)
+        guard.accept(leg, stamp_ns, JointTargets(
+            targets.position[joints], targets.velocity[joints], targets.effort[joints]))
+
+
+@pytest.fixture(scope='module')
+def standing() -> PerfectTrackingRobot:
+    return PerfectTrackingRobot(load_description(SUITE.robot_file), TICK_NS, 'standing')
+
+
+@given(age=st.integers(0, 30), seed=st.integers(0, 2**32))
+def test_what_moves_steadily_is_where_it_would_have_been_in_time(
+        standing: PerfectTrackingRobot, age: int, seed: int) -> None:
+    """Up to 24 ms; from then on targets stand still."""
+    state, random = standing.reset(), np.random.default_rng(seed)
+    position, velocity, effort = random.normal(size=(3, 12))
+    guard = make_guard(standing.description)
+    accept(guard, -age * TICK_NS, JointTargets(position, velocity, effort))
+    given_out = guard.targets(state)
+    carried = min(age, LONGEST) * TICK_NS * 1e-9
+    assert np.allclose(given_out.position, position + carried * velocity, rtol=0.0, atol=1e-12)
+    assert np.array_equal(given_out.velocity, velocity)
+    assert np.array_equal(given_out.effort, effort)
+    if age == 0:
+        assert np.array_equal(given_out.position, position)
+
+
+def test_each_leg_is_carried_by_its_own_age(standing: PerfectTrackingRobot) -> None:
+    state, guard = standing.reset(), make_guard(standing.description)
+    for age, leg in enumerate(LEGS):
+        guard.accept(leg, -age * TICK_NS, JointTargets(np.zeros(3), np.ones(3), np.zeros(3)))
+    moved = guard.targets(state).position.reshape(4, 3)
+    assert np.allclose(moved, 1e-9 * TICK_NS * np.arange(4.0)[:, None], rtol=0.0, atol=1e-15)
+
+
+def arrivals(ticks: int, seed: int) -> list[int]:
+    """Tick whose targets act at each tick: they come late, in bursts, by 24 ms at most."""
+    random, newest, stalled, acting = np.random.default_rng(seed), 0, 0, []
+    for tick in range(ticks):
+        if stalled:
+            stalled -= 1
+        else:
+            newest = max(newest, tick - int(random.integers(0, 3)))
+            stalled = int(random.geometric(0.2)) if random.random() < 0.15 else 0
+        newest = max(newest, tick - LONGEST)
+        acting.append(newest)
+    return acting
+
+
+@pytest.mark.parametrize('gait', ['amble', 'trot'])
+def test_a_robot_whose_targets_come_in_bursts_walks_as_fast_as_it_should(gait: str) -> None:
+    suite = load_suite(None, {'gait': gait, 'auto_inhibit': False, 'cmd_vel_timeout': 0.0})
+    robot = MujocoRobot(suite.robot_file, suite.tick_ns, 0)
+    loop = WalkingLoop(robot.description, suite.gait, suite.parameters, load_gaits())
+    guard, state = make_guard(robot.description), robot.reset()
+    acting = arrivals(2000, seed=3)
+    ages = [tick - acts for tick, acts in enumerate(acting)]
+    assert np.mean(ages) > 2.0 and max(ages) == LONGEST
+    assert all(before <= after for before, after in pairwise(acting))
+    sent, speeds, heights = [], [], []
+    for tick, acts in enumerate(acting):
+        if tick == 1:
+            loop.request(False)
+            loop.command(0.5)
+        sent.append((state.time_ns, loop.tick(state).targets))
+        accept(guard, *sent[acts])
+        state = robot.step(guard.targets(state))
+        speeds.append(state.base_velocity_in_base[0])
+        heights.append(state.base_position_in_world[2])
+    assert not robot.fallen and loop.mode.mode == 'standing'
+    assert np.mean(speeds[-1000:]) == pytest.approx(0.5, rel=0.05)
+    assert min(heights) > 0.9 * heights[0]
