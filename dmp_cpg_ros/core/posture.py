@@ -32,6 +32,7 @@ from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.speed_keeping import SpeedKeeping
 from dmp_cpg_ros.core.stance_load import planned_load
+from dmp_cpg_ros.core.sway import STRAIGHT, Sway, planned_sway
 from dmp_cpg_ros.core.swing_activity import activities_step
 from dmp_cpg_ros.core.triples import (
     Matrix,
@@ -129,6 +130,7 @@ class PostureController:
         footholds = np.array([nominal_foothold(description, leg.name) for leg in description.legs])
         self.model = VirtualModel(description, self.scale.leg_length)
         self.placement = FootPlacement(self.kinematics, footholds, self.scale.leg_length)
+        self._across: list[float] = footholds[:, 1].tolist()
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
         self._com_in_base = triple(description.com_in_base.tolist())
         self._torque_limit = [triple(leg.torque_limit.tolist()) for leg in description.legs]
@@ -183,7 +185,8 @@ class PostureController:
         keeping = memory.keeping.following(
             p, leg_length, moving, state.base_quaternion.tolist(), velocity, reference, dt)
         correction = keeping.acting(p, leg_length, moving)
-        measured = (velocity[0], velocity[1], rate[2])
+        sway = self._sway(positions, duty, omega, moving)
+        measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
         planned = plus(reference, correction)
         lean_x, lean_y = lean(upward, self.model.height)
         shift = [
@@ -197,7 +200,7 @@ class PostureController:
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(positions, duty, omega, moving)
         return PostureState(activity, keeping), PostureFeedback(
-            self._torque(body, legs, feet, load, planned, bounce),
+            self._torque(body, legs, feet, load, planned, bounce, sway),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
             np.array(self.placement.drift(p, measured, planned, swings)),
             np.array(correction),
@@ -222,12 +225,19 @@ class PostureController:
         share = moving / len(each)
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
 
+    def _sway(
+        self, positions: list[float], duty: float, omega: float, moving: float
+    ) -> Sway:
+        """Planned sway of the body; it fades with the legs' activity."""
+        sway = planned_sway(positions, duty, omega, self._across, self.model.height)
+        return STRAIGHT if sway is STRAIGHT else Sway(*(moving * value for value in sway))
+
     def _torque(
         self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
-        load: list[float], r: Triple, bounce: Bounce,
+        load: list[float], r: Triple, bounce: Bounce, sway: Sway,
     ) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
-        force, moment = self.model.wrench(self.parameters, body, r, bounce)
+        force, moment = self.model.wrench(self.parameters, body, r, bounce, sway)
         forces = distribute(
             force, moment, feet, load, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
