@@ -101,13 +101,15 @@ def test_joint_targets(leg: str, values: np.ndarray) -> None:
     assert bits(*dataclasses.astuple(targets)) == bits(*dataclasses.astuple(sent))
 
 
-@given(numbers(12), numbers(4, 3), numbers(4, 2), numbers(3), numbers(12))
+@given(numbers(12), numbers(4, 3), numbers(4, 2), numbers(3), numbers(12), numbers(4))
 def test_posture_feedback(torque: np.ndarray, shift: np.ndarray, drift: np.ndarray,
-                          correction: np.ndarray, measured: np.ndarray) -> None:
-    sent = PostureFeedback(torque, shift, drift, correction, 'damped', measured)
+                          correction: np.ndarray, measured: np.ndarray,
+                          force: np.ndarray) -> None:
+    sent = PostureFeedback(torque, shift, drift, correction, 'damped', measured, force)
     read = PostureFeedbackReader().read(wire(PostureFeedbackWriter().fill(0, sent)))
     assert bits(read.torque, read.shift_in_base, read.drift_in_base, read.correction,
-                read.measured) == bits(torque, shift, drift, correction, measured)
+                read.measured, read.foot_force) == bits(
+                    torque, shift, drift, correction, measured, force)
     assert read.mode == sent.mode
 
 

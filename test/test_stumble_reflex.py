@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.foot_path import FootPath
+from dmp_cpg_ros.core.foot_way import way_of
 from dmp_cpg_ros.core.leg_primitive import LegFeedback, LegParameters, LegPrimitive, LegState
 from dmp_cpg_ros.core.phase import state_at
 from dmp_cpg_ros.core.stumble_reflex import (
@@ -18,7 +19,6 @@ from dmp_cpg_ros.core.stumble_reflex import (
     WARY,
     Stumble,
     stumble_step,
-    way_of,
     yielding,
 )
 from dmp_cpg_ros.robot.model_reader import load_description
@@ -36,7 +36,7 @@ def free(t: float, foot: np.ndarray) -> np.ndarray:
 
 
 def walked(swing: float, met: Met, speed: float = 0.5, late: float = 0.0,
-           swings: int = 1) -> list[Stumble]:
+           swings: int = 1, feels: bool = False) -> list[Stumble]:
     """Reflex of a foot that follows its path, ``late`` seconds after it, but for what it met.
 
     ``met`` takes the time since the swing began [s] and the foot in the world, with the body's
@@ -56,8 +56,10 @@ def walked(swing: float, met: Met, speed: float = 0.5, late: float = 0.0,
         way = None
         if into < swing:
             body = np.array((speed * into, 0.0, 0.0))
-            foot = met(into, foot_at(t - late) + body) - body
-            way = way_of(path, into / swing, tuple(foot), tuple(foot_at(t)))
+            alone = foot_at(t - late) + body
+            foot = met(into, alone)
+            touches = feels and bool((foot != alone).any())
+            way = way_of(path, into / swing, tuple(foot - body), tuple(foot_at(t)), touches)
         states.append(stumble_step(states[-1], way, LIFT, THRESHOLD, TICK))
     return states
 
@@ -119,6 +121,13 @@ def test_a_foot_that_lands_early_yields_and_is_not_lifted(height: float, late: f
     assert not any(s.tripped or s.height for s in states)
 
 
+@pytest.mark.parametrize('met', (riser(0.2), ground(0.025)))
+def test_a_foot_that_feels_the_touch_reacts_sooner(met: Met) -> None:
+    without, feeling = walked(0.3, met, 0.5), walked(0.3, met, 0.5, feels=True)
+    first = [next(k for k, s in enumerate(states) if s.yields) for states in (without, feeling)]
+    assert first[1] < first[0]
+
+
 def test_a_foot_that_yields_brings_its_target_to_where_it_is() -> None:
     stumble, velocity = Stumble(tripped=True, yields=True), (1.5, 0.2, -0.5)
     foot, target = np.array((0.1, 0.0, 0.0)), np.array((0.15, 0.01, -0.02))
@@ -175,3 +184,26 @@ def test_the_leg_feels_an_obstacle_by_its_joints(blocked: bool) -> None:
             highest_0 = max(highest_0, leg.kinematics.foot(goal_0)[2])
     if blocked:
         assert highest - highest_0 > 0.5 * leg.stumble_lift
+
+
+def landing_tick(force: float) -> int:
+    """First tick at which a leg that comes down on ground 25 mm high knows that it has landed."""
+    leg, state = leg_and_state(0.13)
+    r, high = np.array((0.5, 0.0, 0.0)), float(leg.foothold_in_base[2]) + 0.025
+    omega = leg.gait.omega(leg.scale.foot_speed(0.5, 0.0, 0.0), leg.scale)
+    for k in range(500):
+        x = state_at(np.array(omega * k * TICK))
+        foot = np.array(leg.kinematics.foot(state.joints.position))
+        stands = k > 150 and foot[2] < high
+        foot[2] = high if stands else foot[2]
+        feedback = LegFeedback(leg.kinematics.inverse(foot), np.zeros(3), np.zeros(2),
+                               np.zeros(3), force * stands)
+        state, _, _ = leg.step(state, x, omega * np.array((x[1], -x[0])), r, feedback, TICK)
+        if state.stumble.landed:
+            return k
+    return 500
+
+
+def test_the_leg_takes_the_force_of_its_foot_for_a_touch() -> None:
+    touch = leg_and_state(0.13)[0].touch_force
+    assert landing_tick(1.1 * touch) < landing_tick(0.0) == landing_tick(0.9 * touch) < 500

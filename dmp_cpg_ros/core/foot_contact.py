@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.gait import GRAVITY
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.sensor_readings import LARGEST_FORCE
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,12 @@ left the ground. In a trot a standing foot bears two of these quarters."""
 def quarter_weight(description: RobotDescription) -> float:
     """Force on each foot of a robot that stands evenly [N]."""
     return description.mass * GRAVITY / len(LEGS)
+
+
+def believed(force: Array) -> Array:
+    """Forces [N], (n,), with 0 for those that no contact sensor can have measured."""
+    return np.array([
+        value if -LARGEST_FORCE <= value <= LARGEST_FORCE else 0.0 for value in force.tolist()])
 
 
 def standing(before: NDArray[np.bool_], force: Array, quarter: float) -> NDArray[np.bool_]:

@@ -14,8 +14,10 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.foot_contact import LOADED, quarter_weight
 from dmp_cpg_ros.core.foot_path import FootPath, rolling_share, swing_height
 from dmp_cpg_ros.core.foot_shift import ShiftRates
+from dmp_cpg_ros.core.foot_way import way_of
 from dmp_cpg_ros.core.gait import BodyScale
 from dmp_cpg_ros.core.gait_transition import GaitInForce
 from dmp_cpg_ros.core.leg_kinematics import LegKinematics
@@ -23,7 +25,7 @@ from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.phase import scalar_phase, scalar_phase_rate
 from dmp_cpg_ros.core.robot_description import RobotDescription
 from dmp_cpg_ros.core.robot_state import LEGS, JointTargets
-from dmp_cpg_ros.core.stumble_reflex import Stumble, stumble_step, way_of, yielding
+from dmp_cpg_ros.core.stumble_reflex import Stumble, stumble_step, yielding
 from dmp_cpg_ros.core.swing_activity import activity_step
 from dmp_cpg_ros.core.transformation import TransformationState, TransformationSystem
 from dmp_cpg_ros.core.triples import Matrix, Triple, minus, moved, pair, plus, triple
@@ -130,12 +132,15 @@ class LegFeedback:
     correction : ndarray (3,)
         Added to the reference for the stance velocity, not for the cadence: v_x, v_y [m/s],
         γ [rad/s].
+    foot_force : float
+        Measured normal force of the foot [N]; 0 without a contact sensor.
     """
 
     joint_position: Array
     shift_in_base: Array
     drift_in_base: Array
     correction: Array
+    foot_force: float = 0.0
 
 
 class LegPrimitive:
@@ -169,6 +174,7 @@ class LegPrimitive:
         self.clearance = parameters.clearance * description.stance_height
         self.stumble_lift = parameters.stumble_lift * description.stance_height
         self.stumble_lag = parameters.stumble_lag * description.stance_height
+        self.touch_force = LOADED * quarter_weight(description)
         self.transformation = TransformationSystem(
             parameters.stiffness,
             parameters.damping,
@@ -241,7 +247,10 @@ class LegPrimitive:
             shift_rate = (0.0, 0.0, 0.0)
         elif swinging:
             swung = path.swung(position)
-            stumble = self._stumble(state, path, swung, at, target, activity, dt)
+            touches = feedback.foot_force > self.touch_force
+            way = way_of(path, swung, at, target, touches) if self.stumble_lift else None
+            stumble = stumble_step(
+                stumble, way, activity * self.stumble_lift, self.stumble_lag, dt)
             height, _ = swing_height(swung)
             shift_rate = self.shift_rates.in_swing(
                 shift, triple(feedback.shift_in_base.tolist()), height, activity, dt)
@@ -260,17 +269,6 @@ class LegPrimitive:
         goal, goal_velocity = np.array(angles), np.array(_joint_velocity(jacobian, velocity))
         joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, np.array(shift), stumble), goal, goal_velocity
-
-    def _stumble(
-        self, state: LegState, path: FootPath, swung: float, at: Triple, target: Triple,
-        activity: float, dt: float,
-    ) -> Stumble:
-        """What the stumbling reflex does to the swinging foot."""
-        if self.stumble_lift == 0.0:
-            return state.stumble
-        way = way_of(path, swung, at, target)
-        return stumble_step(
-            state.stumble, way, activity * self.stumble_lift, self.stumble_lag, dt)
 
     def targets(
         self,

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.bounce import LEVEL, Bounce
+from dmp_cpg_ros.core.foot_contact import believed
 from dmp_cpg_ros.core.foot_placement import FootPlacement
 from dmp_cpg_ros.core.force_distribution import distribute
 from dmp_cpg_ros.core.gait import GRAVITY
@@ -71,6 +72,8 @@ class PostureFeedback:
         What the body does, see :mod:`~dmp_cpg_ros.core.body_command`.
     measured : ndarray (12,)
         Measured joint angles that the feedback was made of [rad].
+    foot_force : ndarray (4,)
+        Measured normal forces of the feet [N]; 0 where there is none to be believed.
     """
 
     torque: Array
@@ -79,12 +82,13 @@ class PostureFeedback:
     correction: Array
     mode: str = 'standing'
     measured: Array = field(default_factory=lambda: np.zeros(12))
+    foot_force: Array = field(default_factory=lambda: np.zeros(4))
 
     def of_leg(self, i: int) -> LegFeedback:
         """What the path of leg ``i`` takes of it."""
         return LegFeedback(
             self.measured[3 * i : 3 * i + 3], self.shift_in_base[i], self.drift_in_base[i],
-            self.correction)
+            self.correction, float(self.foot_force[i]))
 
 
 @dataclass(frozen=True)
@@ -205,6 +209,7 @@ class PostureController:
             np.array(self.placement.drift(p, measured, planned, swings)),
             np.array(correction),
             measured=state.joint_position,
+            foot_force=believed(state.foot_force),
         )
 
     def _height(self, feet: list[Triple], load: list[float]) -> float:

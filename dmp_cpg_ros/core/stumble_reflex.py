@@ -6,8 +6,10 @@ Cats lift a paw higher when its back touches something while it swings (Forssber
 oscillators as here it took robots over steps blind (Focchi et al. 2013; Ajallooeian et al. 2013).
 The touch is felt by the joints: the foot has fallen behind its target along its way, further than
 targets that act late would leave it, and stands still over the ground. That needs no contact
-sensor, and no message beyond the measured angles, which reach the legs with the posture's
-feedback.
+sensor. Where a sensor feels a touch as well, lateness is no explanation, and the ground is felt
+from the middle of the swing: otherwise a hind foot that comes down on a step is pushed into it for
+the rest of its swing, which throws the body up and forward. Angles and forces reach the legs with
+the posture's feedback.
 
 A foot that tripped yields at once, so that it neither pushes the body back nor is wedged by
 friction, rises, and goes on when it is up. What comes too late in a swing to be cleared is cleared
@@ -21,13 +23,10 @@ body up.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, hypot, pi
+from math import exp
 
-from dmp_cpg_ros.core.foot_path import LOWERING, FootPath
+from dmp_cpg_ros.core.foot_way import Way
 from dmp_cpg_ros.core.triples import Triple
-
-SLOWEST = 0.02
-"""Speed of the body over a foot below which the foot feels nothing [m/s]."""
 
 FEELING = (0.3, 0.85)
 """Shares of the swing between which the foot feels what holds it up."""
@@ -37,6 +36,9 @@ STANDSTILL = 0.35
 
 TOUCHING = 0.75
 """Share of the swing from which a foot may feel the ground under it."""
+
+TOUCHED = 0.5
+"""The same for a foot that a contact sensor says touches something."""
 
 SETTLED = 0.6
 """Speed downwards, as a share of the mean, below which a foot that should come down has landed."""
@@ -66,34 +68,6 @@ YIELDING = 40.0
 
 WARY = 2
 """Swings after a stumble in which the foot steps higher from the start."""
-
-
-@dataclass(frozen=True)
-class Way:
-    """Where a swinging foot is on its way, in the direction in which the body is to go over it.
-
-    Attributes
-    ----------
-    swung : float
-        Share of the swing that has passed, in [0, 1).
-    place, level : float
-        Measured place along the way, and height, in the base [m].
-    target_place, target_level : float
-        The same of its target [m].
-    body_speed : float
-        Speed of the body over this foot [m/s].
-    swing_speed, sinking_speed : float
-        Mean speed of the swing over the ground, and mean speed with which it comes down [m/s].
-    """
-
-    swung: float
-    place: float
-    level: float
-    target_place: float
-    target_level: float
-    body_speed: float
-    swing_speed: float
-    sinking_speed: float
 
 
 @dataclass(frozen=True)
@@ -167,8 +141,7 @@ def stumble_step(
     moved = (way.place - last.place) / dt + way.body_speed
     speed = before.speed + share * (moved - before.speed)
     sinking = before.sinking + share * ((last.level - way.level) / dt - before.sinking)
-    late = LATENCY / dt
-    above = way.level - way.target_level
+    above, late = way.level - way.target_level, 0.0 if way.touches else LATENCY / dt
     tripped = before.tripped or (
         not before.landed
         and FEELING[0] < way.swung < FEELING[1]
@@ -177,7 +150,7 @@ def stumble_step(
             threshold + late * max(0.0, way.target_place - last.target_place), 2.0 * above)
     )
     landed = before.landed or (
-        way.swung > TOUCHING
+        way.swung > (TOUCHED if way.touches else TOUCHING)
         and sinking < SETTLED * way.sinking_speed
         and above > threshold + late * max(0.0, last.target_level - way.target_level)
     )
@@ -200,36 +173,6 @@ def _in_stance(before: Stumble, lift: float, dt: float) -> Stumble:
     if before.way is not None:
         wary = WARY if before.tripped else max(0, wary - 1)
     return Stumble(wary=wary, height=height, rate=(height - before.height) / dt)
-
-
-def way_of(path: FootPath, swung: float, foot: Triple, target: Triple) -> Way | None:
-    """Way of a swinging foot; None where the body hardly moves over it.
-
-    Parameters
-    ----------
-    path : FootPath
-        Of the foot.
-    swung : float
-        Share of the swing that has passed.
-    foot, target : tuple of float
-        Measured and wanted place in the base [m].
-    """
-    x, y, _ = path.foothold_in_base
-    along, across = path.v_x - path.gamma * y, path.v_y + path.gamma * x
-    body_speed = hypot(along, across)
-    if body_speed < SLOWEST:
-        return None
-    along, across, swing = along / body_speed, across / body_speed, 1.0 - path.duty
-    return Way(
-        swung,
-        along * foot[0] + across * foot[1],
-        foot[2],
-        along * target[0] + across * target[1],
-        target[2],
-        body_speed,
-        body_speed / swing,
-        path.clearance * path.omega / (2.0 * pi * swing * LOWERING),
-    )
 
 
 def yielding(stumble: Stumble, shift_rate: Triple, velocity: Triple, away: Triple) -> Triple:

@@ -144,8 +144,8 @@ class JointTargetsReader:
 
 
 class PostureFeedbackWriter:
-    """Writes ``posture_feedback``: torques and measured angles of the joints, shift and drift of
-    the feet, a velocity correction.
+    """Writes ``posture_feedback``: torques and measured angles of the joints, shift, drift and
+    measured forces of the feet, a velocity correction.
 
     The body's mode is in ``frame_id``.
     """
@@ -163,6 +163,7 @@ class PostureFeedbackWriter:
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
         self._effort[_JOINTS] = feedback.torque
+        self._effort[_FEET].reshape(len(LEGS), 3)[:, 2] = feedback.foot_force
         return self._writer.fill(
             time_ns, self._position, self._velocity, self._effort, frame=feedback.mode)
 
@@ -180,4 +181,4 @@ class PostureFeedbackReader:
         return PostureFeedback(
             effort[_JOINTS], position[_FEET].reshape(len(LEGS), 3),
             velocity[_FEET].reshape(len(LEGS), 3)[:, :2], velocity[_BASE],
-            frame_of(message), position[_JOINTS])
+            frame_of(message), position[_JOINTS], effort[_FEET].reshape(len(LEGS), 3)[:, 2])
