@@ -45,6 +45,24 @@ def test_a_velocity_is_shortened_and_keeps_its_curve(
         assert short == velocity
 
 
+@given(velocity=velocities, most=st.floats(0.1, 3.0), curve=st.floats(0.05, 1.0))
+def test_a_fast_command_leaves_less_for_its_curve(
+        velocity: tuple[float, float, float], most: float, curve: float) -> None:
+    scale = BodyScale(0.28, 0.2)
+
+    def share(v: tuple[float, float, float]) -> float:
+        speed = scale.foot_speed(*v) / (most * (GRAVITY * 0.28) ** 0.5)
+        return speed ** 2 + (np.hypot(v[0], v[1]) * v[2] / (curve * GRAVITY)) ** 2
+
+    short = limited(velocity, scale, most, curve)
+    assert np.allclose(np.cross(short, velocity), 0.0, atol=1e-12)
+    assert np.dot(short, velocity) >= 0.0
+    if share(velocity) > 1.0:
+        assert share(short) == pytest.approx(1.0)
+    else:
+        assert short == velocity
+
+
 def test_every_gait_of_the_package_has_a_limit_that_its_tables_reach() -> None:
     for gait in GAITS.values():
         assert np.isfinite(gait.highest_speed) and gait.highest_speed >= gait.speed[-1]
@@ -116,6 +134,16 @@ def test_a_robot_that_is_asked_for_too_much_goes_as_fast_as_it_can(gait: str) ->
     mean = np.mean([state.base_velocity_in_base[0] for state in run.states[-500:]])
     assert mean == pytest.approx(most, rel=0.05)
     assert SCALE.foot_speed(*run.loop.r.tolist()) <= most * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize('command', [(3.5, 0.0, 1.0), (2.0, 0.0, 2.2), (3.0, 0.0, -0.7)])
+def test_no_curve_that_is_asked_for_throws_a_trot(command: tuple[float, float, float]) -> None:
+    run = Walk('trot')
+    run.loop.command(*command)
+    assert run.walk(5.0)
+    reached = np.mean([(state.base_velocity_in_base[0], state.base_rate_in_base[2])
+                       for state in run.states[-500:]], axis=0)
+    assert reached[0] > 1.0 and reached[1] * command[2] > 0.3
 
 
 def test_a_change_to_a_slower_gait_slows_down_without_a_fall() -> None:

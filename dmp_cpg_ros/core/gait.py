@@ -249,10 +249,14 @@ class Gait:
         return wrapped(np.asarray(phi) + 2.0 * np.pi * self.rest) / (2.0 * np.pi)
 
 
-def limited(velocity: Triple, scale: BodyScale, highest_speed: float) -> Triple:
-    """Velocity (v_x, v_y, γ) within a dimensionless highest speed [m/s], [rad/s]."""
+def limited(
+    velocity: Triple, scale: BodyScale, highest_speed: float, largest_curve: float = inf
+) -> Triple:
+    """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
+    share of g, that goes with it [m/s], [rad/s].
+    """
     most = highest_speed * (GRAVITY * scale.leg_length) ** 0.5
-    return within_limit(velocity, scale.foot_speed(*velocity), most)
+    return within_limit(velocity, scale.foot_speed(*velocity), most, largest_curve * GRAVITY)
 
 
 def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:

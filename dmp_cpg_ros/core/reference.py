@@ -40,6 +40,13 @@ class ReferenceParameters(Parameters):
     max_turn_rate: float = parameter(
         2.2, 'largest turn rate that is accepted', unit='rad/s', minimum=0.0, maximum=10.0
     )
+    max_curve: float = parameter(
+        0.3,
+        'largest acceleration towards the centre of a curve, at low speed',
+        unit='g',
+        minimum=0.01,
+        maximum=10.0,
+    )
     max_acceleration: float = parameter(
         4.0,
         'largest acceleration of the reference while it speeds up',
@@ -65,7 +72,7 @@ class CommandGate:
     parameters : ReferenceParameters
         Limits and timeout.
     scale : BodyScale, optional
-        The robot's lengths, for the limit of the gait.
+        The robot's lengths, for the limits of the gait and of curves.
 
     Attributes
     ----------
@@ -121,7 +128,8 @@ class CommandGate:
             return 0.0, 0.0, 0.0
         if self._scale is None:
             return self._command
-        return limited(self._command, self._scale, self.highest_speed)
+        return limited(
+            self._command, self._scale, self.highest_speed, self.parameters.max_curve)
 
 
 class ReferenceSystem:

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""No gait is asked for more than its highest speed.
+"""No gait is asked for more than its highest speed, nor for a curve that would throw it out.
 
 Commands are limited before they are filtered, by the gait that is wanted
 (:class:`~dmp_cpg_ros.core.reference.CommandGate`), so that the reference comes to the highest
@@ -10,18 +10,27 @@ frequency, the legs' paths and the posture controller, takes it within the limit
 force, which moves from one to the other with the blend. The robot slows down on the way into a
 slower gait and speeds up on the way into a faster one.
 
+A body at speed u that turns with γ is accelerated by u |γ| towards the centre of its curve. The
+feet push it there as far as friction bears that, and the less the more the legs are at their limit
+with the speed alone. Commands therefore keep to
+
+    s² + c² ≤ 1 ,    c = u |γ| / (κ g) ,
+
+with s the speed's share of the highest one and κ the parameter ``max_curve``; a reference on its
+way to a command is never far outside.
+
 Velocity and turn rate are shortened alike: a curve stays the same curve.
 """
 
 from __future__ import annotations
 
-from math import inf
+from math import hypot, inf, sqrt
 
 from dmp_cpg_ros.core.triples import Triple
 
 
-def within_limit(velocity: Triple, speed: float, most: float) -> Triple:
-    """Shorten a velocity to the highest speed.
+def within_limit(velocity: Triple, speed: float, most: float, tightest: float = inf) -> Triple:
+    """Shorten a velocity to the highest speed and the largest curve.
 
     Parameters
     ----------
@@ -32,15 +41,20 @@ def within_limit(velocity: Triple, speed: float, most: float) -> Triple:
         :meth:`~dmp_cpg_ros.core.gait.BodyScale.foot_speed`, in proportion to it.
     most : float
         Highest foot speed, in the same unit.
+    tightest : float, optional
+        Largest acceleration towards the centre of a curve [m/s^2].
 
     Returns
     -------
     tuple of float
         The same where it is within the limit.
     """
-    if speed <= most:
+    fast = (speed / most) ** 2
+    tight = (hypot(velocity[0], velocity[1]) * velocity[2] / tightest) ** 2
+    if fast + tight <= 1.0:
         return velocity
-    share = most / speed
+    # shortened by k, the one grows with k², the other with k⁴
+    share = sqrt(2.0 / (fast + sqrt(fast * fast + 4.0 * tight)))
     return velocity[0] * share, velocity[1] * share, velocity[2] * share
 
 

@@ -232,6 +232,7 @@ CHANGEABLE: dict[str, tuple[str, ...]] = {
         'max_speed',
         'max_lateral_speed',
         'max_turn_rate',
+        'max_curve',
         'cmd_vel_timeout',
     ),
     'canonical_oscillators': (
