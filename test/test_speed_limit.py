@@ -18,6 +18,7 @@ from dmp_cpg_ros.commands.walking_trials import Walk
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait import GRAVITY, BodyScale, Gait, limited
 from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters, highest_speed
+from dmp_cpg_ros.core.gait_networks import HASTE
 from dmp_cpg_ros.core.gait_transition import GaitTransition
 from dmp_cpg_ros.core.leg_primitive import LegFeedback, LegParameters, LegPrimitive, body_scale
 from dmp_cpg_ros.core.phase import state_at
@@ -146,10 +147,16 @@ def test_no_curve_that_is_asked_for_throws_a_trot(command: tuple[float, float, f
     assert reached[0] > 1.0 and reached[1] * command[2] > 0.3
 
 
-def test_a_change_to_a_slower_gait_slows_down_without_a_fall() -> None:
+@pytest.mark.parametrize('speed', [2.5, 3.5])
+def test_a_change_to_a_slower_gait_slows_down_first_and_does_not_fall(speed: float) -> None:
     run = Walk('trot')
-    assert run.reach((2.5, 0.0, 0.0)) and run.walk(1.0)
+    assert run.reach((speed, 0.0, 0.0)) and run.walk(1.0)
     assert not run.loop.change_gait('walk')
+    while run.loop.network.gait.name == 'trot':
+        before = SCALE.foot_speed(*run.loop.r.tolist())
+        assert run.walk(0.004)
+    assert before > GAITS['walk'].highest_speed * ROOT  # or it would have waited too long
+    assert SCALE.foot_speed(*run.loop.r.tolist()) <= HASTE * GAITS['walk'].highest_speed * ROOT
     assert run.walk(3.0)
     assert run.loop.network.gait.name == 'walk'
     mean = np.mean([state.base_velocity_in_base[0] for state in run.states[-250:]])

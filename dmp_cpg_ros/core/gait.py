@@ -49,6 +49,10 @@ class BodyScale:
     leg_length: float
     hip_radius: float
 
+    def speed(self, dimensionless: float) -> float:
+        """Speed u √(g l) of a dimensionless one u [m/s]."""
+        return dimensionless * (GRAVITY * self.leg_length) ** 0.5
+
     def foot_speed(self, v_x: float, v_y: float, gamma: float) -> float:
         """Speed by which a gait chooses its cadence: a bound on that of any stance foot [m/s].
 
@@ -255,8 +259,9 @@ def limited(
     """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
     share of g, that goes with it [m/s], [rad/s].
     """
-    most = highest_speed * (GRAVITY * scale.leg_length) ** 0.5
-    return within_limit(velocity, scale.foot_speed(*velocity), most, largest_curve * GRAVITY)
+    return within_limit(
+        velocity, scale.foot_speed(*velocity), scale.speed(highest_speed),
+        largest_curve * GRAVITY)
 
 
 def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Changing the gait: when a change that is wanted begins, and the networks of all gaits.
 
-- While the gait walks freely, a change begins at once and takes its cycles.
+- While the gait walks freely, a change begins at once and takes its cycles; into a slower gait,
+  once the reference has nearly come down to the highest speed of that gait.
 - While gaits change, another change waits until the present one has ended; of several that wait
   the last one is taken.
 - While a stop is under way, a change in progress pauses and a new one waits: what was predicted
@@ -27,6 +28,12 @@ from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.transition_network import TransitionNetwork
 
 Array = NDArray[np.float64]
+
+HASTE = 1.1
+"""Share of a gait's highest speed at which a change into it begins. Commands are within the limit
+of the gait that is wanted already, so the reference comes down to it; the blend's own limit is for
+what is left.
+"""
 
 
 class GaitNetworks:
@@ -94,6 +101,8 @@ class GaitNetworks:
             new = self.of(wanted.scaled(gait.cadence_scale))
             return new, new.settled(turned(x, wanted.phases - gait.phases), r, inhibition)
         if inhibition.requested or isinstance(gait, BlendedGait):
+            return network, x
+        if self.scale.foot_speed(*r.tolist()) > HASTE * self.scale.speed(wanted.highest_speed):
             return network, x
         transition = self.reader.transition(self.reader.named(gait.name), wanted)
         return self.of(transition.at(0.0, 0.0).scaled(gait.cadence_scale)), x

@@ -31,7 +31,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.bounce import GRAVITY, Bounce
+from dmp_cpg_ros.core.bounce import Bounce
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait import BodyScale, Gait, limited
 from dmp_cpg_ros.core.gait_arcs import arcs_between
@@ -199,12 +199,9 @@ class BlendedGait:
         """Velocity that the blend does of one that is asked for, as :meth:`Gait.limited`."""
         return limited(velocity, scale, self.highest_speed)
 
-    def _most(self, scale: BodyScale) -> float:
-        return self.highest_speed * (GRAVITY * scale.leg_length) ** 0.5
-
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω at a foot speed, as :meth:`Gait.omega` [rad/s]."""
-        foot_speed = min(foot_speed, self._most(scale))
+        foot_speed = min(foot_speed, scale.speed(self.highest_speed))
         return self.cadence_scale * self._blended(
             self.transition.before.omega(foot_speed, scale),
             self.transition.after.omega(foot_speed, scale),
@@ -212,7 +209,7 @@ class BlendedGait:
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed, as :meth:`Gait.duty`."""
-        foot_speed = min(foot_speed, self._most(scale))
+        foot_speed = min(foot_speed, scale.speed(self.highest_speed))
         return self._blended(
             self.transition.before.duty(foot_speed, scale),
             self.transition.after.duty(foot_speed, scale),
