@@ -264,11 +264,15 @@ class LegPrimitive:
         foot = plus(plus(foot, shift), (0.0, 0.0, stumble.height - activity * bounce.height))
         velocity = plus(plus(shift_rate, path_velocity), (0.0, 0.0, stumble.rate))
         velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
-        angles = self.kinematics.angles(foot)
-        _, jacobian = self.kinematics.foot_and_jacobian(angles)
-        goal, goal_velocity = np.array(angles), np.array(_joint_velocity(jacobian, velocity))
+        goal, goal_velocity = self._goal(foot, velocity)
         joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, np.array(shift), stumble), goal, goal_velocity
+
+    def _goal(self, foot: Triple, velocity: Triple) -> tuple[Array, Array]:
+        """g_θ [rad] and g_θ̇ [rad/s] of a foot in the base."""
+        angles = self.kinematics.angles(foot)
+        _, jacobian = self.kinematics.foot_and_jacobian(angles)
+        return np.array(angles), np.array(_joint_velocity(jacobian, velocity))
 
     def targets(
         self,

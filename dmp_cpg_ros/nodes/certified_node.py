@@ -35,11 +35,14 @@ from dmp_cpg_ros.core.suite_parameters import (
     CHANGEABLE,
     OWNER,
     CertificateParameters,
+    CommandParameters,
     GaitParameters,
     SuiteParameters,
     TickParameters,
 )
+from dmp_cpg_ros.nodes.conversions import read_twist
 from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
+from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.parameter_follower import ParameterFollower
 from dmp_cpg_ros.nodes.parameterized_node import P, Sets
@@ -117,6 +120,15 @@ class CertifiedNode(ManagedNode):
         gate.highest_speed = highest_speed(
             self.parameters_of(GaitChoiceParameters), self.parameters_of(GaitParameters).gait,
             self.gaits.named)
+
+    def listen_to_commands(self, gate: CommandGate) -> None:
+        """Let a gate take what comes on ``cmd_vel``."""
+        if self.parameters_of(CommandParameters).stamped_cmd_vel:
+            self.listen(STAMPED_CMD_VEL, lambda message: gate.accept(*read_twist(message.twist)),
+                        command=True)
+        else:
+            self.listen('cmd_vel', lambda message: gate.accept(*read_twist(message)),
+                        command=True)
 
     def certificate_changed(self) -> None:
         """Say on ``/diagnostics`` whether the accepted parameters are certified."""

@@ -21,17 +21,15 @@ from dmp_cpg_ros.core.stop_prediction import predict
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
     VOTE_SOURCES,
-    CommandParameters,
     TickParameters,
 )
 from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
-from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference, read_twist
+from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import certificate_words
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
 from dmp_cpg_ros.nodes.inhibition_votes import NodeVotes
-from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
 from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
@@ -99,16 +97,7 @@ class InhibitionNode(CertifiedNode):
                 'reference', header_ns(message), read_reference(message)
             ),
         )
-        if self.parameters_of(CommandParameters).stamped_cmd_vel:
-            self.listen(
-                STAMPED_CMD_VEL,
-                lambda message: self._gate.accept(*read_twist(message.twist)),
-                command=True,
-            )
-        else:
-            self.listen(
-                'cmd_vel', lambda message: self._gate.accept(*read_twist(message)), command=True
-            )
+        self.listen_to_commands(self._gate)
         self.serve('inhibit', self._answer_inhibit)
 
     def activate(self) -> None:

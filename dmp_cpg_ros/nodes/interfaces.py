@@ -129,7 +129,7 @@ TOPICS: tuple[Interface, ...] = (
     Interface('canonical_state', JointState, 'oscillators: position = x, velocity = its rate',
               (_CANONICAL,), (_LEG, _INHIBITION, _POSTURE)),
     Interface('posture_feedback', JointState,
-              'balance: torques, measured angles, shift and drift of the feet',
+              'balance: torques, measured angles, shift, drift and forces of the feet',
               (_POSTURE,), (_LEG,)),
     Interface('joint_targets', JointState, 'targets of the three joints of one leg',
               (_LEG,), (_ROBOT,)),

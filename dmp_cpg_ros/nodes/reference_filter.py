@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.reference import ReferenceParameters, ReferenceSystem
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, CommandParameters
+from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
-from dmp_cpg_ros.nodes.conversions import ReferenceWriter, read_twist
+from dmp_cpg_ros.nodes.conversions import ReferenceWriter
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
-from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 
@@ -54,16 +53,7 @@ class ReferenceFilter(CertifiedNode):
                 read_inhibition_state(message).flag('requested'),
             ),
         )
-        if self.parameters_of(CommandParameters).stamped_cmd_vel:
-            self.listen(
-                STAMPED_CMD_VEL,
-                lambda message: self._gate.accept(*read_twist(message.twist)),
-                command=True,
-            )
-        else:
-            self.listen(
-                'cmd_vel', lambda message: self._gate.accept(*read_twist(message)), command=True
-            )
+        self.listen_to_commands(self._gate)
 
     def on_parameters(self) -> None:
         """Take over limits and rates."""
