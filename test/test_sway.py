@@ -79,7 +79,7 @@ def test_it_follows_phases_and_stance_without_a_jump() -> None:
             assert np.allclose(here, there, atol=1e-3)
 
 
-def test_a_slow_pace_holds_its_speed() -> None:
-    velocity = (0.2, 0.0, 0.0)
-    outcome = steady('pace', velocity)
-    assert relative_error(outcome, velocity) < 0.05
+@pytest.mark.parametrize('velocity', [(0.2, 0.0, 0.0), (0.0, 0.6, 0.0)])
+def test_a_pace_holds_its_speed(velocity: tuple[float, float, float]) -> None:
+    """Slowly ahead, which needs the plan, and sideways, which it must not disturb."""
+    assert relative_error(steady('pace', velocity), velocity) < 0.05

@@ -162,7 +162,8 @@ class FootPlacement:
         return raised
 
     def drift(
-        self, p: PostureParameters, measured: Triple, planned: Triple, activity: Sequence[float]
+        self, p: PostureParameters, measured: Triple, planned: Triple, activity: Sequence[float],
+        sway_velocity: float = 0.0,
     ) -> list[Pair]:
         """Velocity that standing feet add to their paths so as to go along with the ground.
 
@@ -178,6 +179,9 @@ class FootPlacement:
             As for :meth:`shift`.
         activity : sequence of four floats
             Swing activity; at rest the feet hold the body.
+        sway_velocity : float
+            Planned velocity across, which ``measured`` is without, and with which the feet go
+            along fully [m/s].
 
         Returns
         -------
@@ -185,7 +189,7 @@ class FootPlacement:
             [m/s]
         """
         x = -p.yielding * (measured[0] - planned[0])
-        y = -p.yielding * (measured[1] - planned[1])
+        y = -p.yielding * (measured[1] - planned[1]) - sway_velocity
         return [(swings * x, swings * y) for swings in activity]
 
 

@@ -33,7 +33,7 @@ from dmp_cpg_ros.core.robot_legs import RobotLegs
 from dmp_cpg_ros.core.robot_state import RobotState
 from dmp_cpg_ros.core.speed_keeping import SpeedKeeping
 from dmp_cpg_ros.core.stance_load import planned_load
-from dmp_cpg_ros.core.sway import STRAIGHT, Sway, planned_sway
+from dmp_cpg_ros.core.sway import SIDEWAYS, STRAIGHT, Sway, planned_sway
 from dmp_cpg_ros.core.swing_activity import activities_step
 from dmp_cpg_ros.core.triples import (
     Matrix,
@@ -189,7 +189,7 @@ class PostureController:
         keeping = memory.keeping.following(
             p, leg_length, moving, state.base_quaternion.tolist(), velocity, reference, dt)
         correction = keeping.acting(p, leg_length, moving)
-        sway = self._sway(positions, duty, omega, moving)
+        sway = self._sway(positions, duty, omega, reference, moving)
         measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
         planned = plus(reference, correction)
         lean_x, lean_y = lean(upward, self.model.height)
@@ -204,9 +204,9 @@ class PostureController:
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(positions, duty, omega, moving)
         return PostureState(activity, keeping), PostureFeedback(
-            self._torque(body, legs, feet, load, planned, bounce, sway),
+            self._torque(body, legs, feet, load, planned, bounce, sway.acceleration),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
-            np.array(self.placement.drift(p, measured, planned, swings)),
+            np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
             np.array(correction),
             measured=state.joint_position,
             foot_force=believed(state.foot_force),
@@ -231,18 +231,22 @@ class PostureController:
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
 
     def _sway(
-        self, positions: list[float], duty: float, omega: float, moving: float
+        self, positions: list[float], duty: float, omega: float, reference: Triple, moving: float
     ) -> Sway:
-        """Planned sway of the body; it fades with the legs' activity."""
+        """Planned sway of the body; it fades with the legs' activity and with speed sideways."""
         sway = planned_sway(positions, duty, omega, self._across, self.model.height)
-        return STRAIGHT if sway is STRAIGHT else Sway(*(moving * value for value in sway))
+        if sway is STRAIGHT:
+            return STRAIGHT
+        share = moving * max(0.0, 1.0 - abs(reference[1]) / self.scale.speed(SIDEWAYS))
+        return Sway(*(share * value for value in sway))
 
     def _torque(
         self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
-        load: list[float], r: Triple, bounce: Bounce, sway: Sway,
+        load: list[float], r: Triple, bounce: Bounce, sway_acceleration: float,
     ) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
-        force, moment = self.model.wrench(self.parameters, body, r, bounce, sway)
+        force, moment = self.model.wrench(
+            self.parameters, body, r, bounce, sway_acceleration)
         forces = distribute(
             force, moment, feet, load, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)

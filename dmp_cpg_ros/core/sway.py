@@ -23,7 +23,10 @@ middle
 A trot, a walk, a bound and a pronk do not sway; an amble does a little, a pace much. A body that
 was planned not to sway would take its sway for a push: it would place its feet as if to catch it,
 and the wider they are the more force across they need, until friction does not yield that force
-any more.
+any more. Placement therefore answers what differs from the plan, standing feet go along with it,
+and the forces accelerate the body as it says. They do not follow its velocity: a force that damps
+the sway as well bears stronger pushes. Nor is there a plan for a body that goes sideways, which is
+caught anyway by the feet that go ahead of it.
 """
 
 from __future__ import annotations
@@ -56,6 +59,9 @@ class Sway(NamedTuple):
     velocity: float
     acceleration: float
 
+
+SIDEWAYS = 0.3
+"""Speed sideways from which no sway is planned, in √(g l)."""
 
 STRAIGHT = Sway(0.0, 0.0, 0.0)
 """Of a gait that never stands on one side only."""

@@ -16,7 +16,6 @@ from dmp_cpg_ros.core.bounce import LEVEL, Bounce
 from dmp_cpg_ros.core.gait import GRAVITY
 from dmp_cpg_ros.core.posture_parameters import PostureParameters
 from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.sway import STRAIGHT, Sway
 from dmp_cpg_ros.core.triples import Matrix, Triple, triple
 
 
@@ -62,7 +61,7 @@ class VirtualModel:
 
     def wrench(
         self, p: PostureParameters, body: BodyMotion, r: Triple, bounce: Bounce = LEVEL,
-        sway: Sway = STRAIGHT,
+        sway_acceleration: float = 0.0,
     ) -> tuple[Triple, Triple]:
         """Force [N] and moment [N m] about the centre of mass in the frame of the ground.
 
@@ -76,8 +75,8 @@ class VirtualModel:
             Reference v_x, v_y [m/s], γ [rad/s].
         bounce : Bounce
             Planned motion along the normal of the ground.
-        sway : Sway
-            Planned motion across the way.
+        sway_acceleration : float
+            Planned acceleration across the way [m/s^2].
 
         Returns
         -------
@@ -98,8 +97,7 @@ class VirtualModel:
         return (
             (
                 mass * (push * (r[0] - body.velocity[0]) + GRAVITY * up_x),
-                mass * (push * (r[1] + sway.velocity - body.velocity[1])
-                        + sway.acceleration + GRAVITY * up_y),
+                mass * (push * (r[1] - body.velocity[1]) + sway_acceleration + GRAVITY * up_y),
                 mass * (lift + GRAVITY * up_z),
             ),
             (
