@@ -147,6 +147,15 @@ def test_no_curve_that_is_asked_for_throws_a_trot(command: tuple[float, float, f
     assert reached[0] > 1.0 and reached[1] * command[2] > 0.3
 
 
+def test_a_trot_that_is_told_to_turn_back_brakes_first() -> None:
+    run = Walk('trot')
+    assert run.reach((3.0, 0.0, 0.0)) and run.walk(2.0)
+    run.loop.command(-3.0)
+    assert run.walk(4.0)
+    mean = np.mean([state.base_velocity_in_base[0] for state in run.states[-250:]])
+    assert mean == pytest.approx(-3.0, rel=0.05)
+
+
 @pytest.mark.parametrize('speed', [2.5, 3.5])
 def test_a_change_to_a_slower_gait_slows_down_first_and_does_not_fall(speed: float) -> None:
     run = Walk('trot')

@@ -5,8 +5,8 @@ Section 5).
 
 v̇ = α_r (v_ext − v),   γ̇ = α_r (γ_ext − γ)
 
-While |v| grows, |v̇| is limited: no foot can push the body harder. It is not limited while |v|
-falls, so that stops are those of the plain filter.
+|v̇| is limited, for no foot can push the body harder; but not where the filter brakes no harder
+than it would for v_ext = 0, so that stops are those of the plain filter.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class ReferenceParameters(Parameters):
     )
     max_acceleration: float = parameter(
         4.0,
-        'largest acceleration of the reference while it speeds up',
+        'largest acceleration of the reference, other than in braking to rest',
         unit='m/s^2',
         minimum=0.1,
         maximum=1e3,
@@ -140,7 +140,7 @@ class ReferenceSystem:
         self.parameters = parameters
 
     def step(self, r: Array, r_ext: Array, dt: float) -> Array:
-        """Advance: r(t + dt) = r_ext + (r − r_ext) exp(−α_r dt), less where v grows too fast.
+        """Advance: r(t + dt) = r_ext + (r − r_ext) exp(−α_r dt), less where v changes too fast.
 
         Parameters
         ----------
@@ -155,9 +155,14 @@ class ReferenceSystem:
         -------
         ndarray (3,)
         """
-        following = r_ext + (r - r_ext) * np.exp(-self.parameters.alpha_r * dt)
+        kept = np.exp(-self.parameters.alpha_r * dt)
+        following = r_ext + (r - r_ext) * kept
         change, most = following[:2] - r[:2], self.parameters.max_acceleration * dt
-        if change @ change > most * most and following[:2] @ following[:2] > r[:2] @ r[:2]:
+        if change @ change <= most * most:
+            return following
+        if following[:2] @ following[:2] <= r[:2] @ r[:2]:
+            most = max(most, (1.0 - kept) * float(np.sqrt(r[:2] @ r[:2])))
+        if change @ change > most * most * (1.0 + 1e-12):
             following[:2] = r[:2] + change * (most / float(np.sqrt(change @ change)))
         return following
 
