@@ -3,8 +3,8 @@
 """How the body sways from side to side in a gait that at times stands on one side only.
 
 While all feet that stand are on one side, at y_s from the middle, the ground's force passes level
-through the centre of mass only if it leans inward by y_s / h: the body must swing like an inverted
-pendulum,
+through the centre of mass only if it leans inward by y_s / h: the body must swing like the linear
+inverted pendulum (Kajita, Kanehiro, Kaneko, Yokoi, Hirukawa 2001),
 
     ÿ = (g / h) (y − p) ,
 
