@@ -14,7 +14,7 @@ from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.primitives.basis import GaussianBases, VonMisesBases
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
-from dmp_cpg_ros.core.primitives.transformation import SpringDamper
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 
 _FORMAT = 1
 

@@ -11,19 +11,21 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
-from dmp_cpg_ros.core.body_mode import ModeParameters
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.core.estimation_parameters import EstimationParameters, StateSourceParameters
-from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
-from dmp_cpg_ros.core.gait_network import CanonicalParameters
-from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters
-from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.sensor_parameters import SensorParameters
+from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
+from dmp_cpg_ros.core.modes.body_mode import ModeParameters
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.robot_model.world import World
+from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
     GaitParameters,
@@ -33,9 +35,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
     chosen_world,
 )
-from dmp_cpg_ros.core.voting_parameters import VoteSourceParameters
-from dmp_cpg_ros.core.world import World
-from dmp_cpg_ros.core.world_choice import WorldParameters
+from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""

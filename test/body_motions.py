@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from core_examples import GRAVITY, TICK, TICK_NS, quadruped
 
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.leg_primitive import nominal_foothold
-from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.sensor_readings import SensorReadings
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.transformation.leg import nominal_foothold
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
-from dmp_cpg_ros.core.exponential import ExponentialStep
-from dmp_cpg_ros.core.graph import CouplingGraph, graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.phase import state_at
+from dmp_cpg_ros.core.canonical.graph import CouplingGraph, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')
 

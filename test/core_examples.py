@@ -8,14 +8,14 @@ import dataclasses
 
 import numpy as np
 
-from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.leg_primitive import body_scale, nominal_foothold
-from dmp_cpg_ros.core.reference import ReferenceParameters
-from dmp_cpg_ros.core.robot_description import LegGeometry, RobotDescription
-from dmp_cpg_ros.core.robot_state import LEGS, RobotState
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.core.transformation.leg import body_scale, nominal_foothold
 from dmp_cpg_ros.suite import load_gaits
 
 GAITS = load_gaits()

@@ -13,7 +13,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 WALL_START_NS = 1_760_000_000_123_456_789

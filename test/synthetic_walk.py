@@ -20,10 +20,10 @@ from dmp_cpg_ros.analysis.recording import (
     StatusEvent,
     VelocitySeries,
 )
-from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.phase import state_at
-from dmp_cpg_ros.core.robot_description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 Array = NDArray[np.float64]
 

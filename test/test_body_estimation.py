@@ -12,12 +12,12 @@ import pytest
 from body_motions import SWAY, Sway, point_footed, readings
 from core_examples import GRAVITY, TICK
 
-from dmp_cpg_ros.core.body_estimate import BodyEstimate
-from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState
-from dmp_cpg_ros.core.estimation_parameters import EstimationParameters
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.rotations import roll_pitch_yaw, rotation_matrix, turned
-from dmp_cpg_ros.core.sensor_readings import SensorReadings
+from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
+from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
+from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw, rotation_matrix, turned
+from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 ROBOT = point_footed()
 SECONDS = 3.0

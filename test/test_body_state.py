@@ -18,9 +18,9 @@ from core_examples import network, quadruped, standing_state
 from rclpy.serialization import deserialize_message
 from ros_processes import Processes, Ros
 
-from dmp_cpg_ros.core.body_estimation import BodyEstimator
-from dmp_cpg_ros.core.estimation_parameters import EstimationParameters
-from dmp_cpg_ros.core.sensor_readings import readings_of
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
+from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
+from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.nodes.body_state import sensor_readings
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, ReferenceWriter
 from dmp_cpg_ros.nodes.interfaces import interface

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.commands.walking_trials import relative_error, steady
-from dmp_cpg_ros.core.bounce import GRAVITY, LEVEL, planned_bounce, stance_groups
-from dmp_cpg_ros.core.gait_transition import GaitTransition
+from dmp_cpg_ros.core.gait.com_height import GRAVITY, LEVEL, planned_bounce, stance_groups
+from dmp_cpg_ros.core.gait.transition import GaitTransition
 from dmp_cpg_ros.suite import load_gaits
 
 OMEGA = 17.0

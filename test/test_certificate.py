@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from core_examples import GAITS, TICK, network
 
-from dmp_cpg_ros.core.certificate import Certificate, certify
-from dmp_cpg_ros.core.certificate_hierarchy import spring_damper_contraction
-from dmp_cpg_ros.core.certificate_inequality import Inequality
-from dmp_cpg_ros.core.certificate_range import operating_range
-from dmp_cpg_ros.core.certificate_suggest import nearest_value, suggest_gains
-from dmp_cpg_ros.core.contraction.matrix_measure import matrix_measure
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.hierarchy import spring_damper_contraction
+from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.certificates.suggest import nearest_value, suggest_gains
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters
-from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.paper.matrix_measure import matrix_measure
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 

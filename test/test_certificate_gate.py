@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_state
 
-from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.gait_network import CanonicalParameters
-from dmp_cpg_ros.core.gait_networks import GaitNetworks
-from dmp_cpg_ros.core.gait_reader import GaitReader
-from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
-from dmp_cpg_ros.core.gait_word import gait_word, read_gait_word
-from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import body_scale
-from dmp_cpg_ros.core.running_network import CADENCE_RATE, RunningNetwork
+from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.gait_word import gait_word, read_gait_word
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.running_network import CADENCE_RATE, RunningNetwork
+from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER, SuiteParameters
+from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
 
 RUNNING = Running(SuiteParameters(), GAITS['amble'], body_scale(quadruped()), TICK)

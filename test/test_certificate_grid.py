@@ -19,20 +19,20 @@ import pytest
 from contraction_batches import Batch, Setting, locked, random_graph
 from core_examples import GAITS, TICK, quadruped
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
-from dmp_cpg_ros.core.certificate import Certificate, certify
-from dmp_cpg_ros.core.certificate_range import operating_range
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.connectivity import synchronisation_complement
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
-from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.graph import graph_from_edges
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters, body_scale
-from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import operating_range
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')
 LARGEST_MISMATCH = 0.05

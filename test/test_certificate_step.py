@@ -7,8 +7,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
-from dmp_cpg_ros.core.certificate_step import (
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.certificates.step import (
     LARGEST_MILD_STEP,
     STEP_ERROR,
     cycle_radius_error,
@@ -17,10 +20,7 @@ from dmp_cpg_ros.core.certificate_step import (
 )
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.inhibited import inhibited_contraction
-from dmp_cpg_ros.core.exponential import ExponentialStep
-from dmp_cpg_ros.core.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.phase import state_at
+from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 
 
 def amplification(z: float, w: complex) -> float:

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from core_examples import TICK, network
 
-from dmp_cpg_ros.core.certificate import certify
-from dmp_cpg_ros.core.gait_network import GaitNetwork
-from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters
-from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 LEG, POSTURE = LegParameters(), PostureParameters()
 

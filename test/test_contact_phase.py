@@ -10,9 +10,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.certificate import Certificate
-from dmp_cpg_ros.core.certificate_gate import Running
-from dmp_cpg_ros.core.contact_phase import (
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.phase import phase, phase_rotation, wrapped
+from dmp_cpg_ros.core.certificates.certify import Certificate
+from dmp_cpg_ros.core.certificates.gate import Running
+from dmp_cpg_ros.core.contraction.capture import PLACE_TOLERANCE, RADIUS_TOLERANCE
+from dmp_cpg_ros.core.gait.contact_feedback import (
     ContactLimits,
     ContactPhase,
     ContactState,
@@ -20,13 +23,10 @@ from dmp_cpg_ros.core.contact_phase import (
     initial_contact_state,
     touchdown_error,
 )
-from dmp_cpg_ros.core.contraction.capture import PLACE_TOLERANCE, RADIUS_TOLERANCE
-from dmp_cpg_ros.core.foot_contact import LOADED, UNLOADED, standing
-from dmp_cpg_ros.core.gait_network import GaitNetwork
-from dmp_cpg_ros.core.gait_supervisor import LOCKED_PHASE_ERROR
-from dmp_cpg_ros.core.inhibition import Inhibition
-from dmp_cpg_ros.core.leg_primitive import body_scale
-from dmp_cpg_ros.core.phase import phase, phase_rotation, wrapped
+from dmp_cpg_ros.core.gait.foot_contact import LOADED, UNLOADED, standing
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot

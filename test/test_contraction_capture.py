@@ -13,8 +13,11 @@ from contraction_batches import Batch, Setting, locked, random_setting
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
-from dmp_cpg_ros.core.certificate_step import longest_step
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.certificates.step import longest_step
 from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set, outward_growth
 from dmp_cpg_ros.core.contraction.capture_anywhere import needed_gain_anywhere
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
@@ -28,9 +31,6 @@ from dmp_cpg_ros.core.contraction.inhibited import (
 )
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.phase import state_at
 
 TICK = 0.004
 SEEDS = st.integers(0, 10_000)

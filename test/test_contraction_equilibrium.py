@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
-from dmp_cpg_ros.core.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.phase import state_at
 
 
 def system(name: str, gain: float, size: int = 4, rho: float = 8.0) -> CanonicalSystem:

@@ -10,17 +10,17 @@ from contraction_batches import Batch, Setting, locked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.heterogeneity import (
     disagreement_bound,
     mismatch_bound,
     mismatch_margin,
 )
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
-from dmp_cpg_ros.core.contraction.tube import hopf_tube, metric_condition, tube_radius
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
+from dmp_cpg_ros.paper.tube import hopf_tube, metric_condition, tube_radius
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 

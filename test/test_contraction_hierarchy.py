@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
 from dmp_cpg_ros.core.contraction.hierarchy import (
     CONTRACTING,
@@ -17,10 +18,9 @@ from dmp_cpg_ros.core.contraction.hierarchy import (
     hierarchy,
     rhythmic_primitive,
 )
-from dmp_cpg_ros.core.contraction.orbit import runge_kutta_step
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.graph import graph_from_edges, topology
+from dmp_cpg_ros.paper.orbit import runge_kutta_step
 
 FILTER = Part('filter', CONTRACTING, 3.0)
 CYCLE = Part('cycle', TRANSVERSE, 16.0)

@@ -9,18 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.interval import Interval
-from dmp_cpg_ros.core.contraction.jacobians import (
+from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.paper.jacobians import (
     complex_step_jacobian,
     difference_jacobian,
     generalized_jacobian,
     numerical_jacobian,
 )
-from dmp_cpg_ros.core.contraction.matrix_measure import NORMS, interval_measure, matrix_measure
-from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
+from dmp_cpg_ros.paper.matrix_measure import NORMS, interval_measure, matrix_measure
 
 SEEDS = st.integers(0, 10_000)
 

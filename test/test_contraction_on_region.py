@@ -9,21 +9,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED, Finding, weakest
 from dmp_cpg_ros.core.contraction.hopf_bounds import (
     growth,
     interval_jacobian,
     transverse_contraction,
 )
-from dmp_cpg_ros.core.contraction.matrix_measure import NORMS, matrix_measure
-from dmp_cpg_ros.core.contraction.on_region import (
+from dmp_cpg_ros.core.contraction.region import Annulus, Ball, Box
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.paper.matrix_measure import NORMS, matrix_measure
+from dmp_cpg_ros.paper.on_region import (
     proved_contraction,
     sampled_contraction,
     sampled_transverse_contraction,
 )
-from dmp_cpg_ros.core.contraction.region import Annulus, Ball, Box
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.hopf import AndronovHopf
 
 OSCILLATOR, OMEGA = AndronovHopf(8.0, 1.0), 11.0
 

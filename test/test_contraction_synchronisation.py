@@ -10,23 +10,23 @@ from contraction_batches import Batch, Setting, locked, random_setting
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.canonical.graph import CouplingGraph, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.connectivity import (
     components,
     connectivity,
     grounded_connectivity,
     synchronisation_complement,
 )
-from dmp_cpg_ros.core.contraction.matrix_measure import matrix_measure
-from dmp_cpg_ros.core.contraction.norm_form import (
+from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.paper.matrix_measure import matrix_measure
+from dmp_cpg_ros.paper.norm_form import (
     coupling_measure,
     disagreement_measure,
     hopf_jacobian_vertices,
 )
-from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.graph import CouplingGraph, graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
 
 SEEDS = st.integers(0, 10_000)
 

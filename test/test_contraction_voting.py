@@ -9,7 +9,11 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.voting import (
     certified_threshold,
     different_voters,
@@ -17,10 +21,6 @@ from dmp_cpg_ros.core.contraction.voting import (
     rest_threshold,
 )
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.inhibition import Inhibition
-from dmp_cpg_ros.core.phase import state_at
 
 OMEGA, REGION = 10.0, 0.3
 

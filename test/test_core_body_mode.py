@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from core_examples import TICK, TICK_NS, quadruped, standing_state
 
-from dmp_cpg_ros.core.body_command import MODES, MOVING, BodyCommand
-from dmp_cpg_ros.core.body_condition import BodyCondition, BodySense
-from dmp_cpg_ros.core.body_mode import BodyModes, ModeParameters, ModeState
-from dmp_cpg_ros.core.body_requests import REQUESTS, request
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.fall_detection import FallDetector, FallParameters, FallState
-from dmp_cpg_ros.core.gait import GRAVITY
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.modes.body_command import MODES, MOVING, BodyCommand
+from dmp_cpg_ros.core.modes.body_condition import BodyCondition, BodySense
+from dmp_cpg_ros.core.modes.body_mode import BodyModes, ModeParameters, ModeState
+from dmp_cpg_ros.core.modes.body_requests import REQUESTS, request
+from dmp_cpg_ros.core.modes.fall_detection import FallDetector, FallParameters, FallState
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.state import RobotState
 
 ROBOT = quadruped()
 HEIGHT = ROBOT.stance_height

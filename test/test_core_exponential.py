@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.exponential import ExponentialStep, phi_functions
+from dmp_cpg_ros.core.maths.exponential import ExponentialStep, phi_functions
 
 
 def random_matrix(seed: int, n: int, size: float) -> np.ndarray:

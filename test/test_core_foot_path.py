@@ -10,8 +10,8 @@ from core_examples import geometry
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.foot_path import FootPath, rolling_share
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.transformation.foot_path import FootPath, rolling_share
 
 speeds = st.floats(-1.5, 1.5)
 turn_rates = st.one_of(st.floats(-2.0, 2.0), st.sampled_from([0.0, 1e-9, 1e-7]))

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait import GRAVITY, BodyScale, Gait
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.gait.gait import GRAVITY, BodyScale, Gait
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 SCALE = BodyScale(0.28, 0.22)
 MIRRORED = [1, 0, 3, 2]  # fl with fr, rl with rr

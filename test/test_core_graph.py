@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.graph import (
+from dmp_cpg_ros.core.canonical.graph import (
     CouplingGraph,
     graph_from_edges,
     phases_from_offsets,
     topology,
 )
-from dmp_cpg_ros.core.phase import state_at, wrapped
+from dmp_cpg_ros.core.canonical.phase import state_at, wrapped
+from dmp_cpg_ros.core.errors import ParameterError
 
 NAMES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 

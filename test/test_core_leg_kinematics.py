@@ -10,9 +10,9 @@ from core_examples import differences, geometry
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.phase import wrapped
-from dmp_cpg_ros.core.robot_description import LegGeometry
+from dmp_cpg_ros.core.canonical.phase import wrapped
+from dmp_cpg_ros.core.robot_model.description import LegGeometry
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 signs = st.sampled_from([-1.0, 1.0])
 small = st.floats(-0.05, 0.05)

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from core_examples import GAITS, TICK, network, quadruped
 
-from dmp_cpg_ros.core.inhibition import Inhibition
-from dmp_cpg_ros.core.leg_primitive import (
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.phase import phase_generator, state_at
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.transformation.joint_system import TransformationState
+from dmp_cpg_ros.core.transformation.leg import (
     LegFeedback,
     LegParameters,
     LegPrimitive,
@@ -17,9 +20,6 @@ from dmp_cpg_ros.core.leg_primitive import (
     body_scale,
     nominal_foothold,
 )
-from dmp_cpg_ros.core.phase import phase_generator, state_at
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.transformation import TransformationState
 
 ROBOT = quadruped()
 REFERENCES = {'forward': [0.5, 0.0, 0.0], 'sideways': [0.0, 0.3, 0.0], 'turn': [0.2, 0.0, 0.8]}

@@ -10,9 +10,8 @@ from core_examples import differences
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.phase import (
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.phase import (
     phase,
     phase_generator,
     phase_rate,
@@ -20,6 +19,7 @@ from dmp_cpg_ros.core.phase import (
     state_at,
     wrapped,
 )
+from dmp_cpg_ros.core.errors import ParameterError
 
 angles = st.floats(-10.0, 10.0)
 coordinates = st.floats(-2.0, 2.0)

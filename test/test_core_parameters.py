@@ -9,13 +9,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait_network import CanonicalParameters
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 SETS = (CanonicalParameters, InhibitionParameters, LegParameters, PostureParameters,
         ReferenceParameters)

@@ -10,14 +10,14 @@ from core_examples import GAITS, GRAVITY, TICK, network, quadruped, standing_sta
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.force_distribution import REGULARISATION, distribute
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.leg_primitive import nominal_foothold
-from dmp_cpg_ros.core.levelling import level_from_base
-from dmp_cpg_ros.core.posture import PostureController, PostureParameters
-from dmp_cpg_ros.core.rotations import rotation_matrix, turned
-from dmp_cpg_ros.core.terrain_plane import normal_in_world
-from dmp_cpg_ros.core.triples import Triple, triple
+from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
+from dmp_cpg_ros.core.balance.force_distribution import REGULARISATION, distribute
+from dmp_cpg_ros.core.estimation.terrain_plane import normal_in_world
+from dmp_cpg_ros.core.maths.levelling import level_from_base
+from dmp_cpg_ros.core.maths.rotations import rotation_matrix, turned
+from dmp_cpg_ros.core.maths.vec3 import Triple, triple
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.transformation.leg import nominal_foothold
 
 ROBOT = quadruped()
 FEET = np.array([nominal_foothold(ROBOT, leg.name) for leg in ROBOT.legs])

@@ -10,22 +10,22 @@ import numpy as np
 import pytest
 from core_examples import GAITS, geometry, quadruped
 
-from dmp_cpg_ros.core.body_command import BodyCommand
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.leg_primitive import LegParameters, LegPrimitive, LegState
-from dmp_cpg_ros.core.posture_motion import LegMotion, phase_at
-from dmp_cpg_ros.core.posture_movements import Movements, minimum_jerk
-from dmp_cpg_ros.core.postures import (
+from dmp_cpg_ros.core.modes.body_command import BodyCommand
+from dmp_cpg_ros.core.modes.motion import LegMotion, phase_at
+from dmp_cpg_ros.core.modes.movements import Movements, minimum_jerk
+from dmp_cpg_ros.core.modes.postures import (
     folded_length,
     leg_angles,
     lying_posture,
     raised_posture,
     standing_posture,
 )
-from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.transformation import TransformationState
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.transformation.joint_system import TransformationState
+from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
 
 LOWER, UPPER = np.array((-1.0, -1.2, -2.7)), np.array((1.0, 2.8, -0.2))
 

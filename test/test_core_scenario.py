@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.scenario import COMMAND_PERIOD_NS, Scenario, play
-from dmp_cpg_ros.core.scenario_events import EVENT_KINDS
+from dmp_cpg_ros.core.scenario.events import EVENT_KINDS
+from dmp_cpg_ros.core.scenario.scenario import COMMAND_PERIOD_NS, Scenario, play
 from dmp_cpg_ros.suite import load_gaits
 
 SCENARIOS = Path(__file__).resolve().parent.parent / 'config' / 'scenarios'

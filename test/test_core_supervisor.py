@@ -16,18 +16,22 @@ from core_examples import GAITS, TICK_NS, quadruped, standing_state, suite_param
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait_supervisor import STATE_WORDS
-from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
-from dmp_cpg_ros.core.phase import phase, wrapped
-from dmp_cpg_ros.core.posture import (
+from dmp_cpg_ros.core.balance.controller import (
     PostureController,
     PostureFeedback,
     PostureParameters,
     PostureState,
 )
-from dmp_cpg_ros.core.reference import ReferenceParameters
-from dmp_cpg_ros.core.robot_state import LEGS, JointTargets
+from dmp_cpg_ros.core.canonical.inhibition import (
+    Inhibition,
+    InhibitionParameters,
+    initial_inhibition,
+)
+from dmp_cpg_ros.core.canonical.phase import phase, wrapped
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.inhibition.supervisor import STATE_WORDS
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
 
 ROBOT = quadruped()

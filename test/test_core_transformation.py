@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters, ReferenceSystem
-from dmp_cpg_ros.core.swing_activity import activity_step
-from dmp_cpg_ros.core.transformation import TransformationState, TransformationSystem
+from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.transformation.joint_system import TransformationState, TransformationSystem
+from dmp_cpg_ros.core.transformation.swing_activity import activity_step
 
 vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
 durations = st.floats(1e-4, 0.1)

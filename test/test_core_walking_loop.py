@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from core_examples import GAITS, GRAVITY, TICK, suite_parameters
 
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.robot_state import LEGS, RobotState
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.stop_baselines import FreezingLoop
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from core_examples import GAITS, TICK, suite_parameters
 
-from dmp_cpg_ros.core.body_estimate import BodyEstimate
-from dmp_cpg_ros.core.robot_state import RobotState
-from dmp_cpg_ros.core.rotations import roll_pitch_yaw
-from dmp_cpg_ros.core.sensor_parameters import SensorParameters
+from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
+from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
+from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
+from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.robot_model.world import Slope
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
-from dmp_cpg_ros.core.world import Slope
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot

@@ -17,7 +17,7 @@ from rcl_interfaces.srv import GetParameters
 from ros_processes import Processes, Ros
 from std_srvs.srv import SetBool
 
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.nodes.conversions import CANONICAL_NAMES, CORRECTION_NAMES, SHIFT_NAMES
 from dmp_cpg_ros.nodes.interfaces import INTERFACES, published_by, read_by
 

@@ -10,12 +10,12 @@ from core_examples import GRAVITY, quadruped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.foot_placement import FootPlacement
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.leg_primitive import nominal_foothold
-from dmp_cpg_ros.core.levelling import level_from_base
-from dmp_cpg_ros.core.posture_parameters import PostureParameters
-from dmp_cpg_ros.core.triples import Triple, pair
+from dmp_cpg_ros.core.balance.foot_placement import FootPlacement
+from dmp_cpg_ros.core.balance.parameters import PostureParameters
+from dmp_cpg_ros.core.maths.levelling import level_from_base
+from dmp_cpg_ros.core.maths.vec3 import Triple, pair
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.transformation.leg import nominal_foothold
 
 ROBOT = quadruped()
 FEET = np.array([nominal_foothold(ROBOT, leg.name) for leg in ROBOT.legs])

@@ -10,9 +10,9 @@ from core_examples import GAITS, TICK, quadruped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.foot_shift import ShiftRates
-from dmp_cpg_ros.core.leg_primitive import LegFeedback, LegParameters, LegPrimitive
-from dmp_cpg_ros.core.phase import phase_generator, state_at
+from dmp_cpg_ros.core.canonical.phase import phase_generator, state_at
+from dmp_cpg_ros.core.transformation.foot_shift import ShiftRates
+from dmp_cpg_ros.core.transformation.leg import LegFeedback, LegParameters, LegPrimitive
 
 RATES = ShiftRates(40.0, 20.0, 10.0)
 lengths = st.floats(-0.3, 0.3)

@@ -17,10 +17,10 @@ from dmp_cpg_ros.analysis.gait_in_force import gait_rows, gaits_walked
 from dmp_cpg_ros.analysis.metrics.gait import gait_metrics, phase_errors
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.commands.loop_recording import recording_of
-from dmp_cpg_ros.core.gait_transition import BlendedGait
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.phase import phase
-from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.gait.transition import BlendedGait
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 

@@ -10,17 +10,17 @@ from core_examples import GAITS, TICK, TICK_NS, quadruped, standing_state
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.certificate import certify
-from dmp_cpg_ros.core.certificate_change import certify_changes
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.changes import certify_changes
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait import GRAVITY
-from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters, chosen_gait
-from dmp_cpg_ros.core.gait_network import GaitNetwork
-from dmp_cpg_ros.core.gait_transition import BlendedGait
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import body_scale
-from dmp_cpg_ros.core.reference import ReferenceParameters
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, chosen_gait
+from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.transition import BlendedGait
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
 
 ROBOT = quadruped()

@@ -12,19 +12,19 @@ from core_examples import GAITS, TICK, quadruped
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.phase import phase, phase_rate, turned, wrapped
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.gait_arcs import arcs_between, crowding
-from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait_networks import GaitNetworks
-from dmp_cpg_ros.core.gait_reader import GaitReader
-from dmp_cpg_ros.core.gait_transition import BlendedGait, GaitChangeParameters, GaitTransition
-from dmp_cpg_ros.core.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.inhibition import Inhibition
-from dmp_cpg_ros.core.leg_primitive import body_scale
-from dmp_cpg_ros.core.phase import phase, phase_rate, turned, wrapped
+from dmp_cpg_ros.core.gait.arcs import arcs_between, crowding
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitTransition
+from dmp_cpg_ros.core.transformation.leg import body_scale
 
 ODD = Gait('odd', np.array([0.1, 0.33, 0.9, 0.61]), np.array([0.0, 0.5]), np.array([0.3, 0.5]),
            np.array([0.7, 0.6]))

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from core_examples import GAITS, GRAVITY, TICK, suite_parameters
 
-from dmp_cpg_ros.core.body_mode import ModeParameters
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.posture_movements import Movements
-from dmp_cpg_ros.core.robot_state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.modes.body_mode import ModeParameters
+from dmp_cpg_ros.core.modes.movements import Movements
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 
 pytest.importorskip('mujoco')

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from core_examples import quadruped, standing_state
 
-from dmp_cpg_ros.core.ground_frame import SLIGHT, ground_from_base, lean
-from dmp_cpg_ros.core.robot_state import RobotState
-from dmp_cpg_ros.core.rotations import rotation_matrix, turned
-from dmp_cpg_ros.core.terrain_plane import normal_in_world
+from dmp_cpg_ros.core.balance.ground_frame import SLIGHT, ground_from_base, lean
+from dmp_cpg_ros.core.estimation.terrain_plane import normal_in_world
+from dmp_cpg_ros.core.maths.rotations import rotation_matrix, turned
+from dmp_cpg_ros.core.robot_model.state import RobotState
 
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.robot_state import LEGS, JointTargets
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot

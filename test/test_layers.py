@@ -37,7 +37,7 @@ LAYERS = {
 
 
 def layer_of(module: str) -> str:
-    """Second word of a module's name: dmp_cpg_ros.core.phase is of core."""
+    """Second word of a module's name: dmp_cpg_ros.core.canonical.phase is of core."""
     return module.split('.')[1] if '.' in module else ''
 
 

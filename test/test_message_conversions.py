@@ -19,9 +19,9 @@ from hypothesis.extra.numpy import arrays
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
+from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.posture import PostureFeedback
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets, RobotState
 from dmp_cpg_ros.nodes.conversions import (
     CanonicalStateReader,
     CanonicalStateWriter,

@@ -34,8 +34,8 @@ from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.core.reference import ReferenceParameters
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.nodes import middleware
 from dmp_cpg_ros.nodes.conversions import ReferenceWriter, read_twist
 from dmp_cpg_ros.nodes.diagnostics import LOG_EVERY, NodeHealth

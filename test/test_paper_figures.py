@@ -14,7 +14,7 @@ from PIL import Image
 
 from dmp_cpg_ros.analysis import paper_data, paper_figures
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 FREE = paper_data.local_dynamics(False)
 HELD = paper_data.local_dynamics(True)

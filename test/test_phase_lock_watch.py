@@ -8,15 +8,21 @@ import numpy as np
 import pytest
 from core_examples import GAITS, TICK, network
 
-from dmp_cpg_ros.core.certificate_network import EXPECTED_MISMATCH
-from dmp_cpg_ros.core.gait_network import GaitNetwork
-from dmp_cpg_ros.core.gait_networks import GaitNetworks
-from dmp_cpg_ros.core.gait_reader import GaitReader
-from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
-from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
-from dmp_cpg_ros.core.phase import state_at
-from dmp_cpg_ros.core.phase_lock_watch import DISTURBED, LOCKED, LOST, PhaseLock, PhaseLockWatch
-from dmp_cpg_ros.core.running_network import RunningNetwork
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.certificates.lock_watch import (
+    DISTURBED,
+    LOCKED,
+    LOST,
+    PhaseLock,
+    PhaseLockWatch,
+)
+from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH
+from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.running_network import RunningNetwork
+from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 
 R = np.array([0.3, 0.0, 0.0])
 FREE = Inhibition(False, np.zeros(4), 0.3)

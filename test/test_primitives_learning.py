@@ -12,21 +12,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.primitives import learning_discrete, learning_rhythmic
+from dmp_cpg_ros.core.learning import discrete as learning_discrete
+from dmp_cpg_ros.core.learning import rhythmic as learning_rhythmic
+from dmp_cpg_ros.core.learning.discrete import learn_discrete
+from dmp_cpg_ros.core.learning.learning import FitOptions, ridge_regression, smallest_good
+from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, derivatives
-from dmp_cpg_ros.core.primitives.demonstrations import (
+from dmp_cpg_ros.core.primitives.states import DiscreteInput, RhythmicInput
+from dmp_cpg_ros.paper.algebra import transformed
+from dmp_cpg_ros.paper.demonstrations import (
     LETTERS,
     handwriting,
     joint_angles,
     minimum_jerk,
     walking_joints,
 )
-from dmp_cpg_ros.core.primitives.homogeneous import Homogeneous
-from dmp_cpg_ros.core.primitives.learning import FitOptions, ridge_regression, smallest_good
-from dmp_cpg_ros.core.primitives.learning_discrete import learn_discrete
-from dmp_cpg_ros.core.primitives.learning_rhythmic import learn_rhythmic
-from dmp_cpg_ros.core.primitives.primitive_algebra import transformed
-from dmp_cpg_ros.core.primitives.states import DiscreteInput, RhythmicInput
+from dmp_cpg_ros.paper.homogeneous import Homogeneous
 
 DISCRETE = {
     **{f'letter {letter}': handwriting(letter) for letter in LETTERS},

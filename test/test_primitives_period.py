@@ -10,15 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.core.primitives.demonstrations import minimum_jerk, walking_joints
-from dmp_cpg_ros.core.primitives.period import (
+from dmp_cpg_ros.core.learning.period import (
     find_period,
     fourier_series,
     mean_cycle,
     phase_lead,
     spread_between_cycles,
 )
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.paper.demonstrations import minimum_jerk, walking_joints
 
 SHAPES = {
     'sine': lambda u: np.sin(u),

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.primitives.basis import VonMisesBases
 from dmp_cpg_ros.core.primitives.hopf_flow import hopf_flow
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.primitives.states import RhythmicInput
-from dmp_cpg_ros.core.primitives.transformation import SpringDamper
 
 OMEGA = 2.0 * np.pi
 

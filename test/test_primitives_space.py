@@ -9,23 +9,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.phase import phase, state_at
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.phase import phase, state_at
-from dmp_cpg_ros.core.primitives.daughters import Daughter, DaughterSum, transported_metric
+from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.core.primitives.demonstrations import walking_joints
-from dmp_cpg_ros.core.primitives.diffeomorphism import (
+from dmp_cpg_ros.core.primitives.states import DiscreteInput
+from dmp_cpg_ros.paper.algebra import slowed, summed, transformed
+from dmp_cpg_ros.paper.daughters import Daughter, DaughterSum, transported_metric
+from dmp_cpg_ros.paper.demonstrations import walking_joints
+from dmp_cpg_ros.paper.diffeomorphism import (
     Composition,
     FunctionDiffeomorphism,
     TangentLift,
 )
-from dmp_cpg_ros.core.primitives.homogeneous import Homogeneous
-from dmp_cpg_ros.core.primitives.learning_discrete import learn_discrete
-from dmp_cpg_ros.core.primitives.limit_cycle import ClosedCurveDiffeomorphism, canonical_field
-from dmp_cpg_ros.core.primitives.numerical_inverse import difference_jacobian, newton_inverse
-from dmp_cpg_ros.core.primitives.primitive_algebra import slowed, summed, transformed
-from dmp_cpg_ros.core.primitives.states import DiscreteInput
+from dmp_cpg_ros.paper.homogeneous import Homogeneous
+from dmp_cpg_ros.paper.limit_cycle import ClosedCurveDiffeomorphism, canonical_field
+from dmp_cpg_ros.paper.numerical_inverse import difference_jacobian, newton_inverse
 
 SEEDS = st.integers(0, 10_000)
 

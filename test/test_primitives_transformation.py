@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, default_gains
 from dmp_cpg_ros.core.primitives.spring_solution import spring_exponential
 from dmp_cpg_ros.core.primitives.time_scaling import TimeScaling
-from dmp_cpg_ros.core.primitives.transformation import SpringDamper, default_gains
 
 STIFFNESS = st.floats(0.01, 1e4)
 RATIOS = st.one_of(st.just(1.0), st.floats(0.01, 20.0))

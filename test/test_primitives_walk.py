@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from core_examples import GAITS, TICK, suite_parameters
 
+from dmp_cpg_ros.core.learning.period import find_period, spread_between_cycles
+from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic, reproduction_errors
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.core.primitives.learning_rhythmic import learn_rhythmic, reproduction_errors
-from dmp_cpg_ros.core.primitives.period import find_period, spread_between_cycles
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 
 pytest.importorskip('mujoco')

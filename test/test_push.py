@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.push import HOLD_NS, Push, PushForce, PushQueue, read_push
-from dmp_cpg_ros.core.robot_state import JointTargets
-from dmp_cpg_ros.core.scenario import Scenario, play
+from dmp_cpg_ros.core.robot_model.state import JointTargets
+from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue, read_push
+from dmp_cpg_ros.core.scenario.scenario import Scenario, play
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 

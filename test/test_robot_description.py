@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.leg_reader import foot_position
 from dmp_cpg_ros.robot.model_loader import load_model

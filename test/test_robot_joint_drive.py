@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.robot_state import JointTargets
+from dmp_cpg_ros.core.robot_model.state import JointTargets
 from dmp_cpg_ros.robot.joint_drive import JointDrive
 from dmp_cpg_ros.robot.model_reader import load_description
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 from core_examples import quadruped
 
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.legs import RobotLegs
 
 ROBOT = quadruped()
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import find_ids, load_description, pose
 from dmp_cpg_ros.robot.mujoco_import import mujoco

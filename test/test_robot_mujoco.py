@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.robot_state import JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.port import RobotError

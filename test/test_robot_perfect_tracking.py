@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_state import JointTargets
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.state import JointTargets
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.robot_state import JointTargets
+from dmp_cpg_ros.core.robot_model.state import JointTargets
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.leg_reader import foot_position
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot

@@ -15,16 +15,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.commands.walking_trials import Walk
+from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
+from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait import GRAVITY, BodyScale, Gait, limited
-from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters, highest_speed
-from dmp_cpg_ros.core.gait_networks import HASTE
-from dmp_cpg_ros.core.gait_transition import GaitTransition
-from dmp_cpg_ros.core.leg_primitive import LegFeedback, LegParameters, LegPrimitive, body_scale
-from dmp_cpg_ros.core.phase import state_at
-from dmp_cpg_ros.core.posture import PostureController, PostureParameters
-from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters
-from dmp_cpg_ros.core.speed_limit import blended_limit
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
+from dmp_cpg_ros.core.gait.gait import GRAVITY, BodyScale, Gait, limited
+from dmp_cpg_ros.core.gait.gait_networks import HASTE
+from dmp_cpg_ros.core.gait.speed_limit import blended_limit
+from dmp_cpg_ros.core.gait.transition import GaitTransition
+from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
+from dmp_cpg_ros.core.transformation.leg import (
+    LegFeedback,
+    LegParameters,
+    LegPrimitive,
+    body_scale,
+)
 
 ROBOT = quadruped()
 SCALE = body_scale(ROBOT)

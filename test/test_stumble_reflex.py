@@ -9,11 +9,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.foot_path import FootPath
-from dmp_cpg_ros.core.foot_way import way_of
-from dmp_cpg_ros.core.leg_primitive import LegFeedback, LegParameters, LegPrimitive, LegState
-from dmp_cpg_ros.core.phase import state_at
-from dmp_cpg_ros.core.stumble_reflex import (
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.transformation.foot_path import FootPath
+from dmp_cpg_ros.core.transformation.foot_way import way_of
+from dmp_cpg_ros.core.transformation.leg import LegFeedback, LegParameters, LegPrimitive, LegState
+from dmp_cpg_ros.core.transformation.stumble import (
     GENTLENESS,
     LATENCY,
     WARY,

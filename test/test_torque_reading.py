@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip('mujoco')
 
 from dmp_cpg_ros.commands.walk import load_scenario
-from dmp_cpg_ros.core.scenario import play
+from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.robot_file import load_robot_file

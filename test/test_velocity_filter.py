@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from core_examples import GRAVITY, differences, quadruped
 
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.leg_odometry import LegOdometry, force_from_torque, turn_rate_of_feet
-from dmp_cpg_ros.core.rotations import levelled, roll_pitch_yaw, rotation_matrix, skew, turned
-from dmp_cpg_ros.core.terrain_plane import STEEPEST, fitted_slope, normal_in_world
-from dmp_cpg_ros.core.triples import triple
-from dmp_cpg_ros.core.velocity_filter import (
+from dmp_cpg_ros.core.estimation.leg_odometry import (
+    LegOdometry,
+    force_from_torque,
+    turn_rate_of_feet,
+)
+from dmp_cpg_ros.core.estimation.terrain_plane import STEEPEST, fitted_slope, normal_in_world
+from dmp_cpg_ros.core.estimation.velocity_filter import (
     FilterNoise,
     FilterState,
     predict,
@@ -23,6 +24,15 @@ from dmp_cpg_ros.core.velocity_filter import (
     transition,
     update,
 )
+from dmp_cpg_ros.core.maths.rotations import (
+    levelled,
+    roll_pitch_yaw,
+    rotation_matrix,
+    skew,
+    turned,
+)
+from dmp_cpg_ros.core.maths.vec3 import triple
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 NOISE = FilterNoise(2e-3, 0.05, 1e-5, 1e-4, 0.1, 4.0)
 RANDOM = np.random.default_rng(7)

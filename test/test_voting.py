@@ -13,20 +13,20 @@ from core_examples import GRAVITY, TICK_NS, network, quadruped, standing_state
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.ballot import NO_VOTES, acting_gains
-from dmp_cpg_ros.core.certificate_range import operating_range
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.up_direction import UpDirection
-from dmp_cpg_ros.core.vote_box import MOST_VOTERS, VoteBox
-from dmp_cpg_ros.core.vote_memory import FADE_STEPS, VoteMemory
-from dmp_cpg_ros.core.vote_threshold import holds_at_rest, vote_clamp
-from dmp_cpg_ros.core.voting import Voting
-from dmp_cpg_ros.core.voting_contact import ContactState, judge_contact
-from dmp_cpg_ros.core.voting_parameters import VoteSourceParameters
-from dmp_cpg_ros.core.voting_sensors import LastGood, vote_sensors
+from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, acting_gains
+from dmp_cpg_ros.core.inhibition.threshold import holds_at_rest, vote_clamp
+from dmp_cpg_ros.core.inhibition.up_direction import UpDirection
+from dmp_cpg_ros.core.inhibition.vote_box import MOST_VOTERS, VoteBox
+from dmp_cpg_ros.core.inhibition.vote_memory import FADE_STEPS, VoteMemory
+from dmp_cpg_ros.core.inhibition.voting import Voting
+from dmp_cpg_ros.core.inhibition.voting_contact import ContactState, judge_contact
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
+from dmp_cpg_ros.core.inhibition.voting_sensors import LastGood, vote_sensors
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import operating_range
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 NAN = float('nan')
 ROBOT = quadruped()

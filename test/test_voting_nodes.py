@@ -21,10 +21,10 @@ from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario, main
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.inhibition import Inhibition
-from dmp_cpg_ros.core.scenario import play
-from dmp_cpg_ros.core.vote_box import VoteBox
+from dmp_cpg_ros.core.inhibition.vote_box import VoteBox
+from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, ReferenceWriter
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state

@@ -11,15 +11,15 @@ import pytest
 from core_examples import GAITS, TICK, TICK_NS, network
 from test_core_supervisor import Run, walking
 
-from dmp_cpg_ros.core.certificate import Certificate, certify
-from dmp_cpg_ros.core.certificate_change import certify_changes
-from dmp_cpg_ros.core.certificate_range import operating_range
-from dmp_cpg_ros.core.certificate_suggest import suggest_gains
-from dmp_cpg_ros.core.certificate_votes import vote_bound, votes_needed
-from dmp_cpg_ros.core.gait_network import CanonicalParameters
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.changes import certify_changes
+from dmp_cpg_ros.core.certificates.suggest import suggest_gains
+from dmp_cpg_ros.core.certificates.votes import vote_bound, votes_needed
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.reference.operating_range import operating_range
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 
 WEAK = CanonicalParameters(coupling_gain=5.0)

@@ -32,7 +32,7 @@ from dmp_cpg_ros.analysis.recording import (
     StatusEvent,
     VelocitySeries,
 )
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
 Handler = Callable[[int, Any], None]
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.world import World
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.world import World
 
 CONTACT_WEIGHT_SHARE = 0.02
 """A foot is on the ground while it carries more than this share of the weight."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
-from dmp_cpg_ros.core.phase import phase
+from dmp_cpg_ros.core.canonical.phase import phase
 
 Array = NDArray[np.float64]
 

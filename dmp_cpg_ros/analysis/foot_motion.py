@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.motion import common_rows, rotations
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 Array = NDArray[np.float64]
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.motion import held
 from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.gait_reader import GaitReader
-from dmp_cpg_ros.core.gait_transition import GaitInForce
-from dmp_cpg_ros.core.leg_primitive import body_scale
-from dmp_cpg_ros.core.phase import phase
+from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.transformation.leg import body_scale
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.motion import rotations
 from dmp_cpg_ros.analysis.recording import OdometrySeries
-from dmp_cpg_ros.core import world
+from dmp_cpg_ros.core.robot_model import world
 
 Array = NDArray[np.float64]
 

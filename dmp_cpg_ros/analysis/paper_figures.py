@@ -19,8 +19,8 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import canonical_states, style, target_kinematics
 from dmp_cpg_ros.analysis.paper_data import LocalDynamics, VanDerPolData
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 COLOURS = tuple(style.LEG_COLOURS.values())
 

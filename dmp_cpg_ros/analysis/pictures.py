@@ -19,7 +19,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import MOVING, STOPPING, episodes, steady_segments
 from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
 

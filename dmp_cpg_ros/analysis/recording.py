@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
 Array = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ class CanonicalSeries:
         States and their time derivatives [1/s].
     frame : tuple of str
         Gait in which the phases are to be read, one per state
-        (:mod:`~dmp_cpg_ros.core.gait_reader`); empty where it was not recorded.
+        (:mod:`~dmp_cpg_ros.core.gait.gait_reader`); empty where it was not recorded.
     """
 
     time: Array = field(default_factory=no_rows)

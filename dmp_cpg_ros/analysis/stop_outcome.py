@@ -14,7 +14,7 @@ from dmp_cpg_ros.analysis.foot_motion import foot_slip
 from dmp_cpg_ros.analysis.metrics.stops import STILL_SPEED
 from dmp_cpg_ros.analysis.motion import rotations, tilt
 from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording
-from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
 
 Array = NDArray[np.float64]
 

@@ -19,18 +19,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.strict_json import write_json
-from dmp_cpg_ros.core.body_estimation import BodyEstimator
-from dmp_cpg_ros.core.canonical import CanonicalSystem
-from dmp_cpg_ros.core.graph import CouplingGraph, Edges, graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.leg_primitive import LegFeedback
-from dmp_cpg_ros.core.networks.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
-from dmp_cpg_ros.core.networks.hopf_oscillators import HopfOscillators
-from dmp_cpg_ros.core.networks.network import OscillatorNetwork
-from dmp_cpg_ros.core.phase import state_at
-from dmp_cpg_ros.core.sensor_readings import readings_of
-from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.canonical.graph import CouplingGraph, Edges, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
+from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
+from dmp_cpg_ros.core.transformation.leg import LegFeedback
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
+from dmp_cpg_ros.paper.networks.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
+from dmp_cpg_ros.paper.networks.hopf_oscillators import HopfOscillators
+from dmp_cpg_ros.paper.networks.network import OscillatorNetwork
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.suite import load_suite
 
@@ -86,7 +86,7 @@ def steps_of_four() -> list[Row]:
     general = OscillatorNetwork(HopfOscillators(4, OMEGA), EdgeCoupling(graph), state_at(phases))
     x, free, held = state_at(phases + 0.5), np.zeros(4), np.array([400.0, 0.0, 0.0, 0.0])
     return _with_ratios([
-        ('exponential step (core/canonical.py)', lambda: of.step(x, OMEGA, free, TICK)),
+        ('exponential step (core/canonical/system.py)', lambda: of.step(x, OMEGA, free, TICK)),
         ('the same, inhibited', lambda: of.step(x, OMEGA, held, TICK)),
         ('its vector field alone', lambda: of.field(x, OMEGA, free)),
         ('classical Runge-Kutta, unstable here', lambda: _classical(of, x, held)),

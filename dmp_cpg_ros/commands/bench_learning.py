@@ -24,17 +24,18 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.primitives import learning_discrete, learning_rhythmic
+from dmp_cpg_ros.core.learning import discrete as learning_discrete
+from dmp_cpg_ros.core.learning import rhythmic as learning_rhythmic
+from dmp_cpg_ros.core.learning.learning import ranges
+from dmp_cpg_ros.core.learning.period import find_period, mean_cycle, spread_between_cycles
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.core.primitives.demonstrations import (
+from dmp_cpg_ros.paper.demonstrations import (
     LETTERS,
     handwriting,
     joint_angles,
     minimum_jerk,
     walking_joints,
 )
-from dmp_cpg_ros.core.primitives.learning import ranges
-from dmp_cpg_ros.core.primitives.period import find_period, mean_cycle, spread_between_cycles
 
 _REPEATS = 5
 

@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmp_cpg_ros.configuration import find_config
-from dmp_cpg_ros.core.certificate import Certificate, certify
-from dmp_cpg_ros.core.certificate_inequality import Inequality
-from dmp_cpg_ros.core.certificate_range import operating_range
-from dmp_cpg_ros.core.certificate_suggest import Suggestion, suggest_gains
-from dmp_cpg_ros.core.certificate_votes import VotesNeeded, votes_needed
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.certificates.suggest import Suggestion, suggest_gains
+from dmp_cpg_ros.core.certificates.votes import VotesNeeded, votes_needed
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.gait_network import GaitNetwork
-from dmp_cpg_ros.core.leg_primitive import body_scale
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.reference.operating_range import operating_range
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.suite import Suite, load_suite
 
 HOLDS, FAILS, BAD_INPUT = 0, 1, 2

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.inspector import Inspection, inspect_model
 
 BAD_INPUT = 2

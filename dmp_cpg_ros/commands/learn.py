@@ -14,13 +14,14 @@ import numpy as np
 
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.primitives import learning_discrete, learning_rhythmic
+from dmp_cpg_ros.core.learning import discrete as learning_discrete
+from dmp_cpg_ros.core.learning import rhythmic as learning_rhythmic
+from dmp_cpg_ros.core.learning.learning import METHODS, FitOptions, ranges
+from dmp_cpg_ros.core.learning.period import spread_between_cycles
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
-from dmp_cpg_ros.core.primitives.learning import METHODS, FitOptions, ranges
-from dmp_cpg_ros.core.primitives.period import spread_between_cycles
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
-from dmp_cpg_ros.core.primitives.transformation import FORMS
+from dmp_cpg_ros.core.primitives.spring_damper import FORMS
 from dmp_cpg_ros.primitive_files import save_primitive
 
 BAD_INPUT = 2

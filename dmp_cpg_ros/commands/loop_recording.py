@@ -19,7 +19,7 @@ from dmp_cpg_ros.analysis.recording import (
     StatusEvent,
     VelocitySeries,
 )
-from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.walking_loop import Tick
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Generic, TypeVar
 
-from dmp_cpg_ros.core.robot_state import RobotState
+from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 

@@ -18,7 +18,7 @@ from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.commands.loop_recording import recording_of
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.leg_primitive import body_scale
+from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.suite import Suite, load_suite

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
 from dmp_cpg_ros.suite import node_sets
 

@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.context import RunContext, find_parameter
 from dmp_cpg_ros.analysis.pictures import Draw
 from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.parameters import Parameters
-from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.world import World
-from dmp_cpg_ros.core.world_choice import WorldParameters
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.world import World
+from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
 from dmp_cpg_ros.suite import load_gait, load_gaits
 
 Array = NDArray[np.float64]

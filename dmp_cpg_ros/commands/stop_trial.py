@@ -19,7 +19,7 @@ from dmp_cpg_ros.analysis.stop_outcome import WALKING_ERROR, StopOutcome, body_a
 from dmp_cpg_ros.commands.loop_recording import recording_of
 from dmp_cpg_ros.commands.loop_run import LoopRun
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait import Gait
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.stop_baselines import FreezingLoop
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot

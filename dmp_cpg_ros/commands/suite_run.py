@@ -24,7 +24,7 @@ from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.scenario import Scenario
+from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.nodes.executors import make_executor
 from dmp_cpg_ros.nodes.lying_down import LyingDown
 from dmp_cpg_ros.nodes.middleware import prepare_middleware

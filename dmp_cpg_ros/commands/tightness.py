@@ -26,13 +26,13 @@ from dmp_cpg_ros.commands.tightness_trials import (
     synchronises,
     threshold,
 )
-from dmp_cpg_ros.core.certificate_step import longest_step
+from dmp_cpg_ros.core.certificates.step import longest_step
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_margin
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.contraction.voting import certified_threshold, rest_threshold
-from dmp_cpg_ros.core.gait_supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 
 Array = NDArray[np.float64]
 

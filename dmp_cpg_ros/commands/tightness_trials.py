@@ -11,18 +11,18 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
-from dmp_cpg_ros.core.certificate import certify
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.contraction.connectivity import synchronisation_complement
-from dmp_cpg_ros.core.gait import BodyScale
-from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor
-from dmp_cpg_ros.core.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.hopf import AndronovHopf
-from dmp_cpg_ros.core.inhibition import Inhibition
-from dmp_cpg_ros.core.phase import state_at
-from dmp_cpg_ros.core.reference import ReferenceSystem
-from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.gait.gait import BodyScale
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
+from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.suite import load_gait
 

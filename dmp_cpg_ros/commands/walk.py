@@ -17,11 +17,11 @@ from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.commands.analyze import MARKS, analyze_run
 from dmp_cpg_ros.commands.run_folder import make_run_folder, resolved_parameters, write_parameters
 from dmp_cpg_ros.configuration import find_config, load_yaml
-from dmp_cpg_ros.core.certificate import Certificate, certify
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.core.gait_network import GaitNetwork
-from dmp_cpg_ros.core.leg_primitive import body_scale
-from dmp_cpg_ros.core.scenario import Scenario
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.scenario.scenario import Scenario
+from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.suite import Suite, load_suite
 

@@ -10,22 +10,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from dmp_cpg_ros.core.body_mode import ModeParameters
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.estimation_parameters import EstimationParameters, StateSourceParameters
-from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
-from dmp_cpg_ros.core.gait_network import CanonicalParameters
-from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters
+from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingSwitch
+from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.sensor_parameters import SensorParameters
-from dmp_cpg_ros.core.voting_parameters import VoteSourceParameters, VotingSwitch
-from dmp_cpg_ros.core.world import World
-from dmp_cpg_ros.core.world_choice import WorldParameters
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.robot_model.world import World
+from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 
 @dataclass(frozen=True)

@@ -14,40 +14,44 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.body_command import BodyCommand
-from dmp_cpg_ros.core.body_control import BodyControl
-from dmp_cpg_ros.core.body_estimate import estimated_state
-from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState
-from dmp_cpg_ros.core.body_mode import ModeState
-from dmp_cpg_ros.core.body_requests import REQUESTS
-from dmp_cpg_ros.core.certificate_change import refused_change
-from dmp_cpg_ros.core.certificate_gate import CertificateGate, Running
-from dmp_cpg_ros.core.contact_phase import ContactPhase, initial_contact_state
+from dmp_cpg_ros.core.balance.controller import PostureController, PostureFeedback
+from dmp_cpg_ros.core.canonical.inhibition import (
+    Inhibition,
+    InhibitionParameters,
+    initial_inhibition,
+)
+from dmp_cpg_ros.core.certificates.changes import refused_change
+from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.estimation_parameters import ESTIMATE
-from dmp_cpg_ros.core.foot_contact import quarter_weight
-from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.gait_choice import highest_speed
-from dmp_cpg_ros.core.gait_network import GaitNetwork
-from dmp_cpg_ros.core.gait_networks import GaitNetworks
-from dmp_cpg_ros.core.gait_reader import GaitReader
-from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
-from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
-from dmp_cpg_ros.core.leg_primitive import LegPrimitive, LegState, body_scale
-from dmp_cpg_ros.core.posture import PostureController, PostureFeedback
-from dmp_cpg_ros.core.posture_motion import LegMotion, MotionState
-from dmp_cpg_ros.core.reference import CommandGate, ReferenceSystem
-from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.robot_legs import RobotLegs
-from dmp_cpg_ros.core.robot_state import LEGS, JointTargets, RobotState
-from dmp_cpg_ros.core.running_network import RunningNetwork
-from dmp_cpg_ros.core.sensor_readings import readings_of
-from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.estimation.estimate import estimated_state
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
+from dmp_cpg_ros.core.estimation.parameters import ESTIMATE
+from dmp_cpg_ros.core.gait.choice import highest_speed
+from dmp_cpg_ros.core.gait.contact_feedback import ContactPhase, initial_contact_state
+from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.running_network import RunningNetwork
+from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition.vote_counter import VoteCounter
+from dmp_cpg_ros.core.inhibition.voting_sensors import vote_sensors
+from dmp_cpg_ros.core.modes.body_command import BodyCommand
+from dmp_cpg_ros.core.modes.body_control import BodyControl
+from dmp_cpg_ros.core.modes.body_mode import ModeState
+from dmp_cpg_ros.core.modes.body_requests import REQUESTS
+from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
+from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceSystem
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
-from dmp_cpg_ros.core.transformation import TransformationState
+from dmp_cpg_ros.core.transformation.joint_system import TransformationState
+from dmp_cpg_ros.core.transformation.leg import LegPrimitive, LegState, body_scale
 from dmp_cpg_ros.core.updated import updated
-from dmp_cpg_ros.core.vote_counter import VoteCounter
-from dmp_cpg_ros.core.voting_sensors import vote_sensors
 
 Array = NDArray[np.float64]
 
@@ -269,7 +273,7 @@ class WalkingLoop:
     @property
     def takers(self) -> dict[str, Callable[[Any], Any]]:
         """What takes the events of a scenario, by kind, for
-        :func:`~dmp_cpg_ros.core.scenario.play`.
+        :func:`~dmp_cpg_ros.core.scenario.scenario.play`.
         """
         return {
             'command': lambda command: self.command(*command),

@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 from sensor_msgs.msg import Imu, JointState
 
-from dmp_cpg_ros.core.body_estimate import BodyEstimate, estimated_state
-from dmp_cpg_ros.core.body_estimation import BodyEstimator, EstimatorState
-from dmp_cpg_ros.core.estimation_parameters import (
+from dmp_cpg_ros.core.estimation.estimate import BodyEstimate, estimated_state
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
+from dmp_cpg_ros.core.estimation.parameters import (
     ESTIMATE,
     EstimationParameters,
     StateSourceParameters,
 )
-from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.robot_legs import RobotLegs
-from dmp_cpg_ros.core.robot_state import LEGS, RobotState
-from dmp_cpg_ros.core.rotations import roll_pitch_yaw
-from dmp_cpg_ros.core.sensor_readings import SensorReadings
+from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
+from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.nodes.interfaces import BODY_TOPICS
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns

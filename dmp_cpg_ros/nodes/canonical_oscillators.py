@@ -14,16 +14,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.contact_phase import ContactPhase, initial_contact_state
+from dmp_cpg_ros.core.canonical.inhibition import (
+    Inhibition,
+    InhibitionParameters,
+    initial_inhibition,
+)
+from dmp_cpg_ros.core.certificates.lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.foot_contact import quarter_weight
-from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
-from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
-from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
-from dmp_cpg_ros.core.phase_lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.running_network import RunningNetwork
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
+from dmp_cpg_ros.core.gait.contact_feedback import ContactPhase, initial_contact_state
+from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait.running_network import RunningNetwork
+from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
     CertificateParameters,

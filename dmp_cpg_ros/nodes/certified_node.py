@@ -14,8 +14,10 @@ from typing import Any, cast
 
 from rclpy.parameter import Parameter
 
-from dmp_cpg_ros.core.certificate import Certificate
-from dmp_cpg_ros.core.certificate_gate import (
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.certify import Certificate
+from dmp_cpg_ros.core.certificates.gate import (
     UNCERTIFIED,
     CertificateGate,
     Running,
@@ -23,14 +25,11 @@ from dmp_cpg_ros.core.certificate_gate import (
     shown,
 )
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
-from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters, highest_speed
-from dmp_cpg_ros.core.gait_network import CanonicalParameters
-from dmp_cpg_ros.core.gait_networks import GaitNetworks
-from dmp_cpg_ros.core.gait_transition import BlendedGait, GaitChangeParameters, GaitInForce
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters, body_scale
-from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import CommandGate, ReferenceParameters
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
+from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import (
     CHANGEABLE,
     OWNER,
@@ -40,6 +39,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     SuiteParameters,
     TickParameters,
 )
+from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale
 from dmp_cpg_ros.nodes.conversions import read_twist
 from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL

@@ -14,10 +14,10 @@ import numpy as np
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from sensor_msgs.msg import JointState
 
+from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.posture import PostureFeedback
-from dmp_cpg_ros.core.push import FRAMES, PushForce
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
+from dmp_cpg_ros.core.scenario.push import FRAMES, PushForce
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.message_values import (
     Array,

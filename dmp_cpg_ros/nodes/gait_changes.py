@@ -7,23 +7,23 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, cast
 
-from dmp_cpg_ros.core.certificate_change import refused_change
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.changes import refused_change
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
-from dmp_cpg_ros.core.gait_network import CanonicalParameters
-from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.running_network import RunningNetwork
+from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.parameters import Parameters
-from dmp_cpg_ros.core.posture import PostureParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
-from dmp_cpg_ros.core.running_network import RunningNetwork
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import (
     CertificateParameters,
     GaitParameters,
     SuiteParameters,
     TickParameters,
 )
+from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 Sets = Mapping[type[Parameters], Parameters]
 

@@ -7,10 +7,10 @@ parameters.
 from __future__ import annotations
 
 from dmp_cpg_ros.configuration import find_config
-from dmp_cpg_ros.core.certificate import Certificate
-from dmp_cpg_ros.core.gait import Gait
-from dmp_cpg_ros.core.gait_reader import GaitReader
-from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.certificates.certify import Certificate
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.suite_parameters import GaitParameters, RobotFileParameters
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.robot.model_reader import load_description

@@ -11,18 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.certificate import Certificate
-from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor
-from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters, ReferenceSystem
-from dmp_cpg_ros.core.robot_state import LEGS
-from dmp_cpg_ros.core.stop_prediction import predict
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.certificates.certify import Certificate
+from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
     VOTE_SOURCES,
     TickParameters,
 )
+from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference

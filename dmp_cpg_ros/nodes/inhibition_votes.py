@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.ballot import Ballot
-from dmp_cpg_ros.core.certificate_range import operating_range
-from dmp_cpg_ros.core.certificate_votes import vote_bound
-from dmp_cpg_ros.core.gait_network import GaitNetwork
-from dmp_cpg_ros.core.gait_supervisor import GaitSupervisor, SupervisorState
-from dmp_cpg_ros.core.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.reference import ReferenceParameters
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.votes import vote_bound
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.ballot import Ballot
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition.vote_counter import VoteCounter
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
+from dmp_cpg_ros.core.inhibition.voting_sensors import VoteSensors
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import operating_range
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import TickParameters
-from dmp_cpg_ros.core.vote_counter import VoteCounter
-from dmp_cpg_ros.core.voting_parameters import VoteSourceParameters
-from dmp_cpg_ros.core.voting_sensors import VoteSensors
 from dmp_cpg_ros.nodes.gait_setup import description_of
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns

@@ -28,7 +28,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.estimation_parameters import ESTIMATE, GROUND_TRUTH
+from dmp_cpg_ros.core.estimation.parameters import ESTIMATE, GROUND_TRUTH
 
 PUBLISHER_DEPTH = 2000
 """Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the

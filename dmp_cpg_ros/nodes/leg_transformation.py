@@ -9,13 +9,13 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dmp_cpg_ros.core.body_command import BodyCommand
-from dmp_cpg_ros.core.leg_primitive import LegParameters, LegPrimitive
-from dmp_cpg_ros.core.posture_motion import LegMotion, MotionState
-from dmp_cpg_ros.core.posture_movements import Movements
-from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.core.modes.body_command import BodyCommand
+from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
+from dmp_cpg_ros.core.modes.movements import Movements
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, LegChoice
-from dmp_cpg_ros.core.transformation import TransformationState
+from dmp_cpg_ros.core.transformation.joint_system import TransformationState
+from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive
 from dmp_cpg_ros.nodes.conversions import (
     CanonicalStateReader,
     JointTargetsWriter,

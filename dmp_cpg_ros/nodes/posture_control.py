@@ -8,14 +8,14 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from dmp_cpg_ros.core.body_control import BodyControl
-from dmp_cpg_ros.core.body_mode import ModeParameters
-from dmp_cpg_ros.core.body_requests import REQUESTS
-from dmp_cpg_ros.core.estimation_parameters import EstimationParameters
-from dmp_cpg_ros.core.leg_primitive import LegParameters
-from dmp_cpg_ros.core.posture import PostureController, PostureParameters
-from dmp_cpg_ros.core.robot_legs import RobotLegs
+from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
+from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
+from dmp_cpg_ros.core.modes.body_control import BodyControl
+from dmp_cpg_ros.core.modes.body_mode import ModeParameters
+from dmp_cpg_ros.core.modes.body_requests import REQUESTS
+from dmp_cpg_ros.core.robot_model.legs import RobotLegs
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
+from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.body_mode_messages import BodyModeWriter
 from dmp_cpg_ros.nodes.body_state import BodyState
 from dmp_cpg_ros.nodes.conversions import (

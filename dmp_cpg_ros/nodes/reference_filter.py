@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.reference import ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import ReferenceWriter

@@ -12,9 +12,9 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 
-from dmp_cpg_ros.core.body_estimate import BodyEstimate
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, LEGS, RobotState
+from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.message_values import Array, checked, set_stamp
 from dmp_cpg_ros.nodes.serialized_messages import (

@@ -11,7 +11,7 @@ from array import array
 
 import numpy as np
 
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 
 class RobotTiming:

@@ -15,11 +15,11 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.core.body_requests import REQUESTS
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.push import Push
-from dmp_cpg_ros.core.scenario import Scenario
-from dmp_cpg_ros.core.scenario_events import Command
+from dmp_cpg_ros.core.modes.body_requests import REQUESTS
+from dmp_cpg_ros.core.scenario.events import Command
+from dmp_cpg_ros.core.scenario.push import Push
+from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.nodes.acknowledged_topic import AcknowledgedTopic
 from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state

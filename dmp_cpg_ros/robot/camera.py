@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dmp_cpg_ros.core.world import World
+from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import find_ids, read_description
 from dmp_cpg_ros.robot.mujoco_import import has_screen, mujoco

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.leg_kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_description import LegGeometry, RobotDescription
-from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG
+from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG
 
 TOLERANCE = 1e-6  # [m] of the foot's place
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.robot_state import JOINT_NAMES, JointTargets
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JointTargets
 
 Vector = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.camera import Camera, Picture
 from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.leg_reader import foot_position

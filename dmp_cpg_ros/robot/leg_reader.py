@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 Vector = NDArray[np.float64]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
-from dmp_cpg_ros.core.world import World
+from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.worlds import add_world, set_friction
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.robot_description import LegGeometry, RobotDescription
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.foot_load import rolling_radius
 from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.leg_reader import (

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.push import HOLD_NS, Push, PushForce, PushQueue
-from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.robot_state import JointTargets, RobotState
-from dmp_cpg_ros.core.sensor_parameters import SensorParameters
-from dmp_cpg_ros.core.world import World, height_over_ground
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
+from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.world import World, height_over_ground
+from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue
 from dmp_cpg_ros.robot.contact_reader import ContactReader
 from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.joint_actuators import JointActuators, as_slice
@@ -220,7 +220,7 @@ class MujocoRobot:
     @property
     def takers(self) -> dict[str, Callable[[Push], None]]:
         """What takes the events of a scenario that are for the robot, by kind, for
-        :func:`~dmp_cpg_ros.core.scenario.play`.
+        :func:`~dmp_cpg_ros.core.scenario.scenario.play`.
         """
         def push(value: Push) -> None:
             for force in value.forces(self._tick * self.tick_ns, self.tick_ns):

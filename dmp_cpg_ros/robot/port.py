@@ -7,8 +7,8 @@ from __future__ import annotations
 from typing import Protocol
 
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.core.robot_description import RobotDescription
-from dmp_cpg_ros.core.robot_state import JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 
 
 class RobotError(DmpCpgError):

@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
-from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 
 Triple = tuple[float, float, float]
 

@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dmp_cpg_ros.core.robot_state import RobotState
-from dmp_cpg_ros.core.sensor_parameters import SensorParameters
+from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
+from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.updated import updated
 
 STREAM = 1

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.postures import lying_height, lying_posture
-from dmp_cpg_ros.core.robot_description import RobotDescription
+from dmp_cpg_ros.core.modes.postures import lying_height, lying_posture
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
 
 Vector = NDArray[np.float64]
 

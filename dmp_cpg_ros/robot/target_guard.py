@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
 from dmp_cpg_ros.robot.refuge import Refuge, Retreat
 
 CARRIED_NS = 24_000_000

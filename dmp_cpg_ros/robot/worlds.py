@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Puts a world of :mod:`dmp_cpg_ros.core.world` under any robot's model."""
+"""Puts a world of :mod:`dmp_cpg_ros.core.robot_model.world` under any robot's model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.world import Box, World
+from dmp_cpg_ros.core.robot_model.world import Box, World
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 _LOW, _HIGH = np.array((0.52, 0.56, 0.52, 1.0)), np.array((0.80, 0.76, 0.66, 1.0))

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 CAPTION = (
     'The four oscillators across the addition and the removal of sparse inhibition. Only the '

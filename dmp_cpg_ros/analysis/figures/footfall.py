@@ -16,7 +16,7 @@ from dmp_cpg_ros.analysis.episodes import RUNNING, episodes, gait_period, steady
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 CAPTION = (
     'Bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles of '

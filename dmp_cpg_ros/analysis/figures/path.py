@@ -15,7 +15,7 @@ from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.foot_motion import feet_in_base
 from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations, stretches
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 CAPTION = (
     'The base from above. Small dots are footholds, one for each stance; squares mark where the '

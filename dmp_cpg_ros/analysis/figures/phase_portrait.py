@@ -15,8 +15,8 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import STOPPING, Episode, episodes
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.phase import state_at
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 CAPTION = (
     'The first stop in the plane of the oscillators. Left: the inhibited oscillator runs on its '

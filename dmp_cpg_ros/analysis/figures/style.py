@@ -20,7 +20,7 @@ from matplotlib.patches import Patch
 
 from dmp_cpg_ros.analysis.episodes import STOPPING, episodes
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 WIDTH = 7.2
 """Width of every figure [inch], that of a page."""

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 
 CAPTION = (
     'Targets of the hips and the knees across a stop by sparse inhibition and the start after it. '

@@ -12,7 +12,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.figures.footfall import steady_window
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_state import JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 
 CAPTION = (
     'Left: three cycles of steady walking; grey lines are the limits where they are in view. '

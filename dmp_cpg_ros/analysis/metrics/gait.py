@@ -21,8 +21,8 @@ from dmp_cpg_ros.analysis.episodes import (
 from dmp_cpg_ros.analysis.gait_in_force import gaits_walked, phase_offsets, planned_stance
 from dmp_cpg_ros.analysis.motion import held, mean_between
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.phase import phase, wrapped
-from dmp_cpg_ros.core.robot_state import LEGS
+from dmp_cpg_ros.core.canonical.phase import phase, wrapped
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
 

@@ -25,11 +25,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.canonical.phase import phase_rotation
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian, slowest_rate
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.phase import phase_rotation
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian
 from dmp_cpg_ros.core.contraction.interval import Interval
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.graph import CouplingGraph
+from dmp_cpg_ros.core.canonical.graph import CouplingGraph
 
 Array = NDArray[np.float64]
 

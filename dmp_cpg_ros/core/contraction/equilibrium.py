@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
-from dmp_cpg_ros.core.phase import phase, wrapped
+from dmp_cpg_ros.core.canonical.phase import phase, wrapped
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 
 Array = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.contraction.finding import PROVED, Finding
 from dmp_cpg_ros.core.contraction.interval import Interval, stack
 from dmp_cpg_ros.core.contraction.region import Annulus
-from dmp_cpg_ros.core.hopf import AndronovHopf
 
 Array = NDArray[np.float64]
 

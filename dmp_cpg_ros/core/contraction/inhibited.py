@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical import CanonicalSystem
+from dmp_cpg_ros.core.canonical.graph import CouplingGraph
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
 from dmp_cpg_ros.core.contraction.connectivity import (
     comparison_laplacian,
@@ -26,7 +27,6 @@ from dmp_cpg_ros.core.contraction.connectivity import (
 )
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.graph import CouplingGraph
 
 Array = NDArray[np.float64]
 

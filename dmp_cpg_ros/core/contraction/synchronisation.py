@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.canonical.graph import CouplingGraph
 from dmp_cpg_ros.core.contraction.connectivity import (
     comparison_laplacian,
     components,
@@ -23,7 +24,6 @@ from dmp_cpg_ros.core.contraction.connectivity import (
     left_null_weights,
     slowest_rate,
 )
-from dmp_cpg_ros.core.graph import CouplingGraph
 
 Array = NDArray[np.float64]
 

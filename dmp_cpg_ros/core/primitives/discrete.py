@@ -14,9 +14,9 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.primitives.basis import GaussianBases
 from dmp_cpg_ros.core.primitives.demonstration import Trajectory, columns, vector
 from dmp_cpg_ros.core.primitives.goal_filter import FirstOrderFilter
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.primitives.states import DiscreteInput, DiscreteState
 from dmp_cpg_ros.core.primitives.time_scaling import Form, TimeScaling
-from dmp_cpg_ros.core.primitives.transformation import SpringDamper
 
 Array = NDArray[np.float64]
 

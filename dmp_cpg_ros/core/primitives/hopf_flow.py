@@ -3,7 +3,8 @@
 """Solution of one Andronov-Hopf oscillator whose radius follows a reference.
 
 In polar coordinates the angle turns at ω and the squared radius obeys a logistic equation
-(Bernoulli), which is linear in 1/R². So the flow of :class:`~dmp_cpg_ros.core.hopf.AndronovHopf`
+(Bernoulli), which is linear in 1/R². So the flow of
+:class:`~dmp_cpg_ros.core.canonical.hopf.AndronovHopf`
 is exact for a constant radius and has no stability limit, however large ρr² is.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.phase import phase_generator
+from dmp_cpg_ros.core.canonical.phase import phase_generator
 
 Array = NDArray[np.float64]
 

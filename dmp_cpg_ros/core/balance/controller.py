@@ -1,0 +1,264 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Feedback from the body's state to the legs: torques, foot placement, stance velocity.
+
+The virtual model (:mod:`~dmp_cpg_ros.core.balance.virtual_model`) says which wrench the body
+needs, the
+stance feet share it (:mod:`~dmp_cpg_ros.core.balance.force_distribution`), and the forces become
+joint
+torques τ_fb = −Jᵀ f. Swinging feet are placed so as to catch the body
+(:mod:`~dmp_cpg_ros.core.balance.foot_placement`), and a slow loop keeps speed and heading
+(:mod:`~dmp_cpg_ros.core.balance.speed_keeping`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.balance.foot_placement import FootPlacement
+from dmp_cpg_ros.core.balance.force_distribution import distribute
+from dmp_cpg_ros.core.balance.ground_frame import ground_from_base, lean
+from dmp_cpg_ros.core.balance.parameters import PostureParameters
+from dmp_cpg_ros.core.balance.speed_keeping import SpeedKeeping
+from dmp_cpg_ros.core.balance.stance_load import planned_load
+from dmp_cpg_ros.core.balance.sway import SIDEWAYS, STRAIGHT, Sway, planned_sway
+from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel
+from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
+from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
+from dmp_cpg_ros.core.gait.foot_contact import believed
+from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.maths.vec3 import (
+    Matrix,
+    Triple,
+    minus,
+    plus,
+    times,
+    transposed_times,
+    triple,
+)
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
+from dmp_cpg_ros.core.transformation.swing_activity import activities_step
+
+__all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
+
+Array = NDArray[np.float64]
+
+LARGEST_LOAD = 2.0
+"""Largest normal force of a fully loaded foot, in weights of the robot."""
+
+
+@dataclass(frozen=True)
+class PostureFeedback:
+    """What the posture controller sends to the legs.
+
+    Attributes
+    ----------
+    torque : ndarray (12,)
+        τ_fb in the order of the joint names [N m].
+    shift_in_base : ndarray (4, 3)
+        Foot placement shifts for swinging feet [m].
+    drift_in_base : ndarray (4, 2)
+        What standing feet add to the velocity of their paths [m/s].
+    correction : ndarray (3,)
+        What the legs add to the reference velocity of the stance feet: v_x, v_y [m/s], γ [rad/s].
+    mode : str
+        What the body does, see :mod:`~dmp_cpg_ros.core.modes.body_command`.
+    measured : ndarray (12,)
+        Measured joint angles that the feedback was made of [rad].
+    foot_force : ndarray (4,)
+        Measured normal forces of the feet [N]; 0 where there is none to be believed.
+    """
+
+    torque: Array
+    shift_in_base: Array
+    drift_in_base: Array
+    correction: Array
+    mode: str = 'standing'
+    measured: Array = field(default_factory=lambda: np.zeros(12))
+    foot_force: Array = field(default_factory=lambda: np.zeros(4))
+
+    def of_leg(self, i: int) -> LegFeedback:
+        """What the path of leg ``i`` takes of it."""
+        return LegFeedback(
+            self.measured[3 * i : 3 * i + 3], self.shift_in_base[i], self.drift_in_base[i],
+            self.correction, float(self.foot_force[i]))
+
+
+@dataclass(frozen=True)
+class PostureState:
+    """The controller's own state.
+
+    Attributes
+    ----------
+    activity : ndarray (4,)
+        Swing activity of the legs.
+    keeping : SpeedKeeping
+        State of the slow loop.
+    """
+
+    activity: Array
+    keeping: SpeedKeeping
+
+
+class PostureController:
+    """Feedback for one robot; state in, state out.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        The robot.
+    gait : Gait
+        The gait in force; the attribute is set when it changes.
+    parameters : PostureParameters
+        Gains; the attribute is set when they change.
+    legs : RobotLegs, optional
+        The robot's legs, where others ask them too.
+    """
+
+    def __init__(
+        self, description: RobotDescription, gait: GaitInForce, parameters: PostureParameters,
+        legs: RobotLegs | None = None,
+    ) -> None:
+        """Scale all parts by the robot's lengths, mass and inertia."""
+        self.description, self.gait, self.parameters = description, gait, parameters
+        self.legs = legs or RobotLegs(description)
+        self.kinematics = self.legs.kinematics
+        self.scale = body_scale(description)
+        footholds = np.array([nominal_foothold(description, leg.name) for leg in description.legs])
+        self.model = VirtualModel(description, self.scale.leg_length)
+        self.placement = FootPlacement(self.kinematics, footholds, self.scale.leg_length)
+        self._across: list[float] = footholds[:, 1].tolist()
+        self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
+        self._com_in_base = triple(description.com_in_base.tolist())
+        self._torque_limit = [triple(leg.torque_limit.tolist()) for leg in description.legs]
+        inertia = description.base_inertia.diagonal()
+        # moments count as the accelerations that they cause at the length of a leg
+        self._importance = triple(
+            (description.mass * self.scale.leg_length / inertia).tolist())
+
+    def initial_state(self) -> PostureState:
+        """State of a robot that stands."""
+        return PostureState(
+            np.zeros(len(self.kinematics)), SpeedKeeping((0.0, 0.0), 0.0, float('nan')))
+
+    def step(
+        self, memory: PostureState, state: RobotState, x: Array, x_dot: Array, r: Array, dt: float
+    ) -> tuple[PostureState, PostureFeedback]:
+        """Compute the feedback of one tick.
+
+        Parameters
+        ----------
+        memory : PostureState
+            The controller's state one tick before.
+        state : RobotState
+            Measured state.
+        x, x_dot : ndarray (4, 2)
+            Canonical states and rates.
+        r : ndarray (3,)
+            Reference v_x, v_y [m/s], γ [rad/s].
+        dt : float
+            Time since the last tick [s].
+
+        Returns
+        -------
+        memory : PostureState
+        feedback : PostureFeedback
+        """
+        p, leg_length, gait = self.parameters, self.scale.leg_length, self.gait
+        reference = gait.limited(triple(r.tolist()), self.scale)
+        speed = self.scale.foot_speed(*reference)
+        omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
+        rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
+        activity = activities_step(
+            memory.activity, rates, gait.own_omegas(omega), p.activity_rate, dt)
+        swings = activity.tolist()
+        positions = [
+            gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
+        load = planned_load(positions, duty, swings, p.load_transfer)
+        R_ground_base, upward = ground_from_base(state, p.slope_following)
+        velocity = times(R_ground_base, triple(state.base_velocity_in_base.tolist()))
+        rate = times(R_ground_base, triple(state.base_rate_in_base.tolist()))
+        moving = sum(swings) / len(swings)
+        keeping = memory.keeping.following(
+            p, leg_length, moving, state.base_quaternion.tolist(), velocity, reference, dt)
+        correction = keeping.acting(p, leg_length, moving)
+        sway = self._sway(positions, duty, omega, reference, moving)
+        measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
+        planned = plus(reference, correction)
+        lean_x, lean_y = lean(upward, self.model.height)
+        shift = [
+            (along + p.slope_lean * lean_x, across + p.slope_lean * lean_y)
+            for along, across in self.placement.shift(p, measured, planned, pi * duty / omega)
+        ]
+        raised = self.placement.raised(p, shift, R_ground_base)
+        legs = self.legs.at(state.joint_position.tolist())
+        feet = [
+            times(R_ground_base, minus(foot, self._com_in_base)) for foot, _ in legs]
+        body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
+        bounce = self._bounce(positions, duty, omega, moving)
+        return PostureState(activity, keeping), PostureFeedback(
+            self._torque(body, legs, feet, load, planned, bounce, sway.acceleration),
+            np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
+            np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
+            np.array(correction),
+            measured=state.joint_position,
+            foot_force=believed(state.foot_force),
+        )
+
+    def _height(self, feet: list[Triple], load: list[float]) -> float:
+        """Height of the centre of mass over the ground under the feet that carry [m]."""
+        total, heights = sum(load), [z for _, _, z in feet]
+        if total <= 1e-6:
+            return self.foot_radius - min(heights)
+        carried = sum(share * z for share, z in zip(load, heights, strict=True))
+        return self.foot_radius - carried / total
+
+    def _bounce(
+        self, positions: list[float], duty: float, omega: float, moving: float
+    ) -> Bounce:
+        """Planned bounce of the body: what the legs give way to, in the mean."""
+        each = [self.gait.bounce(position, duty, omega) for position in positions]
+        if all(one is LEVEL for one in each):
+            return LEVEL
+        share = moving / len(each)
+        return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
+
+    def _sway(
+        self, positions: list[float], duty: float, omega: float, reference: Triple, moving: float
+    ) -> Sway:
+        """Planned sway of the body; it fades with the legs' activity and with speed sideways."""
+        sway = planned_sway(positions, duty, omega, self._across, self.model.height)
+        if sway is STRAIGHT:
+            return STRAIGHT
+        share = moving * max(0.0, 1.0 - abs(reference[1]) / self.scale.speed(SIDEWAYS))
+        return Sway(*(share * value for value in sway))
+
+    def _torque(
+        self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
+        load: list[float], r: Triple, bounce: Bounce, sway_acceleration: float,
+    ) -> Array:
+        """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
+        force, moment = self.model.wrench(
+            self.parameters, body, r, bounce, sway_acceleration)
+        forces = distribute(
+            force, moment, feet, load, self.parameters.friction,
+            LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
+        torques: list[float] = []
+        for on_foot, (_, J), limits in zip(forces, legs, self._torque_limit, strict=True):
+            a, b, c = transposed_times(J, transposed_times(body.R_ground_base, on_foot))
+            most_a, most_b, most_c = limits
+            torques += (
+                min(max(-a, -most_a), most_a),
+                min(max(-b, -most_b), most_b),
+                min(max(-c, -most_c), most_c),
+            )
+        return np.array(torques)

@@ -1,0 +1,199 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where swinging feet come down, and how standing feet go along with a push.
+
+A foot comes down at
+
+    d = v T_s / 2 + k sqrt(l / g) (v − v_plan)
+
+from its neutral place, with v the velocity of the body over that foot and T_s the duration of
+stance: the neutral point of Raibert (1986), in the middle of the way that the body makes while
+the foot stands, and beyond it the capture point of the linear inverted pendulum (Pratt et al.
+2006; there k = 1 brings the body to rest over the foot). d ends at the leg's reach, and on the
+foot's own side of the body. The foot path brings the foot to v_plan T_s / 2, with v_plan the
+velocity of its stance; the rest is the shift.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.balance.parameters import PostureParameters
+from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, dot, triple
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+
+Array = NDArray[np.float64]
+Pair = tuple[float, float]
+
+LARGEST_RAISE = 0.35
+"""Largest correction of a swinging foot's height by levelling, in leg lengths."""
+
+
+class FootPlacement:
+    """Placement for one robot's feet.
+
+    Parameters
+    ----------
+    kinematics : sequence of LegKinematics
+        Legs.
+    footholds_in_base : ndarray (4, 3)
+        Neutral places of the feet [m].
+    leg_length : float
+        Standing height of the hips [m].
+    """
+
+    def __init__(
+        self, kinematics: list[LegKinematics], footholds_in_base: Array, leg_length: float
+    ) -> None:
+        """Keep places and lengths."""
+        self._footholds = [triple(foot) for foot in footholds_in_base.tolist()]
+        self._leg_length = leg_length
+        self._straight = [leg.thigh_length + leg.shank_length for leg in kinematics]
+        self._lateral = [leg.lateral_offset for leg in kinematics]
+        self._depth = [
+            float(leg.geometry.hip_in_base[2]) - height
+            for leg, (_, _, height) in zip(kinematics, self._footholds, strict=True)
+        ]
+
+    def over_feet(self, velocity: Triple) -> list[Pair]:
+        """Velocity of the body over its feet, v + γ ẑ × p.
+
+        Parameters
+        ----------
+        velocity : tuple of float
+            v_x, v_y [m/s], γ [rad/s].
+
+        Returns
+        -------
+        list of four pairs of float
+            [m/s]
+        """
+        v_x, v_y, gamma = velocity
+        return [(v_x - gamma * y, v_y + gamma * x) for x, y, _ in self._footholds]
+
+    def within_reach(self, down: Sequence[Pair], reach: float) -> list[Pair]:
+        """Shorten displacements from the neutral places to what the legs reach.
+
+        The leg's plane is beside its abduction axis by y_0, so a foot at (x, y_0 + y, z) from the
+        hip needs a leg of length sqrt(x² + y² + 2 y_0 y + z²).
+
+        Parameters
+        ----------
+        down : sequence of four pairs of float
+            Displacements [m].
+        reach : float
+            Share of the straight leg that is used.
+
+        Returns
+        -------
+        list of four pairs of float
+        """
+        reached = []
+        for (x, y), straight, depth, lateral in zip(
+            down, self._straight, self._depth, self._lateral, strict=True
+        ):
+            room = max((reach * straight) ** 2 - depth * depth, 1e-6)
+            squared, outward = max(x * x + y * y, 1e-12), lateral * y
+            share = min((sqrt(outward * outward + squared * room) - outward) / squared, 1.0)
+            reached.append((x * share, y * share))
+        return reached
+
+    def shift(
+        self, p: PostureParameters, measured: Triple, planned: Triple, half_stance: float
+    ) -> list[Pair]:
+        """Shift of the footholds.
+
+        Parameters
+        ----------
+        p : PostureParameters
+            Gains.
+        measured, planned : tuple of float
+            Velocity of the body, and v_plan: v_x, v_y [m/s], γ [rad/s].
+        half_stance : float
+            T_s / 2 [s].
+
+        Returns
+        -------
+        list of four pairs of float
+            [m]
+        """
+        capture = p.placement_gain * (self._leg_length / GRAVITY) ** 0.5
+        way = half_stance + capture
+        wanted, wished = self.over_feet(planned), []
+        for (x, y), (wanted_x, wanted_y) in zip(self.over_feet(measured), wanted, strict=True):
+            wished.append((way * x - capture * wanted_x, way * y - capture * wanted_y))
+        shift = []
+        for (x, y), (wanted_x, wanted_y), (_, place, _) in zip(
+            self.within_reach(wished, p.reach), wanted, self._footholds, strict=True
+        ):
+            y = _on_own_side(y, place)
+            shift.append((x - half_stance * wanted_x, y - half_stance * wanted_y))
+        return shift
+
+    def raised(
+        self, p: PostureParameters, shift: Sequence[Pair], R_ground_base: Matrix
+    ) -> list[float]:
+        """Change of the feet's height in the base that keeps them level over the ground.
+
+        Parameters
+        ----------
+        p : PostureParameters
+            Gains.
+        shift : sequence of four pairs of float
+            Shift of the footholds [m].
+        R_ground_base : tuple of rows
+            Attitude.
+
+        Returns
+        -------
+        list of four floats
+            [m]
+        """
+        upward, limit = R_ground_base[2], LARGEST_RAISE * self._leg_length
+        gain, raised = p.levelling / max(upward[2], 0.3), []
+        for (x, y, z), (more_x, more_y) in zip(self._footholds, shift, strict=True):
+            lost = z - dot((x + more_x, y + more_y, z), upward)
+            raised.append(min(max(gain * lost, -limit), limit))
+        return raised
+
+    def drift(
+        self, p: PostureParameters, measured: Triple, planned: Triple, activity: Sequence[float],
+        sway_velocity: float = 0.0,
+    ) -> list[Pair]:
+        """Velocity that standing feet add to their paths so as to go along with the ground.
+
+        Without it the joint drive would hold the body to its planned velocity, with a force that
+        knows nothing of balance and slips or topples it. They do not go along with a turn: what
+        holds the heading does not topple.
+
+        Parameters
+        ----------
+        p : PostureParameters
+            Gains.
+        measured, planned : tuple of float
+            As for :meth:`shift`.
+        activity : sequence of four floats
+            Swing activity; at rest the feet hold the body.
+        sway_velocity : float
+            Planned velocity across, which ``measured`` is without, and with which the feet go
+            along fully [m/s].
+
+        Returns
+        -------
+        list of four pairs of float
+            [m/s]
+        """
+        x = -p.yielding * (measured[0] - planned[0])
+        y = -p.yielding * (measured[1] - planned[1]) - sway_velocity
+        return [(swings * x, swings * y) for swings in activity]
+
+
+def _on_own_side(y: float, place: float) -> float:
+    """Displacement across the body of a foot from its place, but not beyond the middle."""
+    inside = place + y < 0.0 if place > 0.0 else place + y > 0.0
+    return -place if inside else y

@@ -1,0 +1,116 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How the body sways from side to side in a gait that at times stands on one side only.
+
+While all feet that stand are on one side, at y_s from the middle, the ground's force passes level
+through the centre of mass only if it leans inward by y_s / h: the body must swing like the linear
+inverted pendulum (Kajita, Kanehiro, Kaneko, Yokoi, Hirukawa 2001),
+
+    ÿ = (g / h) (y − p) ,
+
+with p = y_s there and 0 wherever feet on both sides can share the load. Of the periodic solution
+the fundamental is taken: with p_1 that of p, at the gait's frequency ω,
+
+    y_1 = p_1 (g / h) / (ω² + g / h) .
+
+A side stands alone while both legs of the other one swing. For swings of 1 − β and legs that are Δ
+cycles apart that is a share w = 1 − β − Δ of the cycle around the middle of the two swings, and
+w' = 1 − β − (1 − Δ) half a cycle later, where these are positive, so that with c the place of that
+middle
+
+    p_1 = (2 / π) y_s (sin π w − sin π w') cos 2π c .
+
+A trot, a walk, a bound and a pronk do not sway; an amble does a little, a pace much. A body that
+was planned not to sway would take its sway for a push: it would place its feet as if to catch it,
+and the wider they are the more force across they need, until friction does not yield that force
+any more. Placement therefore answers what differs from the plan, standing feet go along with it,
+and the forces accelerate the body as it says. They do not follow its velocity: a force that damps
+the sway as well bears stronger pushes. Nor is there a plan for a body that goes sideways, which is
+caught anyway by the feet that go ahead of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, pi, sin
+from typing import NamedTuple
+
+from dmp_cpg_ros.core.gait.com_height import GRAVITY
+from dmp_cpg_ros.core.robot_model.state import LEGS
+
+LEFT, RIGHT = (
+    tuple(LEGS.index(leg) for leg in side) for side in (('fl', 'rl'), ('fr', 'rr')))
+
+
+class Sway(NamedTuple):
+    """Planned motion of the body across its way, about the middle.
+
+    Attributes
+    ----------
+    place : float
+        y [m].
+    velocity : float
+        ẏ [m/s].
+    acceleration : float
+        ÿ [m/s^2].
+    """
+
+    place: float
+    velocity: float
+    acceleration: float
+
+
+SIDEWAYS = 0.3
+"""Speed sideways from which no sway is planned, in √(g l)."""
+
+STRAIGHT = Sway(0.0, 0.0, 0.0)
+"""Of a gait that never stands on one side only."""
+
+
+def planned_sway(
+    cycle_position: Sequence[float], duty: float, omega: float, across: Sequence[float],
+    height: float,
+) -> Sway:
+    """Sway of the body, from where its legs are in their cycles.
+
+    Parameters
+    ----------
+    cycle_position : sequence of four floats
+        0 at mid-swing, in [−1/2, 1/2].
+    duty : float
+        Duty factor β.
+    omega : float
+        Angular frequency of the gait [rad/s].
+    across : sequence of four floats
+        Footholds' places to the left of the middle [m].
+    height : float
+        Of the centre of mass [m].
+
+    Returns
+    -------
+    Sway
+    """
+    along = quadrature = 0.0
+    for swinging, standing in ((RIGHT, LEFT), (LEFT, RIGHT)):
+        front, hind = (cycle_position[leg] for leg in swinging)
+        amplitude, middle = _both_swing(front, hind, 1.0 - duty)
+        if amplitude != 0.0:
+            amplitude *= 0.5 * sum(across[leg] for leg in standing)
+            along += amplitude * cos(2.0 * pi * middle)
+            quadrature += amplitude * sin(2.0 * pi * middle)
+    if along == quadrature == 0.0:
+        return STRAIGHT
+    pendulum = GRAVITY / height
+    share = pendulum / (omega * omega + pendulum)
+    y = share * along
+    return Sway(y, -omega * share * quadrature, -omega * omega * y)
+
+
+def _both_swing(front: float, hind: float, swing: float) -> tuple[float, float]:
+    """Amplitude of the fundamental of 'both legs of a side swing', and the place in the cycle of
+    the middle of their swings.
+    """
+    apart = (front - hind + 0.5) % 1.0 - 0.5
+    together = max(0.0, swing - abs(apart))
+    opposite = max(0.0, swing - 1.0 + abs(apart))
+    return 2.0 / pi * (sin(pi * together) - sin(pi * opposite)), hind + 0.5 * apart

@@ -1,0 +1,122 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Sparse inhibition: the switched dynamic g(x_i) = α_i (x_{i,d} − x_i) and what its parameters
+are (paper, Section 5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
+from dmp_cpg_ros.core.parameters import parameter
+from dmp_cpg_ros.core.robot_model.state import LEGS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class InhibitionParameters(VotingParameters):
+    """Parameters of the inhibition, with those that say how votes are counted."""
+
+    inhibition_gain: float = parameter(
+        400.0, 'gain k_inh of the inhibition', unit='1/s', minimum=0.0, maximum=1e5
+    )
+    region_radius: float = parameter(
+        0.3,
+        'radius r0 of the region C in which inhibition is switched on',
+        minimum=1e-3,
+        maximum=2.0,
+    )
+    inhibited_legs: tuple[str, ...] = parameter(
+        ('fl',), 'legs whose oscillators are inhibited', choices=LEGS
+    )
+    capture_speed: float = parameter(
+        0.1,
+        'reference foot speed below which inhibition is armed',
+        unit='m/s',
+        minimum=0.0,
+        maximum=10.0,
+    )
+    start_inhibited: bool = parameter(
+        True, 'whether the gait starts at rest and waits to be resumed'
+    )
+    auto_inhibit: bool = parameter(
+        True, 'whether a zero command stops the gait and a new command resumes it'
+    )
+    auto_delay: float = parameter(
+        1.0,
+        'time of zero command after which auto_inhibit stops the gait',
+        unit='s',
+        minimum=0.0,
+        maximum=60.0,
+    )
+
+    def __post_init__(self) -> None:
+        """Validate; at least one leg, none twice."""
+        super().__post_init__()
+        if not self.inhibited_legs or len(set(self.inhibited_legs)) != len(self.inhibited_legs):
+            raise ParameterError(
+                f'inhibited_legs = {list(self.inhibited_legs)} must name one or more of '
+                f'{", ".join(LEGS)}, none twice'
+            )
+
+    @cached_property
+    def armed_gains(self) -> Array:
+        """Gains α_i of the four legs when inhibition is armed, ndarray (4,) [1/s]."""
+        return np.array(
+            [self.inhibition_gain if leg in self.inhibited_legs else 0.0 for leg in LEGS]
+        )
+
+
+@dataclass(frozen=True)
+class Inhibition:
+    """The inhibition that acts on the canonical system during one tick.
+
+    Attributes
+    ----------
+    requested : bool
+        Whether the gait is to stop; the reference is brought to zero.
+    gains : ndarray (N,)
+        Armed gains α_i ≥ 0, zero where not armed [1/s].
+    region_radius : float
+        r0 of the regions C_i = {|x_{i,d} − x_i| ≤ r0}.
+    at_rest : bool
+        Whether oscillators, reference and swings have come to rest.
+    """
+
+    requested: bool
+    gains: Array
+    region_radius: float
+    at_rest: bool = False
+
+    def acting_gains(self, x: Array, target: Array) -> Array:
+        """Gains that act at a state: α_i inside C_i and zero outside.
+
+        Parameters
+        ----------
+        x, target : ndarray (N, 2)
+            States x_i and x_{i,d}.
+
+        Returns
+        -------
+        ndarray (N,)
+        """
+        if not any(self.gains.tolist()):
+            return self.gains
+        error = x - target
+        inside = error[:, 0] * error[:, 0] + error[:, 1] * error[:, 1] <= self.region_radius**2
+        return np.where(inside, self.gains, 0.0)
+
+
+def initial_inhibition(parameters: InhibitionParameters) -> Inhibition:
+    """Inhibition before the first request: armed when the gait starts at rest."""
+    stopped = parameters.start_inhibited
+    return Inhibition(
+        stopped, parameters.armed_gains * float(stopped), parameters.region_radius, stopped
+    )

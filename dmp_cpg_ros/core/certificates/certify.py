@@ -1,0 +1,207 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The certificate of a running suite: what its parameters guarantee, in inequalities.
+
+Computed from the parameters that the nodes run with, for the highest cadence that the reference's
+limits allow: (a) the legs synchronise, (b) inhibition makes the network contract, (c) capture
+holds, (d) the tick is short enough, (e) reference and joints contract, (f) at rest all feet are on
+the ground, (g) unequal leg frequencies are tolerated, (h) the time to rest is bounded, (i) where
+legs can vote, a majority stops the gait and fewer do not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.contact import contact_limits, later_stop, slowest_cadence
+from dmp_cpg_ros.core.certificates.hierarchy import hierarchy_inequalities
+from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.certificates.network import analyse_network, network_inequalities
+from dmp_cpg_ros.core.certificates.rest import rest_inequalities
+from dmp_cpg_ros.core.certificates.step import step_inequalities
+from dmp_cpg_ros.core.certificates.timing import time_to_rest, time_to_walking
+from dmp_cpg_ros.core.certificates.votes import vote_inequalities
+from dmp_cpg_ros.core.contraction.finding import PROVED, weakest
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
+from dmp_cpg_ros.core.transformation.leg import LegParameters
+
+Array = NDArray[np.float64]
+
+LONGEST_STOP = 10.0
+"""Time within which a stop and a start must be bounded; predictions look as far ahead [s]."""
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Inequalities of one set of parameters.
+
+    Attributes
+    ----------
+    inequalities : tuple of Inequality
+        In the order (a) to (i).
+    contraction_grade : str
+        ``global``: the inhibited network contracts from every state; ``regional``: on the set that
+        capture leads into; ``none``.
+    omega_max : float
+        Highest cadence that was considered [rad/s].
+    time_to_rest, time_to_walking : float
+        Bounds on the time from a request to rest and from a release to walking [s]; infinite
+        without a certificate.
+    rest_phase : tuple of float
+        Phase by which each leg rests ahead of its place [rad]; empty without an equilibrium.
+    rest_radius : tuple of float
+        |x_i| of each leg at rest.
+    contact : ContactLimits or None
+        What contact feedback may do; None where it is off.
+    """
+
+    inequalities: tuple[Inequality, ...]
+    contraction_grade: str
+    omega_max: float
+    time_to_rest: float
+    time_to_walking: float
+    rest_phase: tuple[float, ...]
+    rest_radius: tuple[float, ...]
+    contact: ContactLimits | None = None
+
+    def __getitem__(self, name: str) -> Inequality:
+        """Return the inequality of a name; raises ParameterError with the names that exist."""
+        for inequality in self.inequalities:
+            if inequality.name == name:
+                return inequality
+        raise ParameterError(f"there is no inequality '{name}'; valid are "
+                             f"{', '.join(entry.name for entry in self.inequalities)}")
+
+    @property
+    def failing(self) -> tuple[Inequality, ...]:
+        """Required inequalities that do not hold."""
+        return tuple(entry for entry in self.inequalities if entry.required and not entry.holds)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every required inequality holds."""
+        return not self.failing
+
+    @property
+    def sampled(self) -> tuple[str, ...]:
+        """Names of the required inequalities that are sampled and not proved."""
+        return tuple(entry.name for entry in self.inequalities
+                     if entry.required and not entry.proved)
+
+    @property
+    def grade(self) -> str:
+        """``proved`` when every required inequality is, else ``sampled``."""
+        return weakest(tuple(entry.grade for entry in self.inequalities if entry.required))
+
+    def as_rows(self) -> list[tuple[str, ...]]:
+        """Rows of a table: name, verdict, left side, right side, unit, margin, grade, sentence."""
+        return [(entry.name, _verdict(entry), f'{entry.left_is} = {entry.left:.4g}',
+                 f'{entry.right_is} = {entry.right:.4g}', entry.unit, f'{entry.margin:.4g}',
+                 entry.grade, entry.sentence) for entry in self.inequalities]
+
+    def as_mapping(self) -> dict[str, object]:
+        """Return everything as values that strict JSON can write, for ``metrics.json``."""
+        return {
+            'holds': self.holds, 'grade': self.grade, 'contraction_grade': self.contraction_grade,
+            'omega_max': self.omega_max, 'time_to_rest_s': _finite(self.time_to_rest),
+            'time_to_walking_s': _finite(self.time_to_walking),
+            'rest_phase_rad': list(self.rest_phase), 'rest_radius': list(self.rest_radius),
+            'sampled': list(self.sampled), 'failing': [entry.name for entry in self.failing],
+            'inequalities': {entry.name: entry.as_mapping() for entry in self.inequalities}}
+
+    def explained(self) -> str:
+        """One line: that all holds, or the inequalities that fail."""
+        if self.holds:
+            return 'every required inequality holds'
+        return ' | '.join(entry.explained() for entry in self.failing)
+
+
+def certify(network: GaitNetwork, inhibition: InhibitionParameters,
+            reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
+            tick_s: float, span: OperatingRange | None = None) -> Certificate:
+    """Compute the certificate of running parameters.
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        Oscillators, couplings, gait and the robot's scale.
+    inhibition : InhibitionParameters
+        Gain, region, legs.
+    reference : ReferenceParameters
+        Rate and limits: they decide the highest cadence.
+    leg, posture : LegParameters, PostureParameters
+        Transformation systems and swing filters.
+    tick_s : float
+        Control tick [s].
+    span : OperatingRange, optional
+        Cadences to hold for, when they are not those of the gait.
+
+    Returns
+    -------
+    Certificate
+
+    Raises
+    ------
+    ParameterError
+        If the tick is not positive and finite.
+    """
+    if not (np.isfinite(tick_s) and tick_s > 0.0):
+        raise ParameterError(f'tick = {tick_s!r} s must be positive and finite')
+    span = span or operating_range(network, inhibition, reference)
+    analysis = analyse_network(network, inhibition, span)
+    p, found = network.parameters, analysis.found
+    rates = (found.rate, max(analysis.contraction.rate, analysis.capture.rate),
+             2.0 * p.rho * p.radius**2)
+    slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
+    stop = time_to_rest(network, analysis.capture, analysis.rest, span, reference.alpha_r,
+                        leg.activity_rate, inhibition.region_radius, tick_s)
+    start = time_to_walking(network, found, analysis.rest, span, leg.activity_rate, tick_s)
+    contact = None
+    if p.contact_feedback:
+        contact, contact_row = contact_limits(p, analysis, span, start)
+        stop += later_stop(span, tick_s)
+    network_rows = network_inequalities(network, inhibition, span, analysis)
+    rows = [entry for entry in network_rows if entry.name != 'frequency_mismatch']
+    rows += step_inequalities(p.rho, p.radius, span.omega[1], slowest, inhibition.region_radius,
+                              tick_s)
+    rows += hierarchy_inequalities(reference, leg, posture, found, p.rho, p.radius,
+                                   slowest_cadence(span, p))
+    rows += rest_inequalities(network, leg, analysis.rest)
+    rows += [entry for entry in network_rows if entry.name == 'frequency_mismatch']
+    rows += [contact_row] if p.contact_feedback else []
+    rows += _time_inequalities(stop, start)
+    rows += vote_inequalities(network, inhibition, span, reference.alpha_r, leg.activity_rate,
+                              tick_s)
+    rest = analysis.rest
+    return Certificate(
+        tuple(rows), analysis.contraction.reach, span.omega[1], stop, start,
+        () if rest is None else tuple(float(a) for a in rest.phase_ahead),
+        () if rest is None else tuple(float(a) for a in rest.radius), contact)
+
+
+def _time_inequalities(stop: float, start: float) -> list[Inequality]:
+    return [
+        Inequality('time_to_rest', stop, LONGEST_STOP, 's', 'bound', 'longest stop', PROVED,
+                   'from a request at any phase of the locked gait, at any speed, to rest'),
+        Inequality('time_to_walking', start, LONGEST_STOP, 's', 'bound', 'longest start', PROVED,
+                   'from release at rest to locked phases and full swings', required=False)]
+
+
+def _verdict(entry: Inequality) -> str:
+    if entry.holds:
+        return 'holds'
+    return 'FAILS' if entry.required else 'no'
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

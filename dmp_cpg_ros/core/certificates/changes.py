@@ -1,0 +1,133 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The certificate of a change of gait: of both gaits and of every blend between them.
+
+Offsets do not enter the spectrum (:mod:`~dmp_cpg_ros.core.gait.transition`), so that a blend
+differs from a gait only by its cadence. The inequalities are therefore computed for all cadences
+of both gaits, widened by what the moving offsets add to a leg's frequency, and hold for every
+blend. A stop that is requested in a transition waits until the offsets stand still.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.certificates.votes import vote_inequalities
+from dmp_cpg_ros.core.contraction.finding import PROVED
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.transition import SETTLING_RATE, STANDING, GaitTransition
+from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
+from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.core.transformation.leg import LegParameters
+
+
+def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
+                    tick_s: float) -> Certificate:
+    """Compute the certificate of some gaits and of every change between them.
+
+    Parameters
+    ----------
+    parameters : SuiteParameters
+        Parameters of all parts.
+    gaits : sequence of Gait
+        Gaits, before ``cadence_scale``.
+    scale : BodyScale
+        The robot's lengths.
+    tick_s : float
+        Control tick [s].
+
+    Returns
+    -------
+    Certificate
+        What holds in each of the gaits and on every way between two of them.
+
+    Raises
+    ------
+    ParameterError
+        If the tick is not positive and finite.
+    """
+    p, rate = parameters, parameters.gait_change.gait_change_rate
+    networks = [GaitNetwork(p.canonical, gait, scale) for gait in gaits]
+    ways = [GaitTransition(one, other) for one, other in combinations(gaits, 2)]
+    share = max((way.fastest(rate) for way in ways), default=0.0)
+    span = _widened([operating_range(one, p.inhibition, p.reference) for one in networks], share)
+    unvoted = replace(p.inhibition, voting=False)
+    whole = certify(networks[0], unvoted, p.reference, p.leg, p.posture, tick_s, span)
+    pause = math.log(span.omega[1] / (STANDING * span.omega[0])) / SETTLING_RATE + tick_s
+    bound = whole.time_to_rest + pause
+    rows = [_changed(row, bound, p.leg) for row in whole.inequalities]
+    rows += _votes(p, networks, tick_s)
+    rows.append(Inequality(
+        'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
+        'fastest offset', 'tolerated mismatch', PROVED,
+        'the legs would keep their places even if the moving offsets were not fed forward',
+        required=False))
+    return replace(whole, inequalities=tuple(rows), time_to_rest=bound)
+
+
+def refused_change(parameters: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
+                   tick_s: float) -> str:
+    """Why changes among some gaits are refused; empty when they are certified.
+
+    Parameters
+    ----------
+    parameters, scale, tick_s
+        As for :func:`certify_changes`.
+    gaits : sequence of Gait
+        Gaits; one that stands twice counts once.
+    """
+    different = list({gait.name: gait for gait in gaits}.values())
+    if len(different) < 2:
+        return ''
+    certificate = certify_changes(parameters, different, scale, tick_s)
+    if certificate.holds:
+        return ''
+    return (f'changes among {", ".join(gait.name for gait in different)} are not certified: '
+            f'{certificate.explained()}')
+
+
+def _votes(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: float
+           ) -> list[Inequality]:
+    """What votes can do in the gaits, of each inequality the worst: their clamp follows the
+    cadence, and a stop waits until a change of gait is over.
+    """
+    worst: dict[str, Inequality] = {}
+    for network in networks:
+        for row in vote_inequalities(
+                network, p.inhibition, operating_range(network, p.inhibition, p.reference),
+                p.reference.alpha_r, p.leg.activity_rate, tick_s):
+            known = worst.get(row.name)
+            if known is None or not row.margin > known.margin:
+                worst[row.name] = replace(row, sentence=f'{row.sentence}, in {network.gait.name}')
+    return list(worst.values())
+
+
+def _changed(row: Inequality, bound: float, leg: LegParameters) -> Inequality:
+    """Rows that are different in a transition: the time to rest, and the feet at rest."""
+    if row.name == 'time_to_rest':
+        return replace(row, left=bound,
+                       sentence=f'{row.sentence}, the pause of a change of gait included')
+    if row.name == 'rest_posture' and math.isfinite(row.left):
+        return replace(row, left=leg.clearance * REST_ACTIVITY, sentence=(
+            'as a fraction of the standing height, when rest is declared, wherever in its cycle '
+            'a leg rests'))
+    return row
+
+
+def _widened(spans: Sequence[OperatingRange], share: float) -> OperatingRange:
+    """Range of all blends, with frequencies that differ by a share."""
+    slower, faster = 1.0 - share, 1.0 + share
+    return OperatingRange(
+        spans[0].foot_speed, spans[0].armed_speed,
+        (slower * min(span.omega[0] for span in spans),
+         faster * max(span.omega[1] for span in spans)),
+        (slower * min(span.omega_armed[0] for span in spans),
+         faster * max(span.omega_armed[1] for span in spans)),
+        max(span.omega_at_rest for span in spans), max(span.omega_slope for span in spans))

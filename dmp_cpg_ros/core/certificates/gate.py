@@ -1,0 +1,241 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters that change while the suite runs: may they, and what is the nearest that may.
+
+A change that would lose the certificate is refused with the inequality that fails, both its sides,
+and the nearest value that works: on the straight way from the running values for numbers, the
+other choices for words.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any
+
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.changes import certify_changes
+from dmp_cpg_ros.core.certificates.suggest import nearest_value
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
+
+UNCERTIFIED = frozenset(
+    ('auto_inhibit', 'auto_delay', 'start_inhibited', 'cmd_vel_timeout', 'allow_uncertified',
+     'auto_speeds', 'auto_hysteresis', *UNCERTIFIED_VOTES, *VOTE_SOURCES))
+"""Parameters of certified nodes that no inequality depends on."""
+
+_DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Running:
+    """Everything that a certificate is computed from.
+
+    Attributes
+    ----------
+    parameters : SuiteParameters
+        Parameters of the parts.
+    gait : Gait
+        Before ``cadence_scale``.
+    scale : BodyScale
+        The robot's lengths.
+    tick_s : float
+        Control tick [s].
+    others : tuple of Gait
+        Gaits that it may change to and back, before ``cadence_scale``.
+    """
+
+    parameters: SuiteParameters
+    gait: Gait
+    scale: BodyScale
+    tick_s: float
+    others: tuple[Gait, ...] = ()
+
+    def certificate(self) -> Certificate:
+        """Compute the certificate."""
+        p = self.parameters
+        if self.others:
+            return certify_changes(p, (self.gait, *self.others), self.scale, self.tick_s)
+        network = GaitNetwork(p.canonical, self.gait, self.scale)
+        return certify(network, p.inhibition, p.reference, p.leg, p.posture, self.tick_s)
+
+    def differences(self, other: Running) -> dict[str, tuple[Any, Any]]:
+        """Names of parameters that differ, with this value and the other one."""
+        return {
+            name: (value, other.values[name])
+            for name, value in self.values.items()
+            if value != other.values[name]
+        }
+
+    @property
+    def values(self) -> dict[str, Any]:
+        """All parameters by name; a name that two parts share is one parameter."""
+        return {name: value for _, name, value in _fields(self.parameters)}
+
+    def changed(self, values: Mapping[str, Any]) -> Running:
+        """Return this with other values of some parameters.
+
+        Raises
+        ------
+        ParameterError
+            If a value is impossible.
+        """
+        parts: dict[str, dict[str, Any]] = {}
+        for part, name, _ in _fields(self.parameters):
+            if name in values:
+                parts.setdefault(part, {})[name] = values[name]
+        return replace(self, parameters=replace(self.parameters, **{
+            part: replace(getattr(self.parameters, part), **changes)
+            for part, changes in parts.items()}))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a change may be made.
+
+    Attributes
+    ----------
+    certificate : Certificate
+        With the change.
+    accepted : bool
+        Whether no inequality is lost by it.
+    reason : str
+        Why not: the inequalities with both sides, and what is nearest; empty when accepted.
+    """
+
+    certificate: Certificate
+    accepted: bool
+    reason: str = ''
+
+
+@dataclass
+class CertificateGate:
+    """Judges changes.
+
+    Attributes
+    ----------
+    pause : callable ()
+        Called between any two certificates, each of which takes some milliseconds: a node lets
+        ticks pass meanwhile.
+    """
+
+    pause: Callable[[], None] = field(default=lambda: None)
+
+    def judge(self, present: Running, held: Certificate, proposed: Running) -> Verdict:
+        """Judge a change.
+
+        Parameters
+        ----------
+        present : Running
+            What runs.
+        held : Certificate
+            Its certificate.
+        proposed : Running
+            What is asked for.
+
+        Returns
+        -------
+        Verdict
+            Accepted when every required inequality holds, or, where the running parameters have no
+            certificate to lose, when none gets worse.
+        """
+        certificate = proposed.certificate()
+        lost = [entry for entry in certificate.failing
+                if held[entry.name].holds or entry.margin < held[entry.name].margin]
+        if not lost:
+            return Verdict(certificate, True)
+        reason = ' | '.join(entry.explained() for entry in lost)
+        return Verdict(certificate, False, f'{reason}; {self._nearest(present, held, proposed)}')
+
+    def _nearest(self, present: Running, held: Certificate, proposed: Running) -> str:
+        """Nearest values that work, as text."""
+        differences = present.differences(proposed)
+        numbers = {name: pair for name, pair in differences.items()
+                   if isinstance(pair[0], float)}
+        words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
+        if words and not self._holds(present.changed(words)):
+            return self._choices(proposed, words)
+        if not (held.holds or words) or not numbers:
+            return 'nothing nearer is known: the running parameters are not certified themselves'
+
+        def between(share: float) -> dict[str, Any]:
+            return {**words, **{name: _between(share, before, after)
+                                for name, (before, after) in numbers.items()}}
+
+        def works(share: float) -> bool:
+            return self._holds(present.changed(between(share)))
+
+        share = nearest_value(works, 0.0, 1.0)
+        values = ', '.join(f'{name} = {shown(_rounded(between(share)[name], before))}'
+                           for name, (before, _) in numbers.items())
+        several = 's' if len(numbers) > 1 else ''
+        return f'nearest value{several} that work{"" if several else "s"}: {values}'
+
+    def _choices(self, proposed: Running, words: Mapping[str, Any]) -> str:
+        """Other words that work in place of those that were asked for."""
+        found = []
+        for name, asked in words.items():
+            working = [shown(choice) for choice in _alternatives(proposed, name)
+                       if choice != asked and self._holds(proposed.changed({name: choice}))]
+            found.append(f'{name} = {" or ".join(working)}' if working else
+                         f'no other {name} with the rest as it is')
+        return f'what works: {"; ".join(found)}'
+
+    def _holds(self, running: Running) -> bool:
+        self.pause()
+        try:
+            return running.certificate().holds
+        except DmpCpgError:
+            return False
+
+
+def _fields(parameters: SuiteParameters) -> Iterator[tuple[str, str, Any]]:
+    """Part, name and value of every parameter."""
+    for part in dataclasses.fields(parameters):
+        values = getattr(parameters, part.name)
+        for entry in dataclasses.fields(values):
+            yield part.name, entry.name, getattr(values, entry.name)
+
+
+def _alternatives(running: Running, name: str) -> list[Any]:
+    """All values of a parameter that is a choice; for several at once, one up to all of them."""
+    for part in dataclasses.fields(running.parameters):
+        values = getattr(running.parameters, part.name)
+        for entry in dataclasses.fields(values):
+            if entry.name == name:
+                choices = entry.metadata.get('choices', ())
+                if not isinstance(entry.default, tuple):
+                    return list(choices)
+                sizes = range(1, len(choices) + 1)
+                return [some for size in sizes for some in combinations(choices, size)]
+    return []
+
+
+def _between(share: float, before: float, after: float) -> float:
+    """Value at a share of the way; exactly the second at its end."""
+    return after if share == 1.0 else before + share * (after - before)
+
+
+def _rounded(value: float, towards: float) -> float:
+    """Few digits, on the side of a value that works."""
+    if value == towards or value == 0.0:
+        return value
+    step = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - _DIGITS)
+    if towards > value:
+        return min(math.ceil(value / step) * step, towards)
+    return max(math.floor(value / step) * step, towards)
+
+
+def shown(value: Any) -> str:
+    """Value as one types it for a parameter: lists in brackets, floats never as whole numbers."""
+    if isinstance(value, (tuple, list)):
+        return f'[{", ".join(map(str, value))}]'
+    if isinstance(value, float):
+        text = f'{value:g}'
+        return text if set(text) & set('.en') else f'{text}.0'
+    return str(value)

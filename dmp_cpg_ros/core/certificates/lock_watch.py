@@ -1,0 +1,180 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Are the running oscillators as close to their places as theory says they must be.
+
+In the places' own frames, z_i = R(−φ_i) x_i, the disagreement ε = (Σ ξ_i |z_i − z̄|²)^½ of a free
+network obeys ε̇ ≤ −λε + δr (Theorem 4 with the disturbance of Section 3.4): λ is the margin of the
+synchronisation condition, δ what the legs' frequencies may differ by and the rate at which a
+changing gait moves the places. From a start, or from release, ε stays under the solution of that
+inequality, and phases differ by what ε and the radius |z̄| allow. Beyond it something acts on the
+oscillators that is not in the model.
+"""
+
+from __future__ import annotations
+
+from cmath import phase as angle
+from dataclasses import dataclass
+from itertools import combinations
+from math import asin, exp, inf, pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH
+from dmp_cpg_ros.core.contraction.hopf_bounds import growth
+from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+
+Array = NDArray[np.float64]
+
+LOCKED, DISTURBED, LOST = 0, 1, 2
+"""Within the bound; beyond it and coming back as it must; beyond it and not coming back."""
+
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class PhaseLock:
+    """What the watch found at one tick.
+
+    Attributes
+    ----------
+    error : float
+        Largest difference of two legs' phases from their places [rad].
+    bound : float
+        What it must not exceed [rad]; π where nothing is certified or inhibition acts.
+    level : int
+        ``LOCKED``, ``DISTURBED`` or ``LOST``.
+    envelope : float
+        Bound on ε from here on.
+    places : ndarray (4,)
+        Phases of the places [rad].
+    """
+
+    error: float
+    bound: float
+    level: int
+    envelope: float
+    places: Array
+
+    @property
+    def alarm(self) -> str:
+        """What there is to say, starting with ``alarm``; empty while all is well."""
+        if self.level == LOCKED:
+            return ''
+        back = ('; it comes back at the certified rate' if self.level == DISTURBED else
+                ' and does not come back at the certified rate')
+        return (f'alarm: phase-lock error {self.error:.3g} rad is beyond its bound '
+                f'{self.bound:.3g} rad{back}')
+
+
+class PhaseLockWatch:
+    """Watches a network from tick to tick; the findings stay with the caller."""
+
+    def __init__(self) -> None:
+        """Start with no network."""
+        self._parameters: CanonicalParameters | None = None
+        self._found: Synchronisation | None = None
+        self._weights: list[float] = []
+        self._places: list[float] = []
+        self._turns: list[complex] = []
+
+    def step(self, before: PhaseLock | None, network: GaitNetwork, r: Array, x: Array, free: bool,
+             dt: float, contact: float = 0.0) -> PhaseLock:
+        """Look at the state after a tick.
+
+        Parameters
+        ----------
+        before : PhaseLock or None
+            Finding of the tick before; None at a start.
+        network : GaitNetwork
+            The network that acted.
+        r : ndarray (3,)
+            Reference.
+        x : ndarray (4, 2)
+            Canonical states.
+        free : bool
+            Whether no inhibition acted.
+        dt : float
+            Time since the tick before [s].
+        contact : float
+            How unequal contact feedback may make the legs' frequencies [rad/s].
+
+        Returns
+        -------
+        PhaseLock
+        """
+        found, places = self._synchronisation(network), network.gait.phases
+        z = [complex(x_1, -x_2) * turn
+             for (x_1, x_2), turn in zip(x.tolist(), self._into_places(places), strict=True)]
+        error = _spread(z)
+        if found.weights is None or not found.synchronises:
+            return PhaseLock(error, pi, LOCKED, inf, places)
+        weights = self._weights
+        mean = sum(weight * each for weight, each in zip(weights, z, strict=True))
+        epsilon = sqrt(sum(weight * abs(each - mean) ** 2
+                           for weight, each in zip(weights, z, strict=True)))
+        if before is None or not free:
+            return PhaseLock(error, pi, LOCKED, epsilon, places)
+        size = max(network.parameters.radius, *map(abs, z))
+        steady = (EXPECTED_MISMATCH * network.omega(r) + contact) * size / found.rate
+        moved = _moved(places - before.places) * size
+        fade = exp(-found.rate * dt)
+        envelope = max(steady, before.envelope * fade + (1.0 - fade) * steady) + moved
+        if before.envelope == inf:
+            envelope = max(steady, epsilon)
+        bound = _phase_bound(max(envelope, steady), weights, abs(mean))
+        return _judged(before, PhaseLock(error, bound, LOCKED, envelope, places), epsilon,
+                       _phase_bound(steady, weights, abs(mean)))
+
+    def _synchronisation(self, network: GaitNetwork) -> Synchronisation:
+        """Theorem 4 for the network's parameters; places make no difference to it."""
+        p = network.parameters
+        if self._found is None or (p is not self._parameters and p != self._parameters):
+            self._found = synchronisation(network.system.graph,
+                                          float(growth(p.rho, p.radius)))
+            weights = self._found.weights
+            self._weights = [] if weights is None else weights.tolist()
+        self._parameters = p
+        return self._found
+
+    def _into_places(self, places: Array) -> list[complex]:
+        """Rotations R(−φ_i) into the places' own frames, as complex numbers."""
+        listed = places.tolist()
+        if listed != self._places:
+            self._places, self._turns = listed, np.exp(-1j * places).tolist()
+        return self._turns
+
+
+def _judged(before: PhaseLock, now: PhaseLock, epsilon: float, steady: float) -> PhaseLock:
+    """Decide the level: an alarm stays until the error is within the steady bound again."""
+    beyond = now.error > now.bound + _ROUNDING
+    if before.level == LOCKED:
+        if not beyond:
+            return now
+        return PhaseLock(now.error, now.bound, DISTURBED, epsilon, now.places)
+    if now.error <= steady:
+        return now
+    lost = before.level == LOST or beyond
+    return PhaseLock(now.error, steady, LOST if lost else DISTURBED, now.envelope, now.places)
+
+
+def _spread(z: list[complex]) -> float:
+    """Largest difference of two phases, on the circle."""
+    return max(abs(angle(one * other.conjugate())) for one, other in combinations(z, 2))
+
+
+def _moved(change: Array) -> float:
+    """Largest change of a place without what the changes have in common, on the circle."""
+    if not change.any():
+        return 0.0
+    turned = np.exp(1j * change)
+    return float(np.abs(np.angle(turned * np.conj(turned.mean()))).max())
+
+
+def _phase_bound(epsilon: float, weights: list[float], mean_radius: float) -> float:
+    """Largest difference of two phases at a disagreement ε around a mean."""
+    smallest, second = sorted(weights)[:2]
+    inner = mean_radius - epsilon * sqrt((1.0 - smallest) / smallest)
+    half = epsilon * sqrt(1.0 / smallest + 1.0 / second) / (2.0 * inner) if inner > 0.0 else 1.0
+    return 2.0 * asin(half) if half < 1.0 else pi

@@ -1,0 +1,128 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Time step against stiffness: what the exponential step can take."""
+
+from __future__ import annotations
+
+import math
+
+from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE
+from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
+
+STEP_ERROR = 0.025
+"""c: with s = tick · ℓ, a mode that decays by more than c s⁴ per tick decays in the step too."""
+
+LARGEST_MILD_STEP = 1.4
+"""Largest s = tick · ℓ for which that is so with some room."""
+
+
+def mild_rate(rho: float, radius: float, omega: float) -> float:
+    """ℓ = sup ‖∂N/∂x‖ over |x| ≤ r of the part that the step does not integrate exactly.
+
+    With z = x₁ + i x₂, N = (ρr² − iω − ρ|z|²) z has ‖∂N/∂x‖ = |ρr² − iω − 2ρ|z|²| + ρ|z|², a
+    convex function of |z|², largest at |z| = r.
+
+    Parameters
+    ----------
+    rho, radius, omega : float
+        Parameters of the oscillators [1/s], [-], [rad/s].
+
+    Returns
+    -------
+    float
+        [1/s]
+    """
+    return math.hypot(omega, rho * radius**2) + rho * radius**2
+
+
+def longest_step(rho: float, radius: float, omega: float, rate: float) -> float:
+    """Longest step in which every mode that decays at ``rate`` or faster decays too [s].
+
+    The linear part is exact whatever its gains, so that only the mild part limits the step. On the
+    test equation ẏ = (z + w) y / h, with z ≤ 0 the exact and |w| ≤ s the mild part, decay by more
+    than c s⁴ per step is decay of the step, for every z: sampled densely, and tested.
+
+    Parameters
+    ----------
+    rho, radius, omega : float
+        Parameters of the oscillators, the largest ω.
+    rate : float
+        Slowest decay rate that must not be lost [1/s].
+
+    Returns
+    -------
+    float
+        0 when there is no decay to keep.
+    """
+    if not rate > 0.0:
+        return 0.0
+    ell = mild_rate(rho, radius, omega)
+    return min(LARGEST_MILD_STEP / ell, (rate / (STEP_ERROR * ell**4)) ** (1.0 / 3.0))
+
+
+def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -> float:
+    """Share by which the integrated limit cycle's radius differs from r.
+
+    A locked network feels no coupling, so that each oscillator is stepped as if it were alone: by
+    Kutta's third-order method, whose circle is found by bisection.
+
+    Parameters
+    ----------
+    rho, radius, omega : float
+        Parameters of the oscillators.
+    tick_s : float
+        Step [s].
+
+    Returns
+    -------
+    float
+        |R/r − 1|; infinite when the step has no cycle near r.
+    """
+    def rate(z: complex) -> complex:
+        return complex(rho * (radius**2 - abs(z) ** 2), -omega) * z
+
+    def change(R: float) -> float:
+        first = rate(complex(R))
+        second = rate(R + 0.5 * tick_s * first)
+        third = rate(R + tick_s * (2.0 * second - first))
+        return abs(R + tick_s / 6.0 * (first + 4.0 * second + third)) - R
+
+    low, high = 0.5 * radius, 1.5 * radius
+    if not change(low) > 0.0 > change(high):
+        return math.inf
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if change(middle) > 0.0 else (low, middle)
+    return abs(low / radius - 1.0)
+
+
+def step_inequalities(rho: float, radius: float, omega: float, rate: float, region_radius: float,
+                      tick_s: float) -> list[Inequality]:
+    """Inequalities (d): the tick against the mild part, and against the region C.
+
+    Parameters
+    ----------
+    rho, radius, omega : float
+        Parameters of the oscillators, the largest ω.
+    rate : float
+        Slowest certified rate of the network [1/s].
+    region_radius : float
+        r0 of C.
+    tick_s : float
+        Control tick [s].
+
+    Returns
+    -------
+    list of Inequality
+    """
+    limit = longest_step(rho, radius, omega, rate)
+    arc = 4.0 * math.asin(min(1.0, region_radius / (2.0 * radius)))
+    return [
+        Inequality('time_step', tick_s, limit, 's', 'tick', 'longest stable step', SAMPLED,
+                   'what decays in the equations decays in their numerical integration'),
+        Inequality('cycle_radius', cycle_radius_error(rho, radius, omega, tick_s),
+                   RADIUS_TOLERANCE, '', '|R/r - 1| as integrated', 'what capture allows', PROVED,
+                   'the integration keeps the radius of the limit cycle'),
+        Inequality('region_per_tick', omega * tick_s, arc, 'rad', 'omega_max tick', 'arc of C',
+                   PROVED, 'an oscillator cannot step over the region C between two ticks')]

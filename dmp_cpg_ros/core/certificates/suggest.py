@@ -1,0 +1,139 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Gains for which a certificate holds, and the value nearest to one that does not work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.transformation.leg import LegParameters
+
+MARGIN = 1.25
+"""Factor by which a suggested gain exceeds what its inequality needs."""
+
+GAIN_ROWS = ('synchronisation', 'contraction', 'capture', 'rest_in_region', 'time_step',
+             'hierarchy', 'rest_posture', 'rest_radius', 'time_to_rest')
+"""Inequalities that the two gains decide; the others depend on other parameters."""
+
+_LARGEST_COUPLING, _LARGEST_INHIBITION = 1e4, 1e5
+_PRECISION = 1e-3
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """Gains for which the certificate holds.
+
+    Attributes
+    ----------
+    coupling_gain, inhibition_gain : float
+        k and k_inh [1/s].
+    certificate : Certificate
+        With these gains.
+    changed : bool
+        Whether they differ from the present ones.
+    """
+
+    coupling_gain: float
+    inhibition_gain: float
+    certificate: Certificate
+    changed: bool
+
+
+def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
+                  reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
+                  tick_s: float) -> Suggestion | None:
+    """Raise the gains, inhibition before coupling, until the certificate holds.
+
+    Parameters are those of :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
+
+    Returns
+    -------
+    Suggestion or None
+        The present gains when they hold; None when an inequality fails that gains cannot mend, or
+        no gains within the parameters' ranges are enough.
+    """
+    def at(k: float, k_inh: float, voting: bool = False) -> Certificate:
+        return certify(_with_coupling(network, k),
+                       replace(inhibition, inhibition_gain=k_inh, voting=voting),
+                       reference, leg, posture, tick_s)
+
+    k0, k_inh0 = network.parameters.coupling_gain, inhibition.inhibition_gain
+    present = at(k0, k_inh0, inhibition.voting)
+    if present.holds:
+        return Suggestion(k0, k_inh0, present, False)
+    k = k0
+    while k <= _LARGEST_COUPLING:
+        k_inh = k_inh0
+        while k_inh <= _LARGEST_INHIBITION:
+            found = at(k, k_inh)
+            if found.holds and (k == k0 or _has_margin(found)):
+                found = at(k, k_inh, True) if inhibition.voting else found
+                if found.holds:
+                    return Suggestion(k, k_inh, found, True)
+                break  # the votes of some legs may still need stronger couplings
+            if any(entry.name not in GAIN_ROWS for entry in found.failing):
+                return None
+            k_inh = _next_inhibition(found, k_inh)
+        k = _rounded(1.3 * k)
+    return None
+
+
+def nearest_value(holds: Callable[[float], bool], working: float, wanted: float) -> float:
+    """Value nearest to a wanted one, on the way from one that works, that still works.
+
+    Parameters
+    ----------
+    holds : callable
+        Whether a value works.
+    working, wanted : float
+        A value that works, and the one that is asked for.
+
+    Returns
+    -------
+    float
+        The wanted value when it works, else found by bisection to 0.1 % of the way.
+
+    Raises
+    ------
+    ParameterError
+        If the first value does not work.
+    """
+    if not holds(working):
+        raise ParameterError(f'{working:g} does not hold a certificate to start from')
+    if holds(wanted):
+        return wanted
+    low, high = working, wanted
+    while abs(high - low) > _PRECISION * abs(wanted - working):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def _with_coupling(network: GaitNetwork, gain: float) -> GaitNetwork:
+    parameters: CanonicalParameters = replace(network.parameters, coupling_gain=gain)
+    return GaitNetwork(parameters, network.gait, network.scale)
+
+
+def _has_margin(found: Certificate) -> bool:
+    """Whether the inequalities of the coupling hold by the margin."""
+    return all(MARGIN * found[name].left <= found[name].right
+               for name in ('synchronisation', 'contraction'))
+
+
+def _next_inhibition(found: Certificate, k_inh: float) -> float:
+    """Next gain to try: what capture needs with its margin, or a step on."""
+    needed = MARGIN * found['capture'].left
+    return _rounded(max(needed, 1.0) if needed > k_inh else 1.5 * max(k_inh, 1.0))
+
+
+def _rounded(gain: float) -> float:
+    """Two or three digits that are not smaller."""
+    step = 10.0 ** (len(str(int(gain))) - 2)
+    return float(-(-gain // step) * step)

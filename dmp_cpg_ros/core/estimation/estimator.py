@@ -1,0 +1,368 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The state of the body from what a robot has: gyroscope, accelerometer, joints, contacts.
+
+A Kalman filter (:mod:`~dmp_cpg_ros.core.estimation.velocity_filter`) fuses the IMU with the
+velocities that
+the standing legs measure (:mod:`~dmp_cpg_ros.core.estimation.leg_odometry`); position is
+integrated, the
+ground is a plane through the newest footholds
+(:mod:`~dmp_cpg_ros.core.estimation.terrain_plane`). An
+attitude that the IMU's driver may give is not used: here yaw is the gyroscope's, whose bias the
+standing legs correct.
+
+What cannot be used (not finite, impossible, absent) never reaches the filter and is named in
+``BodyEstimate.problems``: a leg without joints measures nothing, a foot without contact sensor is
+judged by its joint torques, and without IMU the standing feet tell how the body turns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import exp, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
+from dmp_cpg_ros.core.estimation.leg_odometry import (
+    FootMotion,
+    LegOdometry,
+    force_from_torque,
+    turn_rate_of_feet,
+)
+from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
+from dmp_cpg_ros.core.estimation.terrain_plane import (
+    TerrainState,
+    initial_terrain,
+    normal_in_world,
+    terrain_step,
+)
+from dmp_cpg_ros.core.estimation.velocity_filter import (
+    FilterNoise,
+    FilterState,
+    predict,
+    settle,
+    update,
+)
+from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.rotations import levelled
+from dmp_cpg_ros.core.maths.vec3 import (
+    Triple,
+    dot,
+    rotation,
+    times,
+    transposed_times,
+    triple,
+    upward,
+)
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
+from dmp_cpg_ros.core.robot_model.state import LEGS
+
+Array = NDArray[np.float64]
+
+BLIND = 0.02
+"""Time for which the last turn rate is held without IMU and feet [s]; then the body counts as not
+turning. Also the gap between ticks beyond which readings do not stand for their mean.
+"""
+
+BLIND_NOISE = (0.3, 3.0)
+"""Noise densities of such guesses instead of the IMU's [rad/s/√Hz], [m/s²/√Hz]."""
+
+INITIAL_DEVIATION = (0.05, 0.1, 0.005, 0.1)
+"""Of attitude [rad], velocity [m/s], biases of gyroscope [rad/s] and accelerometer [m/s^2]."""
+
+UNTRUSTED_SHARE = 0.2
+"""Share of the force of full trust below which a foot is not trusted at all."""
+
+STILL_JOINT, STILL_TURN = 0.15, 0.03
+"""Velocities of joints and body below which a robot on all four feet stands still [rad/s]."""
+
+STILL_TIME = 0.3
+"""Time after which a robot that seems to stand still does so [s]; it sways out before."""
+
+STILL_DEVIATION = 0.01
+"""By which such a body turns all the same [rad/s]."""
+
+HEIGHT_RATE = 50.0
+"""Rate at which the height follows the kinematics of the stance legs [1/s]."""
+
+
+@dataclass(frozen=True)
+class EstimatorState:
+    """State of the estimator between ticks.
+
+    Attributes
+    ----------
+    filter : FilterState
+        Attitude, velocity, biases.
+    terrain : TerrainState
+        Footholds and plane.
+    estimate : BodyEstimate
+        The last one.
+    rate : ndarray (3,)
+        Last usable reading of the gyroscope [rad/s].
+    blind : float
+        Time since the IMU could be used [s].
+    still : float
+        Time for which the robot has stood still [s].
+    """
+
+    filter: FilterState
+    terrain: TerrainState
+    estimate: BodyEstimate
+    rate: Array
+    blind: float
+    still: float
+
+
+class BodyEstimator:
+    """Estimator of one robot; state in, state out.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        The robot.
+    parameters : EstimationParameters
+        Noise and thresholds.
+    legs : RobotLegs, optional
+        The robot's legs, where others ask them too.
+    """
+
+    def __init__(
+        self, description: RobotDescription, parameters: EstimationParameters,
+        legs: RobotLegs | None = None,
+    ) -> None:
+        """Scale the thresholds by the robot's weight."""
+        self.parameters = parameters
+        self.odometry = LegOdometry(description, legs)
+        self._weight = description.mass * GRAVITY
+
+    @property
+    def parameters(self) -> EstimationParameters:
+        """Noise and thresholds; may be set while the estimator runs."""
+        return self._parameters
+
+    @parameters.setter
+    def parameters(self, parameters: EstimationParameters) -> None:
+        self._parameters = p = parameters
+        self._seeing_noise, self._blind_noise = (
+            FilterNoise(
+                gyro, accelerometer, p.gyro_bias_walk, p.accelerometer_bias_walk, p.foot_noise,
+                p.foot_freedom,
+            )
+            for gyro, accelerometer in ((p.gyro_noise, p.accelerometer_noise), BLIND_NOISE)
+        )
+
+    def step(
+        self, memory: EstimatorState | None, readings: SensorReadings
+    ) -> tuple[EstimatorState, BodyEstimate]:
+        """Take in the readings of one tick.
+
+        Parameters
+        ----------
+        memory : EstimatorState or None
+            State after the last tick; None at the first, which takes the robot to be at rest.
+        readings : SensorReadings
+            A stamp that is not later than the last one means that the robot began anew.
+
+        Returns
+        -------
+        memory : EstimatorState
+        estimate : BodyEstimate
+        """
+        if memory is None or readings.time_ns <= memory.estimate.time_ns:
+            return self._begin(readings)
+        dt = (readings.time_ns - memory.estimate.time_ns) * 1e-9
+        legs, contacts, seeing = (
+            readings.usable_legs,
+            readings.usable_contacts,
+            readings.imu_is_usable,
+        )
+        blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
+        noise = self._blind_noise if blind else self._seeing_noise
+        if seeing:
+            rate, force = readings.rate_in_base, readings.specific_force_in_base
+        else:
+            rate, force = self._guessed(memory, readings, legs, blind)
+        state = predict(memory.filter, 0.5 * (memory.rate + rate), force, dt, noise)
+        motion, normal = self._motion(memory.terrain, state, readings, legs)
+        more = dt / self.parameters.contact_settling
+        trust = [
+            min(now, before + more)
+            for now, before in zip(
+                self._trust(readings, legs, contacts, motion, normal),
+                memory.estimate.trust.tolist(), strict=True)
+        ]
+        state, _ = update(
+            state, rate, motion.contact_in_base, motion.velocity_in_base, trust, noise)
+        rests = seeing and min(trust) > 0.0 and _is_still(readings, state)
+        still = memory.still + dt if rests else 0.0
+        if still > STILL_TIME:
+            state = settle(state, rate, STILL_DEVIATION)
+        problems = _problems(legs, contacts, seeing)
+        covariance, velocity = state.covariance.ravel(), state.velocity_in_base
+        if not isfinite(covariance.dot(covariance) + velocity.dot(velocity)):
+            problems = (*problems, 'filter')
+            state = memory.filter
+        terrain, estimate = self._finished(
+            memory, state, readings.time_ns, rate, motion, trust, problems
+        )
+        return EstimatorState(state, terrain, estimate, rate, blind, still), estimate
+
+    def _begin(self, readings: SensorReadings) -> tuple[EstimatorState, BodyEstimate]:
+        """Start at rest: the accelerometer tells the vertical, the feet the ground."""
+        seeing = readings.imu_is_usable
+        up = readings.specific_force_in_base if seeing else np.array((0.0, 0.0, 1.0))
+        zero = np.zeros(3)
+        covariance = np.diag(np.repeat(np.square(INITIAL_DEVIATION), 3))
+        state = FilterState(levelled(up), zero, zero, zero, covariance)
+        legs, contacts = readings.usable_legs, readings.usable_contacts
+        R = rotation(state.quaternion.tolist())
+        flat = TerrainState(((0.0, 0.0, 0.0),) * len(LEGS), (0.0, 0.0))
+        motion, normal = self._motion(flat, state, readings, legs)
+        trust = self._trust(readings, legs, contacts, motion, normal)
+        contact = [times(R, place) for place in motion.contact_in_base]
+        depths = [z for (_, _, z), usable in zip(contact, legs, strict=True) if usable]
+        height = -sum(depths) / len(depths) if depths else 0.0
+        estimate = BodyEstimate(
+            readings.time_ns,
+            np.array((0.0, 0.0, height)),
+            state.quaternion,
+            zero,
+            readings.rate_in_base if seeing else zero,
+            height,
+            np.array(normal_in_world(flat.slope)),
+            np.array(trust),
+            covariance.diagonal()[3:6],
+            _problems(legs, contacts, seeing),
+        )
+        terrain = (
+            initial_terrain([(x, y, z + height) for x, y, z in contact]) if all(legs) else flat)
+        rate = estimate.rate_in_base
+        return EstimatorState(state, terrain, estimate, rate, 0.0, 0.0), estimate
+
+    def _guessed(
+        self,
+        memory: EstimatorState,
+        readings: SensorReadings,
+        legs: tuple[bool, ...],
+        blind: float,
+    ) -> tuple[Array, Array]:
+        """Guess what a silent IMU would read: the feet tell the turn rate, nothing accelerates."""
+        state, trust = memory.filter, np.where(legs, memory.estimate.trust, 0.0)
+        up = np.array(upward(state.quaternion.tolist()))
+        rate = memory.rate if blind <= BLIND else state.gyro_bias
+        if trust.any():
+            motion, _ = self._motion(memory.terrain, state, readings, legs)
+            rate = state.gyro_bias + turn_rate_of_feet(
+                np.array(motion.contact_in_base), np.array(motion.velocity_in_base), trust
+            )
+        return rate, GRAVITY * up + state.accelerometer_bias
+
+    def _motion(
+        self,
+        terrain: TerrainState,
+        state: FilterState,
+        readings: SensorReadings,
+        legs: tuple[bool, ...],
+    ) -> tuple[FootMotion, Triple]:
+        """Motion of the feet, and the normal of the ground in the base."""
+        R = rotation(state.quaternion.tolist())
+        normal = transposed_times(R, normal_in_world(terrain.slope))
+        q, q_dot = readings.joint_position, readings.joint_velocity
+        if not all(legs):  # a placeholder for legs that are left out later
+            q, q_dot = (np.where(np.repeat(legs, 3), values, 0.0) for values in (q, q_dot))
+        return self.odometry.motion(q.tolist(), q_dot.tolist(), normal), normal
+
+    def _trust(
+        self,
+        readings: SensorReadings,
+        legs: tuple[bool, ...],
+        contacts: tuple[bool, ...],
+        motion: FootMotion,
+        normal: Triple,
+    ) -> list[float]:
+        """Trust in each foot from its force alone, in [0, 1]; 0 for legs without joints."""
+        force = readings.foot_force.tolist()
+        if not all(contacts):
+            for i in np.flatnonzero(np.logical_not(contacts)).tolist():
+                torque = readings.joint_effort[3 * i : 3 * i + 3]
+                felt = force_from_torque(
+                    np.array(motion.jacobian_in_base[i]), torque, np.array(normal))
+                force[i] = felt if isfinite(felt) else 0.0
+        full = self.parameters.contact_share * self._weight
+        return [
+            min(max((felt / full - UNTRUSTED_SHARE) / (1.0 - UNTRUSTED_SHARE), 0.0), 1.0)
+            if usable else 0.0
+            for felt, usable in zip(force, legs, strict=True)
+        ]
+
+    def _finished(
+        self,
+        memory: EstimatorState,
+        state: FilterState,
+        time_ns: int,
+        rate: Array,
+        motion: FootMotion,
+        trust: list[float],
+        problems: tuple[str, ...],
+    ) -> tuple[TerrainState, BodyEstimate]:
+        """Integrate the position, follow the ground, and put the estimate together."""
+        last = memory.estimate
+        dt = (time_ns - last.time_ns) * 1e-9
+        R, R_before = rotation(state.quaternion.tolist()), rotation(last.quaternion.tolist())
+        v_x, v_y, v_z = times(R, triple(state.velocity_in_base.tolist()))
+        u_x, u_y, u_z = times(R_before, triple(last.velocity_in_base.tolist()))
+        velocity = (0.5 * (v_x + u_x), 0.5 * (v_y + u_y), 0.5 * (v_z + u_z))
+        x, y, z = last.position_in_world.tolist()
+        x, y, z = x + velocity[0] * dt, y + velocity[1] * dt, z + velocity[2] * dt
+        contact = [times(R, place) for place in motion.contact_in_base]
+        terrain = terrain_step(
+            memory.terrain, [(x + a, y + b, z + c) for a, b, c in contact], trust, dt,
+            self.parameters.terrain_time,
+        )
+        normal = normal_in_world(terrain.slope)
+        height, weight = last.height + dot(normal, velocity) * dt, sum(trust)
+        if weight > 0.0:
+            depths = zip(trust, contact, strict=True)
+            measured = -sum(share * dot(place, normal) for share, place in depths) / weight
+            share = 1.0 - exp(-HEIGHT_RATE * min(weight, 1.0) * dt)
+            height += share * (measured - height)
+        estimate = BodyEstimate(
+            time_ns,
+            np.array((x, y, z)),
+            state.quaternion,
+            state.velocity_in_base,
+            rate - state.gyro_bias,
+            height,
+            np.array(normal),
+            np.array(trust),
+            state.covariance.diagonal()[3:6],
+            problems,
+        )
+        return terrain, estimate
+
+
+def _is_still(readings: SensorReadings, state: FilterState) -> bool:
+    """Whether neither joints nor body move."""
+    x, y, z = (readings.rate_in_base - state.gyro_bias).tolist()
+    return (
+        x * x + y * y + z * z < STILL_TURN**2
+        and float(np.abs(readings.joint_velocity).max()) < STILL_JOINT
+    )
+
+
+def _problems(
+    legs: tuple[bool, ...], contacts: tuple[bool, ...], seeing: bool
+) -> tuple[str, ...]:
+    """Names of the sensors that could not be used."""
+    if seeing and all(legs) and all(contacts):
+        return ()
+    return (
+        *(() if seeing else ('imu',)),
+        *(f'joints of {leg}' for leg, usable in zip(LEGS, legs, strict=True) if not usable),
+        *(f'contact of {leg}' for leg, usable in zip(LEGS, contacts, strict=True) if not usable),
+    )

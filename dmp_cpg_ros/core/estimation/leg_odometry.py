@@ -1,0 +1,161 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What standing legs tell about the motion of the body: one velocity per foot.
+
+The centre of a round foot of radius ρ that rolls on a plane of normal n moves at ω_shank × ρ n,
+and with the body's velocity v, its angular velocity ω and the shank's s relative to it,
+
+    v + ω × p + J q̇ = (ω + s) × ρ n    ⟹    v + ω × (p − ρ n) = s × ρ n − J q̇ ,
+
+all in the base frame. The left side is what the filter predicts, the right side is measured from
+joints alone. Without the rolling term the velocity of Mini Cheetah's legs would be 8 % too small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, times, triple
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FootMotion:
+    """Where the feet touch the ground, and the velocities that they measure; a tuple per leg.
+
+    Attributes
+    ----------
+    contact_in_base : tuple of (float, float, float)
+        Contact points r = p − ρ n [m].
+    velocity_in_base : tuple of (float, float, float)
+        s × ρ n − J q̇ [m/s]: v + ω × r of a body whose foot does not slide.
+    jacobian_in_base : tuple of matrices
+        Of the feet's centres [m/rad].
+    """
+
+    contact_in_base: tuple[Triple, ...]
+    velocity_in_base: tuple[Triple, ...]
+    jacobian_in_base: tuple[Matrix, ...]
+
+
+class LegOdometry:
+    """Kinematics of all legs of a robot.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        The robot.
+    legs : RobotLegs, optional
+        Its legs, where others ask them too.
+    """
+
+    def __init__(self, description: RobotDescription, legs: RobotLegs | None = None) -> None:
+        """Build the legs."""
+        self.legs = legs or RobotLegs(description)
+        self._signs = [triple(leg.axis_sign.tolist()) for leg in description.legs]
+        self._radius = [leg.foot_radius for leg in description.legs]
+
+    def motion(
+        self, q: Sequence[float], q_dot: Sequence[float], normal_in_base: Triple
+    ) -> FootMotion:
+        """Contact points and measured velocities of all feet.
+
+        Parameters
+        ----------
+        q, q_dot : sequence of 12 floats
+            Joint angles [rad] and velocities [rad/s].
+        normal_in_base : tuple of float
+            Normal n of the ground, upwards.
+
+        Returns
+        -------
+        FootMotion
+        """
+        n_x, n_y, n_z = normal_in_base
+        contacts, velocities, jacobians = [], [], []
+        for i, (((x, y, z), J), sign, radius) in enumerate(
+            zip(self.legs.at(q), self._signs, self._radius, strict=True)
+        ):
+            angles, rates = q[3 * i : 3 * i + 3], triple(q_dot[3 * i : 3 * i + 3])
+            down = (radius * n_x, radius * n_y, radius * n_z)
+            rolling, moving = cross(shank_rate(sign, angles, rates), down), times(J, rates)
+            contacts.append((x - down[0], y - down[1], z - down[2]))
+            velocities.append(
+                (rolling[0] - moving[0], rolling[1] - moving[1], rolling[2] - moving[2]))
+            jacobians.append(J)
+        return FootMotion(tuple(contacts), tuple(velocities), tuple(jacobians))
+
+
+def shank_rate(
+    sign: Sequence[float], angle: Sequence[float], rate: Sequence[float]
+) -> Triple:
+    """Angular velocity of the shank relative to the base, in the base [rad/s].
+
+    Parameters
+    ----------
+    sign : sequence of float
+        The leg's ``axis_sign``.
+    angle, rate : sequence of float
+        Joint angles [rad] and velocities [rad/s] of the leg.
+    """
+    pitching = sign[1] * rate[1] + sign[2] * rate[2]
+    abduction = sign[0] * angle[0]
+    return sign[0] * rate[0], cos(abduction) * pitching, sin(abduction) * pitching
+
+
+def turn_rate_of_feet(contact_in_base: Array, velocity_in_base: Array, trust: Array) -> Array:
+    """Angular velocity of a body from the feet alone, for when its gyroscope is silent.
+
+    Least squares of v + ω × r_i = m_i, weighted by the trust and slightly damped: two feet tell
+    nothing of a turn about the line between them, and one tells nothing at all.
+
+    Parameters
+    ----------
+    contact_in_base, velocity_in_base : ndarray (n, 3)
+        r_i [m] and m_i [m/s].
+    trust : ndarray (n,)
+        Weights, not all 0.
+
+    Returns
+    -------
+    ndarray (3,)
+        ω in the base [rad/s].
+    """
+    weight = trust / trust.sum()
+    r = contact_in_base - weight @ contact_in_base
+    m = velocity_in_base - weight @ velocity_in_base
+    squares = float(weight @ (r * r).sum(axis=1)) + 1e-4
+    normal = squares * np.eye(3) - (weight[:, None] * r).T @ r
+    return np.linalg.solve(normal, weight @ np.cross(r, m))
+
+
+def force_from_torque(jacobian: Array, torque: Array, normal_in_base: Array) -> float:
+    """Normal force on a foot from the joint torques alone, for when its sensor is silent.
+
+    Statics: τ + Jᵀ f = 0 for a massless leg; weight and acceleration of the leg are left out.
+
+    Parameters
+    ----------
+    jacobian : ndarray (3, 3)
+        Of the foot's centre [m/rad].
+    torque : ndarray (3,)
+        Joint torques [N m].
+    normal_in_base : ndarray (3,)
+        Normal of the ground.
+
+    Returns
+    -------
+    float
+        [N]; 0 for a leg so straight that the torques do not tell.
+    """
+    if abs(float(np.linalg.det(jacobian))) < 1e-6:
+        return 0.0
+    return float(normal_in_base @ np.linalg.solve(jacobian.T, -torque))

@@ -1,0 +1,293 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Gaits as data: which leg follows which, for how long it stands, and how often it steps.
+
+Speeds and cadences are dimensionless (Alexander & Jayes 1983, dynamic similarity), so that one
+gait serves robots of any size: speed û = u / sqrt(g l), cadence f̂ = f sqrt(l / g), with l the
+standing height of the hip.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.phase import wrapped
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.com_height import GRAVITY, Bounce, planned_bounce, stance_groups
+from dmp_cpg_ros.core.gait.gait_word import gait_word
+from dmp_cpg_ros.core.gait.speed_limit import within_limit
+from dmp_cpg_ros.core.maths.vec3 import Triple
+from dmp_cpg_ros.core.robot_model.state import LEGS
+
+Array = NDArray[np.float64]
+
+LATERAL_WEIGHT = 2.0
+"""Weight of speed across the body in the speed by which a gait chooses its cadence."""
+
+
+@dataclass(frozen=True)
+class BodyScale:
+    """Lengths by which a robot's speeds are made dimensionless.
+
+    Attributes
+    ----------
+    leg_length : float
+        Standing height l of the hips [m].
+    hip_radius : float
+        Horizontal distance from the base's origin to a foot [m]: a turn at γ moves a foot at γ
+        times this.
+    """
+
+    leg_length: float
+    hip_radius: float
+
+    def speed(self, dimensionless: float) -> float:
+        """Speed u √(g l) of a dimensionless one u [m/s]."""
+        return dimensionless * (GRAVITY * self.leg_length) ** 0.5
+
+    def foot_speed(self, v_x: float, v_y: float, gamma: float) -> float:
+        """Speed by which a gait chooses its cadence: a bound on that of any stance foot [m/s].
+
+        Speed sideways and from turning counts ``LATERAL_WEIGHT`` times: across the body the feet
+        have about half the room, so that the steps must be shorter.
+        """
+        across = LATERAL_WEIGHT * v_y
+        return float(
+            (v_x * v_x + across * across) ** 0.5
+            + LATERAL_WEIGHT * abs(gamma) * self.hip_radius
+        )
+
+
+@dataclass(frozen=True)
+class Gait:
+    """One gait.
+
+    Attributes
+    ----------
+    name : str
+        Name in the YAML.
+    lag : ndarray (4,)
+        Fraction of a cycle by which each leg (fl, fr, rl, rr) follows fl, in [0, 1).
+    speed : ndarray (n,)
+        Increasing dimensionless foot speeds at which the next two are given; held constant
+        outside.
+    cadence : ndarray (n,)
+        Dimensionless stride frequencies.
+    duty_factor : ndarray (n,)
+        Fraction β of the cycle that a foot is planned to stand, in (0, 1).
+    highest_speed : float
+        Dimensionless foot speed that the gait never exceeds, not below the last of ``speed``, so
+        that the cadence is that of the tables with and without it; infinite for none.
+    """
+
+    name: str
+    lag: Array
+    speed: Array
+    cadence: Array
+    duty_factor: Array
+    highest_speed: float = inf
+    rest: float = field(init=False)
+    groups: int = field(init=False)
+    cadence_scale: float = field(init=False, default=1.0)
+    _tables: tuple[list[float], list[float], list[float]] = field(
+        init=False, repr=False, compare=False
+    )
+
+    def __post_init__(self) -> None:
+        """Validate and find the rest phase."""
+        if not self.name or any(sign.isspace() or sign == '>' for sign in self.name):
+            raise ParameterError(f"gait '{self.name}': a name must be one word without '>'")
+        if self.lag.shape != (len(LEGS),) or not np.all((self.lag >= 0.0) & (self.lag < 1.0)):
+            raise ParameterError(
+                f"gait '{self.name}': lag needs four fractions in [0, 1), not {self.lag}"
+            )
+        if not len(self.speed) == len(self.cadence) == len(self.duty_factor) > 0:
+            raise ParameterError(
+                f"gait '{self.name}': speed, cadence and duty_factor must have equal lengths"
+            )
+        if np.any(np.diff(self.speed) <= 0.0) or not np.all(np.isfinite(self.speed)):
+            raise ParameterError(f"gait '{self.name}': speed must increase")
+        if not np.all((self.duty_factor > 0.0) & (self.duty_factor < 1.0)):
+            raise ParameterError(f"gait '{self.name}': duty_factor must lie in (0, 1)")
+        if not np.all((self.cadence > 0.0) & np.isfinite(self.cadence)):
+            raise ParameterError(f"gait '{self.name}': cadence must be positive")
+        if not self.highest_speed >= max(float(self.speed[-1]), 1e-3):
+            raise ParameterError(
+                f"gait '{self.name}': highest_speed must be positive and not below the last of "
+                f'speed, {self.speed[-1]:g}, not {self.highest_speed:g}')
+        object.__setattr__(self, 'rest', _rest_phase(self.lag))
+        object.__setattr__(self, 'groups', stance_groups(self.lag))
+        object.__setattr__(
+            self,
+            '_tables',
+            tuple(table.tolist() for table in (self.speed, self.cadence, self.duty_factor)),
+        )
+
+    @classmethod
+    def from_mapping(cls, name: str, values: Mapping[str, Any]) -> Gait:
+        """Build from one entry of the gaits YAML.
+
+        Raises
+        ------
+        ParameterError
+            If a key is missing or not known, or a value is impossible.
+        """
+        valid, optional = ('lag', 'speed', 'cadence', 'duty_factor'), 'highest_speed'
+        if not isinstance(values, Mapping) or set(values) - {optional} != set(valid):
+            raise ParameterError(
+                f"gait '{name}' must have the keys {', '.join(valid)} and may have {optional}, "
+                'no others')
+        lag = values['lag']
+        if not isinstance(lag, Mapping) or set(lag) != set(LEGS):
+            raise ParameterError(f"gait '{name}': lag must name the legs {', '.join(LEGS)}")
+        try:
+            speed, cadence, duty = (np.asarray(values[key], dtype=float) for key in valid[1:])
+            return cls(name, np.array([float(lag[leg]) for leg in LEGS]), speed, cadence, duty,
+                       float(values.get(optional, inf)))
+        except (TypeError, ValueError) as error:
+            raise ParameterError(f"gait '{name}': {error}") from error
+
+    def scaled(self, cadence_scale: float) -> Gait:
+        """Return this gait with all cadences multiplied; itself for a factor of 1.
+
+        Parameters
+        ----------
+        cadence_scale : float
+            Positive factor.
+        """
+        if cadence_scale == 1.0:
+            return self
+        scaled = copy(self)
+        cadence = self.cadence * cadence_scale
+        object.__setattr__(scaled, 'cadence', cadence)
+        object.__setattr__(scaled, 'cadence_scale', self.cadence_scale * cadence_scale)
+        object.__setattr__(
+            scaled, '_tables', (self._tables[0], cadence.tolist(), self._tables[2])
+        )
+        return scaled
+
+    def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
+        """Velocity (v_x, v_y, γ) that the gait does of one that is asked for [m/s], [rad/s], see
+        :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
+        """
+        return limited(velocity, scale, self.highest_speed)
+
+    @property
+    def phases(self) -> Array:
+        """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
+        return -2.0 * np.pi * self.lag
+
+    @property
+    def word(self) -> str:
+        """Text that travels with the phases, see :mod:`~dmp_cpg_ros.core.gait.gait_word`."""
+        return gait_word(self.name, self.cadence_scale)
+
+    @property
+    def rest_rate(self) -> float:
+        """Rate of the rest phase: 0, other than while gaits change [rad/s]."""
+        return 0.0
+
+    def own_omega(self, leg: int, omega: float) -> float:
+        """Frequency with which one leg goes through its cycle when the gait's is ω: the same
+        [rad/s].
+        """
+        return omega
+
+    def own_omegas(self, omega: float) -> list[float]:
+        """As :meth:`own_omega` for all legs [rad/s]."""
+        return [omega] * len(LEGS)
+
+    def omega(self, foot_speed: float, scale: BodyScale) -> float:
+        """Angular frequency ω of the oscillators at a foot speed [rad/s].
+
+        Parameters
+        ----------
+        foot_speed : float
+            As from :meth:`BodyScale.foot_speed` [m/s].
+        scale : BodyScale
+            The robot's lengths.
+        """
+        root = (GRAVITY / scale.leg_length) ** 0.5
+        return (
+            2.0
+            * np.pi
+            * root
+            * _interpolated(
+                foot_speed / (root * scale.leg_length), self._tables[0], self._tables[1]
+            )
+        )
+
+    def duty(self, foot_speed: float, scale: BodyScale) -> float:
+        """Duty factor β at a foot speed."""
+        return _interpolated(
+            foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self._tables[0], self._tables[2]
+        )
+
+    def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
+        """How the body is planned to rise and fall, see
+        :mod:`~dmp_cpg_ros.core.gait.com_height`.
+        """
+        return planned_bounce(cycle_position, self.groups, duty, omega)
+
+    def scalar_cycle_position(self, phi: float) -> float:
+        """As :meth:`cycle_position` for one leg, without arrays."""
+        return (phi / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
+
+    def cycle_position(self, phi: Array | float) -> Array:
+        """Where legs are in their cycle: 0 at mid-swing, in [−1/2, 1/2).
+
+        The phase φ = 0 of oscillator fl, where inhibition holds it, is the moment at which all
+        legs are farthest from mid-swing.
+
+        Parameters
+        ----------
+        phi : ndarray (...) or float
+            Oscillator phases [rad].
+        """
+        return wrapped(np.asarray(phi) + 2.0 * np.pi * self.rest) / (2.0 * np.pi)
+
+
+def limited(
+    velocity: Triple, scale: BodyScale, highest_speed: float, largest_curve: float = inf
+) -> Triple:
+    """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
+    share of g, that goes with it [m/s], [rad/s].
+    """
+    return within_limit(
+        velocity, scale.foot_speed(*velocity), scale.speed(highest_speed),
+        largest_curve * GRAVITY)
+
+
+def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:
+    """Piecewise linear interpolation, constant outside; plain floats, because it runs in every
+    node at every tick.
+    """
+    place = bisect_right(xs, at)
+    if place == 0:
+        return ys[0]
+    if place == len(xs):
+        return ys[-1]
+    share = (at - xs[place - 1]) / (xs[place] - xs[place - 1])
+    return ys[place - 1] + share * (ys[place] - ys[place - 1])
+
+
+def _rest_phase(lag: Array) -> float:
+    """Cycle position of fl at which the leg nearest to its mid-swing is as far from it as
+    possible.
+
+    Of several such positions the one at which fl itself is farthest from mid-swing, and of two the
+    earlier one.
+    """
+    mid_swings = np.unique(np.round(lag % 1.0, 9))  # cycle positions of fl
+    gaps = np.diff(np.append(mid_swings, mid_swings[0] + 1.0))
+    middles = (mid_swings + 0.5 * gaps)[gaps > gaps.max() - 1e-6] % 1.0
+    own = np.abs((middles + 0.5) % 1.0 - 0.5)
+    return float(min(middles[own > own.max() - 1e-6]))

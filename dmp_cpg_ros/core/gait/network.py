@@ -1,0 +1,251 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The four coupled oscillators of a gait: what the canonical node runs and what predictions are
+made with.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+from functools import cached_property
+from math import atan2, ceil, cos, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.gait.gait import GRAVITY, BodyScale
+from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.robot_model.state import LEGS
+
+Array = NDArray[np.float64]
+
+
+LONGEST_STEP = 0.005
+"""Longest time step of the oscillators [s]."""
+
+
+@dataclass(frozen=True)
+class CanonicalParameters(Parameters):
+    """Parameters of the coupled canonical oscillators."""
+
+    rho: float = parameter(
+        8.0, 'attraction rho to the limit cycle', unit='1/s', minimum=0.1, maximum=1e3
+    )
+    radius: float = parameter(1.0, 'radius r of the limit cycle', minimum=0.01, maximum=100.0)
+    coupling_gain: float = parameter(
+        100.0, 'gain k of every coupling', unit='1/s', minimum=0.0, maximum=1e4
+    )
+    coupling_graph: str = parameter(
+        'all_to_all',
+        'who is coupled with whom',
+        choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'),
+    )
+    cadence_scale: float = parameter(
+        1.0, "factor on the gait's cadence at every speed", minimum=0.25, maximum=4.0
+    )
+    contact_feedback: bool = parameter(
+        False, 'whether early and late touchdown shift the phase of the legs'
+    )
+    contact_gain: float = parameter(
+        20.0,
+        'frequency offset per phase by which a touchdown is early or late',
+        unit='1/s',
+        minimum=0.0,
+        maximum=1e3,
+    )
+    contact_hold: float = parameter(
+        0.5,
+        'largest share of the cadence by which late feet hold the phase back',
+        minimum=0.0,
+        maximum=0.9,
+    )
+    margin_share: float = parameter(
+        0.5,
+        'share of the margin for unequal leg frequencies that contact feedback may use',
+        minimum=0.0,
+        maximum=0.95,
+    )
+
+
+def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalSystem:
+    """Coupled oscillators that lock at given phases; inhibition pulls each leg to its place when
+    fl has phase 0.
+
+    Parameters
+    ----------
+    parameters : CanonicalParameters
+        Oscillators and coupling.
+    phases : ndarray (4,)
+        Locked phases relative to fl [rad].
+    """
+    graph = graph_from_edges(
+        len(LEGS),
+        topology(parameters.coupling_graph, len(LEGS)),
+        parameters.coupling_gain,
+        phases,
+    )
+    return CanonicalSystem(
+        graph,
+        AndronovHopf(parameters.rho, parameters.radius),
+        state_at(phases, parameters.radius),
+    )
+
+
+class GaitNetwork:
+    """Canonical system of one gait with its frequency taken from the reference.
+
+    Parameters
+    ----------
+    parameters : CanonicalParameters
+        Oscillators and coupling.
+    gait : Gait
+        Phase offsets and cadence, before ``cadence_scale`` (a blend while gaits change).
+    scale : BodyScale
+        The robot's lengths.
+
+    Attributes
+    ----------
+    gait : Gait
+        With the cadence that acts: everything that asks a gait for ω must ask this one.
+    """
+
+    gait: GaitInForce
+
+    def __init__(
+        self, parameters: CanonicalParameters, gait: GaitInForce, scale: BodyScale
+    ) -> None:
+        """Keep the parts."""
+        self.parameters, self.scale = parameters, scale
+        self.gait = gait.scaled(parameters.cadence_scale)
+
+    @cached_property
+    def system(self) -> CanonicalSystem:
+        """The coupled system with the gait's offsets."""
+        return network_system(self.parameters, self.gait.phases)
+
+    @cached_property
+    def target(self) -> Array:
+        """x_d of every leg, ndarray (4, 2)."""
+        return self.system.target
+
+    def with_cadence_of(self, gait: GaitInForce) -> GaitNetwork:
+        """Return this network at the cadence of another gait with the same phases; what was
+        computed for the phases is kept.
+        """
+        if gait is self.gait:
+            return self
+        _ = self.target  # computed once for both
+        other = copy(self)
+        other.gait = gait
+        return other
+
+    @property
+    def highest_speed(self) -> float:
+        """Foot speed at which the gait in force is held [m/s]."""
+        return self.gait.highest_speed * (GRAVITY * self.scale.leg_length) ** 0.5
+
+    def omega(self, r: Array) -> float:
+        """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""
+        return self.gait.omega(self.scale.foot_speed(*r.tolist()), self.scale)
+
+    def step(
+        self,
+        x: Array,
+        r: Array,
+        inhibition: Inhibition,
+        dt: float,
+        feedback: Array | float = 0.0,
+    ) -> Array:
+        """Advance the states (4, 2) by dt [s] at reference r under an inhibition that is
+        switched by region.
+
+        Feedback, ndarray (4,), is added to the legs' ω [rad/s]. After a gap in the robot's states
+        the time is made up in parts of at most ``LONGEST_STEP``.
+        """
+        parts = max(1, ceil(dt / LONGEST_STEP - 1e-9))
+        for _ in range(parts):
+            gains = inhibition.acting_gains(x, self.target)
+            x = self.system.step(x, self.omega(r) + feedback, gains, dt / parts)
+        return x
+
+    def advance(
+        self,
+        x: Array,
+        r: Array,
+        inhibition: Inhibition,
+        dt: float,
+        feedback: Array | float = 0.0,
+    ) -> tuple[GaitNetwork, Array]:
+        """Advance the states as :meth:`step`, and the network: another one while gaits change.
+
+        Returns
+        -------
+        network : GaitNetwork
+            In force after the step.
+        x : ndarray (4, 2)
+        """
+        return self, self.step(x, r, inhibition, dt, feedback)
+
+    def rate(
+        self, x: Array, r: Array, inhibition: Inhibition, feedback: Array | float = 0.0
+    ) -> Array:
+        """Rate of the states, ẋ (4, 2) [1/s], with feedback as in :meth:`step`."""
+        gains = inhibition.acting_gains(x, self.target)
+        return self.system.field(x, self.omega(r) + feedback, gains)
+
+    def locked_state(self, phi: float = 0.0) -> Array:
+        """States (4, 2) on the limit cycle with fl at phase φ [rad] and all legs in their
+        places.
+        """
+        return state_at(phi + self.gait.phases, self.parameters.radius)
+
+    def rest_state(
+        self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0
+    ) -> Array:
+        """Equilibrium (4, 2) that is reached from the locked state under inhibition at zero
+        reference.
+        """
+        x, r = self.locked_state(), np.zeros(3)
+        for _ in range(round(duration / tick)):
+            following = self.step(x, r, inhibition, tick)
+            if np.array_equal(following, x):
+                break
+            x = following
+        return x
+
+    def settled(self, x: Array, r: Array, inhibition: Inhibition) -> Array:
+        """Equilibrium (4, 2) near a state under inhibition, by Newton's iteration.
+
+        Parameters
+        ----------
+        x : ndarray (4, 2)
+            State near it.
+        r : ndarray (3,)
+            Reference, about zero.
+        inhibition : Inhibition
+            That acts at x.
+        """
+        omega, gains = self.omega(r), inhibition.acting_gains(x, self.target)
+        for _ in range(6):
+            off = self.system.field(x, omega, gains).ravel()
+            x = x - np.linalg.solve(self.system.jacobian(x, omega, gains), off).reshape(x.shape)
+        return x
+
+    def phase_errors(self, x: Array) -> Array:
+        """Deviation of each leg's phase from its place, relative to the circular mean, ndarray
+        (4,) [rad].
+        """
+        places = self.gait.phases.tolist()
+        relative = [
+            scalar_phase(x_1, x_2) - place
+            for (x_1, x_2), place in zip(x.tolist(), places, strict=True)
+        ]
+        mean = atan2(sum(map(sin, relative)), sum(map(cos, relative)))
+        return np.array([(angle - mean + pi) % (2.0 * pi) - pi for angle in relative])

@@ -1,0 +1,74 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""No gait is asked for more than its highest speed, nor for a curve that would throw it out.
+
+Commands are limited before they are filtered, by the gait that is wanted
+(:class:`~dmp_cpg_ros.core.reference.filter.CommandGate`), so that the reference comes to the
+highest
+speed as smoothly as to any other. While gaits change, the reference is not there yet, or the old
+gait cannot do what the new one can: whatever reads the reference by a gait, the oscillators'
+frequency, the legs' paths and the posture controller, takes it within the limit of the gait in
+force, which moves from one to the other with the blend. The robot slows down on the way into a
+slower gait and speeds up on the way into a faster one.
+
+A body at speed u that turns with γ is accelerated by u |γ| towards the centre of its curve. The
+feet push it there as far as friction bears that, and the less the more the legs are at their limit
+with the speed alone. Commands therefore keep to
+
+    s² + c² ≤ 1 ,    c = u |γ| / (κ g) ,
+
+with s the speed's share of the highest one and κ the parameter ``max_curve``; a reference on its
+way to a command is never far outside.
+
+Velocity and turn rate are shortened alike: a curve stays the same curve.
+"""
+
+from __future__ import annotations
+
+from math import hypot, inf, sqrt
+
+from dmp_cpg_ros.core.maths.vec3 import Triple
+
+
+def within_limit(velocity: Triple, speed: float, most: float, tightest: float = inf) -> Triple:
+    """Shorten a velocity to the highest speed and the largest curve.
+
+    Parameters
+    ----------
+    velocity : tuple of float
+        v_x, v_y [m/s], γ [rad/s].
+    speed : float
+        The foot speed that goes with it, as from
+        :meth:`~dmp_cpg_ros.core.gait.gait.BodyScale.foot_speed`, in proportion to it.
+    most : float
+        Highest foot speed, in the same unit.
+    tightest : float, optional
+        Largest acceleration towards the centre of a curve [m/s^2].
+
+    Returns
+    -------
+    tuple of float
+        The same where it is within the limit.
+    """
+    fast = (speed / most) ** 2
+    tight = (hypot(velocity[0], velocity[1]) * velocity[2] / tightest) ** 2
+    if fast + tight <= 1.0:
+        return velocity
+    # shortened by k, the one grows with k², the other with k⁴
+    share = sqrt(2.0 / (fast + sqrt(fast * fast + 4.0 * tight)))
+    return velocity[0] * share, velocity[1] * share, velocity[2] * share
+
+
+def blended_limit(before: float, after: float, weight: float) -> float:
+    """Limit on the way from one to another: the slowness 1/u moves evenly, so that it is a number
+    also where one of them has no limit, and near the slower one for most of the way.
+
+    Parameters
+    ----------
+    before, after : float
+        Limits, positive; infinite for none.
+    weight : float
+        In [0, 1].
+    """
+    slowness = (1.0 - weight) / before + weight / after
+    return 1.0 / slowness if slowness > 0.0 else inf

@@ -1,0 +1,245 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""From one gait to another while walking: the phase offsets move, the network stays certified.
+
+**The spectrum does not see the offsets.** With offsets φ_i the coupling is −Σ_j k (x_i −
+R(φ_i − φ_j) x_j). Let R = blockdiag(R(φ_1), …, R(φ_N)) and x = R y. Then Rᵀ L_φ R has the blocks
+R(φ_i)ᵀ k R(φ_i) = k I and −R(φ_i)ᵀ k R(φ_i − φ_j) R(φ_j) = −k I: it is L_K, the same for all
+offsets. R is orthogonal, so L_φ has the spectrum of L_K whatever the φ_i, and so have its
+symmetric part and L_φ + diag α, because diag α is a multiple of I in each block. The oscillator
+f(x; ω) = ω S x + ρ(r² − |x|²) x commutes with rotations, so growth bounds, inhibited regions
+|x_i − R(φ_i) x_d| ≤ r₀ and equilibria are rotated too, radii and rates kept. Every margin of
+synchronisation and contraction is therefore the same in every gait and every blend.
+
+**Moving offsets are unequal frequencies.** With φ_i(t), ẏ_i = f(y_i; ω_i − φ̇_i) + (coupling
+without offsets). Left alone, φ̇_i disturbs as a mismatch of frequencies does, within certificate
+(g)'s margin. Here it is fed forward, ω_i = ω + φ̇_i, and nothing is left of it: y obeys exactly the
+equation of a gait that does not change, so the phase error keeps its bound and decays at its rate
+during a transition as outside of it.
+
+**The course.** The share s runs from 0 to 1 with ṡ = ω/(2πn), filtered at ``SETTLING_RATE``; the
+weight w = s²(3 − 2s) blends offsets, rest phase, cadence and duty factor. n is the number of
+cycles for which no leg's frequency differs from ω by more than the fraction ``gait_change_rate``.
+While a stop is requested ṡ goes to 0 and the blend stays as it is; at rest the new gait takes
+force at once (:mod:`~dmp_cpg_ros.core.gait.gait_networks`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.arcs import arcs_between
+from dmp_cpg_ros.core.gait.com_height import Bounce
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait, limited
+from dmp_cpg_ros.core.gait.gait_word import gait_word
+from dmp_cpg_ros.core.gait.speed_limit import blended_limit
+from dmp_cpg_ros.core.maths.vec3 import Triple
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+
+Array = NDArray[np.float64]
+
+STEEPEST = 1.5
+"""Largest slope of the weight w(s)."""
+
+SHORTEST = 1.0
+"""Cycles that a transition takes at least, between gaits with the same offsets."""
+
+SETTLING_RATE = 12.0
+"""Rate of the filter through which a transition starts, pauses and goes on [1/s]."""
+
+STANDING = 0.02
+"""A transition that pauses stands still below this fraction of its usual rate."""
+
+
+@dataclass(frozen=True)
+class GaitChangeParameters(Parameters):
+    """How gaits change."""
+
+    gait_change_rate: float = parameter(
+        0.25,
+        "largest change of a leg's frequency during a change of gait, as a fraction of the "
+        "gait's frequency",
+        minimum=0.01,
+        maximum=0.6,
+    )
+
+
+@dataclass(frozen=True)
+class GaitTransition:
+    """The way from one gait to another.
+
+    Attributes
+    ----------
+    before, after : Gait
+        Both gaits.
+    arcs : ndarray (4,)
+        a_i: what each leg's cycle gains on a walk at the common frequency, in cycles.
+    rest_arc : float
+        By how much the rest phase moves, in cycles.
+    offset_arcs : ndarray (4,)
+        By how much the phase offsets move, in cycles; with the rest phase and a common arc that
+        speeds all oscillators they add up to ``arcs``.
+    """
+
+    before: Gait
+    after: Gait
+    arcs: Array = field(init=False, repr=False, compare=False)
+    rest_arc: float = field(init=False, repr=False, compare=False)
+    offset_arcs: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Choose the arcs."""
+        before, after = self.before, self.after
+        middle = [float(np.median(gait.duty_factor)) for gait in (before, after)]
+        arcs = arcs_between(before.rest - before.lag, after.rest - after.lag, *middle)
+        rest_arc = (after.rest - before.rest + 0.5) % 1.0 - 0.5
+        moves = arcs - arcs[0] + round(float(before.lag[0] - after.lag[0]), 12)
+        object.__setattr__(self, 'arcs', arcs)
+        object.__setattr__(self, 'rest_arc', rest_arc)
+        object.__setattr__(self, 'offset_arcs', moves)
+
+    @property
+    def common_arc(self) -> float:
+        """By how much all oscillators run ahead of ω, in cycles."""
+        return float(self.arcs[0] - self.offset_arcs[0]) - self.rest_arc
+
+    def cycles(self, rate: float) -> float:
+        """Length n in cycles when no leg's frequency may change by more than a fraction."""
+        return max(SHORTEST, STEEPEST * float(np.abs(self.arcs).max()) / rate)
+
+    def fastest(self, rate: float) -> float:
+        """Largest change of a leg's frequency on the way, as a fraction of ω; at most ``rate``."""
+        return STEEPEST * float(np.abs(self.arcs).max()) / self.cycles(rate)
+
+    def at(self, share: float, rate: float) -> BlendedGait:
+        """Blend at a share s in [0, 1] that grows at a rate ṡ [1/s]."""
+        return BlendedGait(self, share, rate)
+
+
+@dataclass(frozen=True)
+class BlendedGait:
+    """A gait between two gaits; everywhere that phases are read it stands for a :class:`Gait`.
+
+    Attributes
+    ----------
+    transition : GaitTransition
+        From where to where.
+    share : float
+        s in [0, 1].
+    rate : float
+        ṡ ≥ 0 [1/s].
+    cadence_scale : float
+        Factor on the cadences of both gaits.
+
+    Raises
+    ------
+    ParameterError
+        If the share or the rate is impossible.
+    """
+
+    transition: GaitTransition
+    share: float
+    rate: float
+    cadence_scale: float = 1.0
+    weight: float = field(init=False, repr=False, compare=False)
+    turning: float = field(init=False, repr=False, compare=False)
+    rest: float = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Validate and blend; ``turning`` is 2π dw/dt, the rate of an arc of one cycle [rad/s]."""
+        s = self.share
+        if not (0.0 <= s <= 1.0 and 0.0 <= self.rate < float('inf')):
+            raise ParameterError(
+                f'a blend needs a share in [0, 1] and a rate that is not negative, not {s!r} and '
+                f'{self.rate!r}'
+            )
+        transition, weight = self.transition, s * s * (3.0 - 2.0 * s)
+        object.__setattr__(self, 'weight', weight)
+        object.__setattr__(self, 'turning', 2.0 * np.pi * 6.0 * s * (1.0 - s) * self.rate)
+        object.__setattr__(self, 'rest', transition.before.rest + weight * transition.rest_arc)
+
+    @property
+    def name(self) -> str:
+        """Both names, as ``amble>trot``."""
+        return f'{self.transition.before.name}>{self.transition.after.name}'
+
+    @property
+    def word(self) -> str:
+        """Text that :class:`~dmp_cpg_ros.core.gait.gait_reader.GaitReader` reads back to the same
+        blend.
+        """
+        return gait_word(f'{self.name} {self.share!r} {self.rate!r}', self.cadence_scale)
+
+    def scaled(self, cadence_scale: float) -> BlendedGait:
+        """Return this blend with this factor on its cadences."""
+        return replace(self, cadence_scale=cadence_scale)
+
+    @property
+    def phases(self) -> Array:
+        """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
+        transition = self.transition
+        return transition.before.phases + (2.0 * np.pi * self.weight) * transition.offset_arcs
+
+    @property
+    def rest_rate(self) -> float:
+        """Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]."""
+        return self.turning * self.transition.rest_arc
+
+    @property
+    def highest_speed(self) -> float:
+        """Dimensionless foot speed that is not exceeded."""
+        before, after = self.transition.before, self.transition.after
+        return blended_limit(before.highest_speed, after.highest_speed, self.weight)
+
+    def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
+        """Velocity that the blend does of one that is asked for, as :meth:`Gait.limited`."""
+        return limited(velocity, scale, self.highest_speed)
+
+    def omega(self, foot_speed: float, scale: BodyScale) -> float:
+        """Angular frequency ω at a foot speed, as :meth:`Gait.omega` [rad/s]."""
+        foot_speed = min(foot_speed, scale.speed(self.highest_speed))
+        return self.cadence_scale * self._blended(
+            self.transition.before.omega(foot_speed, scale),
+            self.transition.after.omega(foot_speed, scale),
+        )
+
+    def duty(self, foot_speed: float, scale: BodyScale) -> float:
+        """Duty factor β at a foot speed, as :meth:`Gait.duty`."""
+        foot_speed = min(foot_speed, scale.speed(self.highest_speed))
+        return self._blended(
+            self.transition.before.duty(foot_speed, scale),
+            self.transition.after.duty(foot_speed, scale),
+        )
+
+    def own_omega(self, leg: int, omega: float) -> float:
+        """Frequency with which one leg goes through its cycle when the gait's is ω [rad/s]."""
+        return omega + self.turning * float(self.transition.arcs[leg])
+
+    def own_omegas(self, omega: float) -> list[float]:
+        """As :meth:`own_omega` of all legs [rad/s]."""
+        return [omega + self.turning * arc for arc in self.transition.arcs.tolist()]
+
+    def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
+        """How the body is planned to rise and fall, as :meth:`Gait.bounce`."""
+        before, after = self.transition.before, self.transition.after
+        return before.bounce(cycle_position, duty, omega).mixed(
+            after.bounce(cycle_position, duty, omega), self.weight)
+
+    def scalar_cycle_position(self, phi: float) -> float:
+        """As :meth:`cycle_position` for one leg, without arrays."""
+        return (phi / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
+
+    def cycle_position(self, phi: Array | float) -> Array:
+        """Where legs are in their cycle, as :meth:`Gait.cycle_position`."""
+        return (np.asarray(phi) / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
+
+    def _blended(self, before: float, after: float) -> float:
+        return before + self.weight * (after - before)
+
+
+GaitInForce = Gait | BlendedGait
+"""What phases are read in."""

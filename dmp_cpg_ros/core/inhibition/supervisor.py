@@ -1,0 +1,313 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Stopping and starting the gait: requests in, the next tick's inhibition and its state word out.
+
+- ``free``, ``walking``: uninhibited, or slowed by votes that do not stop it; walking once the legs
+  are in their places and the reference moves.
+- ``waiting``: a stop is requested; the reference slows, then inhibition is armed until x enters C.
+- ``captured``: inhibition holds an oscillator and the others follow.
+- ``at_rest``: oscillators, reference and swings have come to rest.
+- ``releasing``: a start is requested; the oscillators run up until they are phase-locked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
+from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, Ballot
+from dmp_cpg_ros.core.inhibition.voting_parameters import SUM
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.transformation.swing_activity import activities_step
+from dmp_cpg_ros.core.updated import updated
+
+Array = NDArray[np.float64]
+
+STATE_WORDS = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing')
+"""What ``inhibition_state`` can say."""
+
+FALLEN_MODES = ('damped', 'recovering')
+"""Modes of the body after which only the service starts the gait again."""
+
+REST_ACTIVITY = 0.02
+"""Swing activity below which a leg is at rest: its foot is below 2 % of its clearance."""
+
+REST_SPEED = 0.01
+"""Reference foot speed below which the reference is at rest [m/s]."""
+
+REST_PHASE_RATE = 0.05
+"""Phase rate below which an oscillator is at rest [rad/s]."""
+
+LOCKED_PHASE_ERROR = 0.05
+"""Phase error below which the legs count as being in their places [rad]."""
+
+LOCKED_ACTIVITY = 0.95
+"""Swing activity above which a leg swings at its height."""
+
+
+@dataclass(frozen=True)
+class SupervisorState:
+    """State of the supervisor after a tick.
+
+    Attributes
+    ----------
+    time_ns : int
+        Stamp of the tick [ns].
+    word : str
+        One of ``STATE_WORDS``.
+    requested : bool
+        Whether a stop is requested: asked for, or voted.
+    automatic : bool
+        Whether the stop was asked for by ``auto_inhibit`` (or by starting at rest) and not by a
+        service call.
+    request_ns : int
+        Stamp at which the present stop or start was requested [ns].
+    armed : bool
+        Whether the inhibition's gains are on.
+    activity : ndarray (4,)
+        Swing activity of the legs.
+    measured_s : float
+        Time from the request to rest or to phase lock [s]; NaN until then.
+    idle_ns : int
+        Stamp since which the command has been zero [ns]; −1 while it is not.
+    asked : bool
+        Whether the service or ``auto_inhibit`` asks for the stop.
+    voted : bool
+        Whether votes have overcome the threshold and hold the stop.
+    vote_gains : ndarray (4,)
+        Largest gains of the votes since then [1/s]: what holds the gait does not fade.
+    ballot : Ballot
+        Votes of this tick.
+    """
+
+    time_ns: int
+    word: str
+    requested: bool
+    automatic: bool
+    request_ns: int
+    armed: bool
+    activity: Array
+    measured_s: float = float('nan')
+    idle_ns: int = -1
+    asked: bool = False
+    voted: bool = False
+    vote_gains: Array = field(default_factory=lambda: np.zeros(len(LEGS)))
+    ballot: Ballot = NO_VOTES
+
+
+class GaitSupervisor:
+    """The state machine; state in, state out.
+
+    Parameters
+    ----------
+    parameters : InhibitionParameters
+        Gains, region, legs, automatic stop.
+    network : GaitNetwork
+        The oscillators that are watched.
+    activity_rate : float
+        Rate of the legs' swing activity [1/s].
+    """
+
+    def __init__(
+        self, parameters: InhibitionParameters, network: GaitNetwork, activity_rate: float
+    ) -> None:
+        """Keep the parts."""
+        self.parameters, self.network, self.activity_rate = parameters, network, activity_rate
+
+    def on(self, network: GaitNetwork) -> GaitSupervisor:
+        """Return a supervisor of another network with the same parameters."""
+        if network is self.network:
+            return self
+        return GaitSupervisor(self.parameters, network, self.activity_rate)
+
+    def initial_state(self, time_ns: int = 0) -> SupervisorState:
+        """At rest, or free when ``start_inhibited`` is false."""
+        stopped = self.parameters.start_inhibited
+        return SupervisorState(
+            time_ns,
+            'at_rest' if stopped else 'free',
+            stopped,
+            True,
+            time_ns,
+            stopped,
+            np.zeros(4) if stopped else np.ones(4),
+            measured_s=0.0,
+            asked=stopped,
+        )
+
+    def inhibition(self, state: SupervisorState) -> Inhibition:
+        """Inhibition that the canonical system applies at the tick after ``state``.
+
+        Votes that do not stop the gait act weakly while it walks. In a stop the larger acts on
+        each leg of what was asked for and what was voted, once the reference is slow.
+        """
+        gains = self._gains(state, state.armed)
+        at_rest = state.word == 'at_rest'
+        return Inhibition(state.requested, gains, self.parameters.region_radius, at_rest)
+
+    def _gains(self, state: SupervisorState, armed: bool) -> Array:
+        if not state.requested:
+            return state.ballot.gains
+        gains = self.parameters.armed_gains if armed and state.asked else np.zeros(len(LEGS))
+        return np.maximum(gains, state.vote_gains) if armed and state.voted else gains
+
+    def request(
+        self, state: SupervisorState, stop: bool, automatic: bool = False
+    ) -> SupervisorState:
+        """Ask for a stop or a start; asking for what is already asked changes nothing but its
+        origin.
+
+        A service call that asks for a start ends a stop by votes too, once nobody votes any more.
+        """
+        voted = state.voted and (stop or automatic or state.ballot.alive)
+        return self._turned(updated(state, asked=stop, automatic=automatic, voted=voted))
+
+    def step(
+        self,
+        state: SupervisorState,
+        time_ns: int,
+        x: Array,
+        x_dot: Array,
+        r: Array,
+        command: tuple[float, float, float],
+        ballot: Ballot | None = None,
+        body_mode: str = 'standing',
+    ) -> SupervisorState:
+        """Advance by one tick.
+
+        Parameters
+        ----------
+        state : SupervisorState
+            State after the last tick, requests included.
+        time_ns : int
+            Stamp of this tick [ns].
+        x, x_dot : ndarray (4, 2)
+            Canonical states and rates of this tick.
+        r : ndarray (3,)
+            Reference of this tick.
+        command : tuple of float
+            External command (v_x, v_y, γ) that acts at this tick.
+        ballot : Ballot, optional
+            Votes of this tick; those of the tick before without.
+        body_mode : str
+            What the body does; in every mode but ``standing`` the gait is stopped.
+
+        Returns
+        -------
+        SupervisorState
+        """
+        dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
+        gait, rates = self.network.gait, scalar_phase_rates(x, x_dot)
+        speed = self.network.scale.foot_speed(*r.tolist())
+        omega, more = gait.omega(speed, self.network.scale), gait.rest_rate
+        activity = activities_step(
+            state.activity,
+            [rate + more for rate in rates],
+            gait.own_omegas(omega),
+            self.activity_rate,
+            dt,
+        )
+        state = updated(state, time_ns=time_ns, activity=activity)
+        if body_mode == 'standing':
+            state = self._automatic(state, command)
+        else:
+            state = self._barred(state, body_mode)
+        state = self._voted(state, ballot or state.ballot)
+        if state.requested:
+            return self._stopping(state, x, rates, speed)
+        return self._running(state, x, speed)
+
+    def _automatic(
+        self, state: SupervisorState, command: tuple[float, float, float]
+    ) -> SupervisorState:
+        """Stop after a time of zero command, and start at a command, when ``auto_inhibit`` is
+        on.
+        """
+        if not self.parameters.auto_inhibit:
+            return state
+        if any(command):
+            if state.idle_ns >= 0:
+                state = updated(state, idle_ns=-1)
+            return self.request(state, False, True) if state.asked and state.automatic else state
+        if state.idle_ns < 0:
+            state = updated(state, idle_ns=state.time_ns)
+        waited = (state.time_ns - state.idle_ns) * 1e-9
+        if not state.asked and waited >= self.parameters.auto_delay:
+            return self.request(state, True, True)
+        return state
+
+    def _voted(self, state: SupervisorState, ballot: Ballot) -> SupervisorState:
+        """Stop when votes overcome the threshold; keep what holds until it is released."""
+        if ballot is not state.ballot:
+            state = updated(state, ballot=ballot)
+        if ballot.stops and not state.voted:
+            return self._turned(updated(state, voted=True, vote_gains=ballot.gains))
+        if not state.voted:
+            return state
+        if not ballot.alive and self.parameters.vote_resume:
+            return self._turned(updated(state, voted=False))
+        if self.parameters.vote_rule == SUM and np.any(ballot.gains > state.vote_gains):
+            return updated(state, vote_gains=np.maximum(ballot.gains, state.vote_gains))
+        return state
+
+    @staticmethod
+    def _turned(state: SupervisorState) -> SupervisorState:
+        """Begin a stop or a start when what is wanted has changed."""
+        stop = state.asked or state.voted
+        if stop == state.requested:
+            return state
+        return updated(
+            state,
+            word='waiting' if stop else 'releasing',
+            requested=stop,
+            request_ns=state.time_ns,
+            armed=False,
+            measured_s=float('nan'),
+            idle_ns=-1,
+        )
+
+    def _barred(self, state: SupervisorState, body_mode: str) -> SupervisorState:
+        """Stop because the robot does not stand; after a fall no command starts it again."""
+        automatic = body_mode not in FALLEN_MODES
+        if not state.asked:
+            return self.request(state, True, automatic)
+        return updated(state, automatic=state.automatic and automatic, idle_ns=-1)
+
+    def _stopping(
+        self, state: SupervisorState, x: Array, rates: list[float], speed: float
+    ) -> SupervisorState:
+        armed = state.armed or speed <= self.parameters.capture_speed
+        inhibition = Inhibition(True, self._gains(state, armed), self.parameters.region_radius)
+        if not any(inhibition.acting_gains(x, self.network.target).tolist()):
+            return updated(state, armed=armed, word='waiting')
+        if (
+            max(map(abs, rates)) > REST_PHASE_RATE
+            or speed > REST_SPEED
+            or max(state.activity.tolist()) > REST_ACTIVITY
+        ):
+            return updated(state, armed=armed, word='captured')
+        return updated(state, armed=armed, word='at_rest', measured_s=self._measured(state))
+
+    def _running(self, state: SupervisorState, x: Array, speed: float) -> SupervisorState:
+        errors = self.network.phase_errors(x).tolist()
+        locked = max(map(abs, errors)) <= LOCKED_PHASE_ERROR
+        swinging = min(state.activity.tolist())
+        if state.word == 'releasing' and not (locked and swinging >= LOCKED_ACTIVITY):
+            return state
+        word, measured_s = 'walking' if locked and speed > REST_SPEED else 'free', state.measured_s
+        if word == state.word and isfinite(measured_s):
+            return state
+        return updated(state, word=word, measured_s=self._measured(state))
+
+    @staticmethod
+    def _measured(state: SupervisorState) -> float:
+        """Time from the request to now, kept once it has been set [s]."""
+        if isfinite(state.measured_s):
+            return state.measured_s
+        return (state.time_ns - state.request_ns) * 1e-9

@@ -1,0 +1,244 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Standing up, lying down, falling and getting up again: one state machine on the robot's clock.
+
+- ``standing``: the gait may run.
+- ``stopping``: it is to lie down; the gait is inhibited, and lying down begins once it rests.
+- ``lowering``, ``rising``: movements to ``lying`` and back to ``standing``.
+- ``damped``: it fell; the joints are held by damping alone until somebody asks for ``recover``.
+- ``recovering``: it rolls onto its belly, as often as it takes, and then rises.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from dmp_cpg_ros.core.modes.body_command import BALANCED, BodyCommand
+from dmp_cpg_ros.core.modes.body_condition import BodyCondition
+from dmp_cpg_ros.core.modes.fall_detection import FallDetector, FallParameters, FallState
+from dmp_cpg_ros.core.modes.motion import phase_at
+from dmp_cpg_ros.core.modes.movements import SIDES, Movements
+from dmp_cpg_ros.core.parameters import parameter
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.updated import updated
+
+UPRIGHT_TILT = 0.5
+"""Tilt up to which a robot on the ground can rise without rolling over [rad]."""
+
+ON_ITS_BACK = 0.5
+"""Share of gravity along the base's z from which it lies on its back, not on its side."""
+
+RISEN_HEIGHT = 0.8
+"""Share of the standing height from which it has risen."""
+
+RISING_PATIENCE = 6.0
+"""Time after the end of rising until it must have risen, in √(l/g)."""
+
+STOPPING_PATIENCE_S = 15.0
+"""How long the gait may take to come to rest before lying down is given up [s]."""
+
+
+@dataclass(frozen=True)
+class ModeParameters(FallParameters):
+    """How the robot begins, when it has fallen, how often it tries to get up."""
+
+    start_mode: str = parameter(
+        'standing', 'what the robot does at the start', choices=('standing', 'lying', 'damped')
+    )
+    recovery_tries: int = parameter(
+        5, 'how often it tries to roll onto its belly', minimum=1, maximum=100
+    )
+
+
+@dataclass(frozen=True)
+class ModeState:
+    """State of the machine after a tick.
+
+    Attributes
+    ----------
+    time_ns : int
+        Stamp [ns].
+    mode : str
+        See the module's text.
+    movements : tuple of str
+        Movements to come, the present one first.
+    count : int
+        Movements begun so far.
+    begun_ns : int
+        Stamp at which the present movement (or mode, where there is none) began [ns].
+    tries : int
+        Attempts to roll over since recovery was asked for.
+    reason : str
+        Why it is in this mode, for people.
+    condition : BodyCondition or None
+        As last measured.
+    fall : FallState
+        Of the detector.
+    """
+
+    time_ns: int
+    mode: str
+    movements: tuple[str, ...] = ()
+    count: int = 0
+    begun_ns: int = 0
+    tries: int = 0
+    reason: str = ''
+    condition: BodyCondition | None = None
+    fall: FallState = field(default_factory=FallState)
+
+
+class BodyModes:
+    """The state machine of one robot; state in, state out.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        The robot.
+    parameters : ModeParameters
+        Start, fall detection, tries.
+    """
+
+    def __init__(self, description: RobotDescription, parameters: ModeParameters) -> None:
+        """Derive the movements and their durations."""
+        self.movements = Movements(description)
+        self._stance_height = description.stance_height
+        self._detector = FallDetector(parameters, description.stance_height)
+        self.parameters = parameters
+
+    def initial_state(self) -> ModeState:
+        """State at the start."""
+        return ModeState(0, self.parameters.start_mode, reason='as started')
+
+    def command(self, state: ModeState) -> BodyCommand:
+        """What the legs have to do at the tick of a state."""
+        if not state.movements:
+            return BodyCommand(state.mode)
+        share = self._share(state)
+        return BodyCommand(state.mode, state.movements[0], state.count, phase_at(share))
+
+    def carried(self, state: ModeState) -> float:
+        """Share of the weight that the legs are to carry by feed-forward in a movement."""
+        if not state.movements:
+            return 0.0
+        begin, end = self.movements.named(state.movements[0]).support
+        share = min(self._share(state), 1.0)
+        rest = (1.0 - share) if begin > end else share
+        return max(begin, end) * min(rest / 0.3, 1.0)
+
+    def step(
+        self, state: ModeState, condition: BodyCondition, time_ns: int, at_rest: bool
+    ) -> ModeState:
+        """Advance by one tick.
+
+        Parameters
+        ----------
+        state : ModeState
+            State after the last tick, requests included.
+        condition : BodyCondition
+            Measured at this tick.
+        time_ns : int
+            Stamp of this tick [ns].
+        at_rest : bool
+            Whether the gait rests: phases, reference and swings.
+
+        Returns
+        -------
+        ModeState
+        """
+        begun = time_ns if state.begun_ns < 0 else state.begun_ns
+        fall, sign = state.fall, ''
+        if state.mode not in ('damped', 'recovering'):
+            fall, sign = self._detector.step(fall, condition, time_ns, state.mode in BALANCED)
+        state = updated(state, time_ns=time_ns, condition=condition, begun_ns=begun, fall=fall)
+        if sign:
+            return self._fallen(state, f'fell at {time_ns * 1e-9:.3f} s: {sign}')
+        if state.mode == 'stopping':
+            return self._stopped(state, at_rest)
+        if state.movements and self._elapsed(state) >= self._time_of(state.movements[0]):
+            return self._moved(state)
+        return state
+
+    def _stopped(self, state: ModeState, at_rest: bool) -> ModeState:
+        if at_rest:
+            return self._enter_now(state, 'lowering', ('lower',), state.reason)
+        if self._elapsed(state) > STOPPING_PATIENCE_S:
+            return self._enter_now(
+                state, 'standing', (),
+                f'lying down was given up: the gait did not rest within {STOPPING_PATIENCE_S:g} s',
+            )
+        return state
+
+    def _moved(self, state: ModeState) -> ModeState:
+        """Go on after a movement."""
+        assert state.condition is not None
+        following = state.movements[1:]
+        if following:
+            return self._enter_now(state, state.mode, following, state.reason)
+        if state.mode == 'lowering':
+            return self._enter_now(state, 'lying', (), state.reason)
+        if state.mode == 'recovering':
+            return self._rolled(state, state.condition)
+        if state.condition.height >= RISEN_HEIGHT * self._stance_height:
+            return self._enter_now(state, 'standing', (), 'risen')
+        if self._elapsed(state) < self._time_of('rise') + RISING_PATIENCE * self._unit:
+            return state
+        return self._fallen(
+            state, f'did not rise by {state.time_ns * 1e-9:.3f} s: {state.condition.height:.3f} m '
+            f'over its feet, less than {RISEN_HEIGHT:g} of {self._stance_height:.3f} m'
+        )
+
+    def _rolled(self, state: ModeState, condition: BodyCondition) -> ModeState:
+        """Rise when the belly is down; else roll, or give up."""
+        if condition.tilt <= UPRIGHT_TILT:
+            return self._enter_now(state, 'rising', ('fold', 'rise'), state.reason)
+        if state.tries >= self.parameters.recovery_tries:
+            return self._fallen(
+                state, f'still tilted by {condition.tilt:.2f} rad after {state.tries} tries'
+            )
+        rolls = (*self.rolls(condition), 'tuck')
+        return replace(
+            self._enter_now(state, 'recovering', rolls, state.reason), tries=state.tries + 1
+        )
+
+    @staticmethod
+    def rolls(condition: BodyCondition) -> tuple[str, ...]:
+        """Movements that bring the belly down from how it lies."""
+        if condition.tilt <= UPRIGHT_TILT:
+            return ()
+        side = SIDES[0] if condition.down_in_base[1] > 0.0 else SIDES[1]
+        on_its_back = condition.down_in_base[2] > ON_ITS_BACK
+        names = ('turn', 'tip', 'over') if on_its_back else ('push', 'over')
+        return tuple(f'{name}_{side}' for name in names)
+
+    # Inside ------------------------------------------------------------------------------------
+
+    def _fallen(self, state: ModeState, reason: str) -> ModeState:
+        return replace(self._enter_now(state, 'damped', (), reason), fall=FallState())
+
+    def enter(
+        self, state: ModeState, mode: str, movements: tuple[str, ...], reason: str
+    ) -> ModeState:
+        """Enter a mode at the next tick, whose stamp is not known yet."""
+        return replace(
+            state, mode=mode, movements=movements, reason=reason, begun_ns=-1,
+            count=state.count + bool(movements), fall=FallState(),
+        )
+
+    def _enter_now(
+        self, state: ModeState, mode: str, movements: tuple[str, ...], reason: str
+    ) -> ModeState:
+        return replace(self.enter(state, mode, movements, reason), begun_ns=state.time_ns)
+
+    @property
+    def _unit(self) -> float:
+        return self.movements.time_unit
+
+    def _elapsed(self, state: ModeState) -> float:
+        return max(state.time_ns - state.begun_ns, 0) * 1e-9 if state.begun_ns >= 0 else 0.0
+
+    def _share(self, state: ModeState) -> float:
+        """Time since the present movement began, as a share of its duration."""
+        return self._elapsed(state) / self.movements.named(state.movements[0]).duration
+
+    def _time_of(self, movement: str) -> float:
+        return self.movements.named(movement).duration + self.movements.pause

@@ -1,0 +1,171 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The reference system: commanded speed and turn rate through first-order filters (paper,
+Section 5).
+
+v̇ = α_r (v_ext − v),   γ̇ = α_r (γ_ext − γ)
+
+|v̇| is limited, for no foot can push the body harder; but not where the filter brakes no harder
+than it would for v_ext = 0, so that stops are those of the plain filter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.gait.gait import BodyScale, limited
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ReferenceParameters(Parameters):
+    """Parameters of the reference system."""
+
+    alpha_r: float = parameter(
+        3.0, 'rate of the reference filters', unit='1/s', minimum=0.05, maximum=50.0
+    )
+    max_speed: float = parameter(
+        3.5, 'largest forward speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
+    )
+    max_lateral_speed: float = parameter(
+        0.6, 'largest sideways speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
+    )
+    max_turn_rate: float = parameter(
+        2.2, 'largest turn rate that is accepted', unit='rad/s', minimum=0.0, maximum=10.0
+    )
+    max_curve: float = parameter(
+        0.3,
+        'largest acceleration towards the centre of a curve, at low speed',
+        unit='g',
+        minimum=0.01,
+        maximum=10.0,
+    )
+    max_acceleration: float = parameter(
+        4.0,
+        'largest acceleration of the reference, other than in braking to rest',
+        unit='m/s^2',
+        minimum=0.1,
+        maximum=1e3,
+    )
+    cmd_vel_timeout: float = parameter(
+        0.5,
+        'silence of cmd_vel after which the command is zero; 0: never',
+        unit='s',
+        minimum=0.0,
+        maximum=3600.0,
+    )
+
+
+class CommandGate:
+    """The external command r_ext: checked, limited, and zero when its source falls silent or
+    the gait is stopped.
+
+    Parameters
+    ----------
+    parameters : ReferenceParameters
+        Limits and timeout.
+    scale : BodyScale, optional
+        The robot's lengths, for the limits of the gait and of curves.
+
+    Attributes
+    ----------
+    highest_speed : float
+        Dimensionless foot speed of the gait that is wanted, see
+        :func:`~dmp_cpg_ros.core.gait.choice.highest_speed`; infinite at the start.
+    """
+
+    def __init__(
+        self, parameters: ReferenceParameters, scale: BodyScale | None = None
+    ) -> None:
+        """Start with a zero command."""
+        self.parameters, self.highest_speed, self._scale = parameters, inf, scale
+        self._command: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        self._received_ns: int | None = None
+        self._fresh = False
+
+    def accept(self, v_x: float, v_y: float, gamma: float) -> None:
+        """Take a new command; it acts from the next :meth:`at` on.
+
+        Parameters
+        ----------
+        v_x, v_y, gamma : float
+            Forward and sideways speed [m/s], turn rate [rad/s]; limited to the parameters' ranges.
+
+        Raises
+        ------
+        DataError
+            If a value is not finite; the former command stays.
+        """
+        if not np.all(np.isfinite((v_x, v_y, gamma))):
+            raise DataError(
+                f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite'
+            )
+        p = self.parameters
+        self._command = (
+            _limited(v_x, p.max_speed),
+            _limited(v_y, p.max_lateral_speed),
+            _limited(gamma, p.max_turn_rate),
+        )
+        self._fresh = True
+
+    def at(self, time_ns: int) -> tuple[float, float, float]:
+        """Command that acts at a time on the robot's clock [ns]: (v_x, v_y, γ)."""
+        if self._fresh:
+            self._fresh, self._received_ns = False, time_ns
+        if self._received_ns is None:
+            return 0.0, 0.0, 0.0
+        if time_ns < self._received_ns:
+            self._received_ns = time_ns
+        timeout = self.parameters.cmd_vel_timeout
+        if timeout > 0.0 and (time_ns - self._received_ns) * 1e-9 > timeout:
+            return 0.0, 0.0, 0.0
+        if self._scale is None:
+            return self._command
+        return limited(
+            self._command, self._scale, self.highest_speed, self.parameters.max_curve)
+
+
+class ReferenceSystem:
+    """First-order filters on v_x, v_y and γ, integrated exactly for a command that is held."""
+
+    def __init__(self, parameters: ReferenceParameters) -> None:
+        """Keep the parameters."""
+        self.parameters = parameters
+
+    def step(self, r: Array, r_ext: Array, dt: float) -> Array:
+        """Advance: r(t + dt) = r_ext + (r − r_ext) exp(−α_r dt), less where v changes too fast.
+
+        Parameters
+        ----------
+        r : ndarray (3,)
+            v_x, v_y [m/s], γ [rad/s].
+        r_ext : ndarray (3,)
+            External command, held during the step.
+        dt : float
+            [s]
+
+        Returns
+        -------
+        ndarray (3,)
+        """
+        kept = np.exp(-self.parameters.alpha_r * dt)
+        following = r_ext + (r - r_ext) * kept
+        change, most = following[:2] - r[:2], self.parameters.max_acceleration * dt
+        if change @ change <= most * most:
+            return following
+        if following[:2] @ following[:2] <= r[:2] @ r[:2]:
+            most = max(most, (1.0 - kept) * float(np.sqrt(r[:2] @ r[:2])))
+        if change @ change > most * most * (1.0 + 1e-12):
+            following[:2] = r[:2] + change * (most / float(np.sqrt(change @ change)))
+        return following
+
+
+def _limited(value: float, limit: float) -> float:
+    return min(max(float(value), -limit), limit)

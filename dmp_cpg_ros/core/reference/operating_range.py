@@ -1,0 +1,89 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The range in which a gait operates: speeds and cadences that its reference's limits allow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.transition import BlendedGait
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class OperatingRange:
+    """Extremes over everything that can be commanded.
+
+    Attributes
+    ----------
+    foot_speed : float
+        Largest foot speed [m/s].
+    armed_speed : float
+        Largest foot speed while inhibition is armed during a stop [m/s].
+    omega : tuple of float
+        Smallest and largest ω over all speeds [rad/s].
+    omega_armed : tuple of float
+        The same over the speeds at which inhibition is armed [rad/s].
+    omega_at_rest : float
+        ω at zero reference [rad/s].
+    omega_slope : float
+        Largest |dω/du| over the speeds at which inhibition is armed [rad/m].
+    """
+
+    foot_speed: float
+    armed_speed: float
+    omega: tuple[float, float]
+    omega_armed: tuple[float, float]
+    omega_at_rest: float
+    omega_slope: float
+
+
+def operating_range(network: GaitNetwork, inhibition: InhibitionParameters,
+                    reference: ReferenceParameters) -> OperatingRange:
+    """Extremes of speed and cadence.
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        Gait and scale.
+    inhibition : InhibitionParameters
+        For the speed at which inhibition is armed.
+    reference : ReferenceParameters
+        Limits of the commands.
+
+    Returns
+    -------
+    OperatingRange
+    """
+    fastest = network.scale.foot_speed(reference.max_speed, reference.max_lateral_speed,
+                                       reference.max_turn_rate)
+    armed = min(fastest, inhibition.capture_speed)
+    speeds, omegas = _cadences(network, armed)
+    slopes = np.abs(np.diff(omegas) / np.maximum(np.diff(speeds), 1e-12))
+    return OperatingRange(fastest, armed, _extremes(_cadences(network, fastest)[1]),
+                          _extremes(omegas), network.gait.omega(0.0, network.scale),
+                          float(slopes.max(initial=0.0)))
+
+
+def _cadences(network: GaitNetwork, largest: float) -> tuple[Array, Array]:
+    """Speeds from 0 to the largest between which ω is linear, and ω there."""
+    gait = network.gait
+    ends = [gait.transition.before, gait.transition.after] if isinstance(
+        gait, BlendedGait) else [gait]
+    knots = np.concatenate([end.speed for end in ends]) * float(
+        np.sqrt(GRAVITY * network.scale.leg_length))
+    between = knots[(knots > 0.0) & (knots < largest)]
+    speeds = np.unique(np.concatenate([[0.0], between, [largest]]))
+    return speeds, np.array([network.gait.omega(float(u), network.scale) for u in speeds])
+
+
+def _extremes(values: Array) -> tuple[float, float]:
+    return float(values.min()), float(values.max())

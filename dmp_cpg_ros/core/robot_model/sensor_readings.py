@@ -1,0 +1,90 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the sensors of one tick say, and what of it can be used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isnan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, RobotState
+
+Array = NDArray[np.float64]
+
+FASTEST_TURN, HARDEST_BLOW = 100.0, 1000.0
+"""Readings beyond these are no readings of a walking robot's IMU [rad/s], [m/s^2]."""
+
+FASTEST_JOINT, LARGEST_FORCE = 200.0, 1e5
+"""Readings beyond these are faults of joint and contact sensors [rad/s], [N]."""
+
+_ALL_LEGS = (True,) * len(LEGS)
+_FIRST_JOINT = range(0, len(JOINT_NAMES), len(JOINTS_OF_LEG))
+
+
+@dataclass(frozen=True)
+class SensorReadings:
+    """What the sensors of one tick say; NaN marks what is missing.
+
+    Attributes
+    ----------
+    time_ns : int
+        Stamp [ns].
+    joint_position, joint_velocity, joint_effort : ndarray (12,)
+        [rad], [rad/s], [N m] in the order of ``JOINT_NAMES``.
+    rate_in_base, specific_force_in_base : ndarray (3,)
+        Gyroscope [rad/s] and accelerometer [m/s^2] at the origin of ``base_link``.
+    foot_force : ndarray (4,)
+        Normal force of each foot [N].
+    """
+
+    time_ns: int
+    joint_position: Array
+    joint_velocity: Array
+    joint_effort: Array
+    rate_in_base: Array
+    specific_force_in_base: Array
+    foot_force: Array
+
+    @property
+    def imu_is_usable(self) -> bool:
+        """Whether gyroscope and accelerometer both say something possible."""
+        return _within(self.rate_in_base.tolist(), FASTEST_TURN) and _within(
+            self.specific_force_in_base.tolist(), HARDEST_BLOW)
+
+    @property
+    def usable_legs(self) -> tuple[bool, ...]:
+        """Whether angles and velocities of each leg's joints are possible."""
+        q, q_dot = self.joint_position.tolist(), self.joint_velocity.tolist()
+        if _within(q, FASTEST_JOINT) and _within(q_dot, FASTEST_JOINT):
+            return _ALL_LEGS
+        return tuple(
+            _within(q[i : i + 3], FASTEST_JOINT) and _within(q_dot[i : i + 3], FASTEST_JOINT)
+            for i in _FIRST_JOINT
+        )
+
+    @property
+    def usable_contacts(self) -> tuple[bool, ...]:
+        """Whether each foot's force is possible."""
+        limit = LARGEST_FORCE
+        return tuple(-limit <= force <= limit for force in self.foot_force.tolist())
+
+
+def _within(values: list[float], limit: float) -> bool:
+    """Whether no value is beyond a limit, and none is NaN, which makes the sum NaN."""
+    return max(values) <= limit and min(values) >= -limit and not isnan(sum(values))
+
+
+def readings_of(state: RobotState) -> SensorReadings:
+    """Sensors' part of a robot's state; its ground truth stays behind."""
+    return SensorReadings(
+        state.time_ns,
+        state.joint_position,
+        state.joint_velocity,
+        state.joint_effort,
+        state.measured_rate_in_base,
+        state.acceleration_in_base,
+        state.foot_force,
+    )

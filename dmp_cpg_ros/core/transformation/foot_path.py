@@ -1,0 +1,182 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The path of a foot over one cycle, as a function of the oscillator's phase and the reference.
+
+In stance the foot stays where it is in the world while the base moves with (v, γ), so in the base
+frame it follows ṗ = −v − γ ẑ × p exactly, turning included. A round foot rolls while it stands:
+its centre needs only the share ``rolling`` of the way that the contact point makes
+(:func:`rolling_share`). In swing a cubic Hermite curve carries it back with matching velocities at
+both ends, lifted by :func:`swing_height`. The whole path is C¹ in the phase.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.maths.vec3 import Triple
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+
+Array = NDArray[np.float64]
+
+LIFTING, LOWERING = 0.35, 0.5
+"""Shares of the swing in which the foot rises and comes down. It rises sooner, so that it is clear
+of the ground before it is moved along it.
+"""
+
+
+@dataclass(frozen=True)
+class FootPath:
+    """Path of one foot for a held reference.
+
+    Attributes
+    ----------
+    foothold_in_base : sequence of three floats
+        Where the foot is at mid-stance [m].
+    v_x, v_y, gamma : float
+        Reference velocity of the base [m/s], [rad/s].
+    omega : float
+        Angular frequency of the oscillator on its limit cycle [rad/s].
+    duty : float
+        Duty factor β in (0, 1).
+    clearance : float
+        Height of the swing [m].
+    rolling : tuple of float
+        Share of the stance displacement, along x and y, that the foot's centre makes.
+    """
+
+    foothold_in_base: Sequence[float]
+    v_x: float
+    v_y: float
+    gamma: float
+    omega: float
+    duty: float
+    clearance: float
+    rolling: tuple[float, float] = (1.0, 1.0)
+
+    def at(self, cycle_position: float) -> tuple[Triple, Triple]:
+        """Foot position and its derivative with respect to the cycle position.
+
+        Parameters
+        ----------
+        cycle_position : float
+            0 at mid-swing, ±1/2 at mid-stance, in [−1/2, 1/2].
+
+        Returns
+        -------
+        position_in_base : tuple of float
+            [m]
+        slope : tuple of float
+            ∂p/∂c [m per cycle]; the velocity is slope · φ̇ / 2π.
+        """
+        period, swing = 6.283185307179586 / self.omega, 1.0 - self.duty
+        height = self.foothold_in_base[2]
+        if abs(cycle_position) >= 0.5 * swing:
+            from_mid_stance = (
+                cycle_position - 0.5 if cycle_position > 0.0 else cycle_position + 0.5
+            )
+            x, y, x_dot, y_dot = self._stance(from_mid_stance * period)
+            return (x, y, height), (x_dot * period, y_dot * period, 0.0)
+        half_stance = 0.5 * self.duty * period
+        x0, y0, dx0, dy0 = self._stance(half_stance)
+        x1, y1, dx1, dy1 = self._stance(-half_stance)
+        s, scale = cycle_position / swing + 0.5, swing * period
+        x, x_slope = _hermite(s, x0, x1, dx0 * scale, dx1 * scale)
+        y, y_slope = _hermite(s, y0, y1, dy0 * scale, dy1 * scale)
+        bump, bump_slope = swing_height(s)
+        return (
+            (x, y, height + self.clearance * bump),
+            (x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing),
+        )
+
+    def swung(self, cycle_position: float) -> float:
+        """Share of the swing that has passed; outside of [0, 1] in stance."""
+        return cycle_position / (1.0 - self.duty) + 0.5
+
+    def _stance(self, t: float) -> tuple[float, float, float, float]:
+        """Planar position and velocity of a foot that stands, t seconds after mid-stance."""
+        angle = self.gamma * t
+        s, c = sin(angle), cos(angle)
+        if abs(angle) > 1e-6:
+            along, across = s / self.gamma, (1.0 - c) / self.gamma
+        else:
+            along, across = t, 0.5 * angle * t
+        x0, y0, _ = self.foothold_in_base
+        x = c * x0 + s * y0 - along * self.v_x - across * self.v_y
+        y = c * y0 - s * x0 - along * self.v_y + across * self.v_x
+        share_x, share_y = self.rolling
+        return (
+            x0 + share_x * (x - x0),
+            y0 + share_y * (y - y0),
+            share_x * (-self.v_x + self.gamma * y),
+            share_y * (-self.v_y - self.gamma * x),
+        )
+
+
+def swing_height(s: float) -> tuple[float, float]:
+    """Relative height of a swinging foot, in [0, 1], and its slope: up, along, down.
+
+    Parameters
+    ----------
+    s : float
+        Share of the swing that has passed, in [0, 1].
+
+    Returns
+    -------
+    height, slope : float
+    """
+    if s < LIFTING:
+        u, scale = s / LIFTING, 1.0 / LIFTING
+    elif s > 1.0 - LOWERING:
+        u, scale = (1.0 - s) / LOWERING, -1.0 / LOWERING
+    else:
+        return 1.0, 0.0
+    return u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) * scale
+
+
+def rolling_share(kinematics: LegKinematics, foothold_in_base: Array) -> tuple[float, float]:
+    """Share of the stance displacement that the centre of a rolling foot makes, along x and y.
+
+    A foot of radius ρ on a shank that turns by θ rolls ρ θ on the ground, so with the base's
+    velocity v the centre moves at ẋ = −v / (1 − ρ ∂θ/∂x) in the base; to first order at the
+    foothold, with θ the pitch of the shank for x and its roll (with the opposite sign) for y.
+
+    Parameters
+    ----------
+    kinematics : LegKinematics
+        The leg.
+    foothold_in_base : ndarray (3,)
+        Where to take the derivatives [m].
+
+    Returns
+    -------
+    tuple of float
+    """
+    geometry = kinematics.geometry
+    inverse = np.linalg.inv(kinematics.jacobian_in_base(kinematics.inverse(foothold_in_base)))
+    turning = geometry.axis_sign[:, None] * inverse  # (3, 3) axis angles per metre
+    pitch_per_x = turning[1, 0] + turning[2, 0]
+    roll_per_y = turning[0, 1]
+    return (
+        float(1.0 / (1.0 - geometry.foot_radius * pitch_per_x)),
+        float(1.0 / (1.0 + geometry.foot_radius * roll_per_y)),
+    )
+
+
+def _hermite(s: float, p0: float, p1: float, m0: float, m1: float) -> tuple[float, float]:
+    """Cubic Hermite curve on [0, 1] and its derivative."""
+    s2, s3 = s * s, s * s * s
+    value = (
+        (2.0 * s3 - 3.0 * s2 + 1.0) * p0
+        + (s3 - 2.0 * s2 + s) * m0
+        + (3.0 * s2 - 2.0 * s3) * p1
+        + (s3 - s2) * m1
+    )
+    slope = (
+        6.0 * (s2 - s) * (p0 - p1) + (3.0 * s2 - 4.0 * s + 1.0) * m0 + (3.0 * s2 - 2.0 * s) * m1
+    )
+    return value, slope

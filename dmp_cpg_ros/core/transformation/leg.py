@@ -1,0 +1,345 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One leg's rhythmic primitive: oscillator state and reference in, joint targets out.
+
+The goals g_θ(x_i, r), g_θ̇(x_i, r) are the foot path through the leg's inverse kinematics and
+Jacobian.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rate
+from dmp_cpg_ros.core.gait.foot_contact import LOADED, quarter_weight
+from dmp_cpg_ros.core.gait.gait import BodyScale
+from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, minus, moved, pair, plus, triple
+from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.transformation.foot_path import FootPath, rolling_share, swing_height
+from dmp_cpg_ros.core.transformation.foot_shift import ShiftRates
+from dmp_cpg_ros.core.transformation.foot_way import way_of
+from dmp_cpg_ros.core.transformation.joint_system import TransformationState, TransformationSystem
+from dmp_cpg_ros.core.transformation.stumble import Stumble, stumble_step, yielding
+from dmp_cpg_ros.core.transformation.swing_activity import activity_step
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LegParameters(Parameters):
+    """Parameters of a leg's transformation systems."""
+
+    stiffness: float = parameter(
+        6400.0, 'stiffness k of the transformation system', unit='1/s^2', minimum=1.0, maximum=1e6
+    )
+    damping: float = parameter(
+        160.0, 'damping b of the transformation system', unit='1/s', minimum=0.1, maximum=1e4
+    )
+    reading: str = parameter(
+        'kinematic',
+        'whether the joint follows the primitive or receives its torque',
+        choices=('kinematic', 'torque'),
+    )
+    clearance: float = parameter(
+        0.2, 'height of the swing as a fraction of the standing height', minimum=0.0, maximum=0.6
+    )
+    activity_rate: float = parameter(
+        12.0,
+        'rate at which the swing height follows the phase speed',
+        unit='1/s',
+        minimum=0.1,
+        maximum=1e3,
+    )
+    placement_rate: float = parameter(
+        40.0,
+        'rate at which a swinging foot follows its placement shift',
+        unit='1/s',
+        minimum=0.1,
+        maximum=1e3,
+    )
+    yielding_rate: float = parameter(
+        20.0,
+        'rate at which the target of a standing foot goes to where the foot is',
+        unit='1/s',
+        minimum=0.0,
+        maximum=1e3,
+    )
+    levelling_rate: float = parameter(
+        10.0,
+        'rate at which a standing foot gives up the height that made up for the tilt',
+        unit='1/s',
+        minimum=0.1,
+        maximum=1e3,
+    )
+    stumble_lift: float = parameter(
+        0.13,
+        'additional height of a swinging foot that something holds up, as a fraction of the '
+        'standing height; 0: no reflex',
+        minimum=0.0,
+        maximum=0.4,
+    )
+    stumble_lag: float = parameter(
+        0.035,
+        'distance from its target at which a swinging foot that stands still has met '
+        'something, as a fraction of the standing height',
+        minimum=0.005,
+        maximum=1.0,
+    )
+
+
+@dataclass(frozen=True)
+class LegState:
+    """State of one leg's primitive.
+
+    Attributes
+    ----------
+    joints : TransformationState
+        θ, θ̇ of the kinematic reading, (3,) each.
+    activity : float
+        Swing activity a in [0, 1].
+    shift_in_base : ndarray (3,)
+        Shift of the foot's path that acts now [m].
+    stumble : Stumble
+        What the stumbling reflex does.
+    """
+
+    joints: TransformationState
+    activity: float
+    shift_in_base: Array
+    stumble: Stumble = Stumble()
+
+
+@dataclass(frozen=True)
+class LegFeedback:
+    """The part of the body's feedback that one leg's path takes.
+
+    Attributes
+    ----------
+    joint_position : ndarray (3,)
+        Measured angles [rad].
+    shift_in_base : ndarray (3,)
+        Wanted foot placement shift, for a swinging foot [m].
+    drift_in_base : ndarray (2,)
+        Added to the velocity of a standing foot [m/s].
+    correction : ndarray (3,)
+        Added to the reference for the stance velocity, not for the cadence: v_x, v_y [m/s],
+        γ [rad/s].
+    foot_force : float
+        Measured normal force of the foot [N]; 0 without a contact sensor.
+    """
+
+    joint_position: Array
+    shift_in_base: Array
+    drift_in_base: Array
+    correction: Array
+    foot_force: float = 0.0
+
+
+class LegPrimitive:
+    """Transformation systems of one leg.
+
+    Parameters
+    ----------
+    leg : str
+        ``fl``, ``fr``, ``rl`` or ``rr``.
+    description : RobotDescription
+        The robot.
+    gait : Gait
+        The gait in force; the attribute is set when it changes.
+    parameters : LegParameters
+        Gains and swing.
+    """
+
+    def __init__(
+        self, leg: str, description: RobotDescription, gait: GaitInForce, parameters: LegParameters
+    ) -> None:
+        """Derive foothold and scale from the description."""
+        self.parameters, self.gait, self.place = parameters, gait, LEGS.index(leg)
+        geometry = description.legs[self.place]
+        self.kinematics = LegKinematics(geometry)
+        self.scale = body_scale(description)
+        self.foothold_in_base = nominal_foothold(description, leg)
+        self._foothold = triple(self.foothold_in_base.tolist())
+        self.rolling = rolling_share(self.kinematics, self.foothold_in_base)
+        self.shift_rates = ShiftRates(
+            parameters.placement_rate, parameters.yielding_rate, parameters.levelling_rate)
+        self.clearance = parameters.clearance * description.stance_height
+        self.stumble_lift = parameters.stumble_lift * description.stance_height
+        self.stumble_lag = parameters.stumble_lag * description.stance_height
+        self.touch_force = LOADED * quarter_weight(description)
+        self.transformation = TransformationSystem(
+            parameters.stiffness,
+            parameters.damping,
+            np.asarray(geometry.rotor_inertia, dtype=float),
+        )
+
+    def initial_state(self) -> LegState:
+        """State of a leg that stands at its foothold."""
+        q = self.kinematics.inverse(self.foothold_in_base)
+        return LegState(TransformationState(q, np.zeros(3)), 0.0, np.zeros(3))
+
+    def step(
+        self,
+        state: LegState,
+        x: Array,
+        x_dot: Array,
+        r: Array,
+        feedback: LegFeedback,
+        dt: float,
+    ) -> tuple[LegState, Array, Array]:
+        """Advance the leg to the time at which the inputs hold.
+
+        Parameters
+        ----------
+        state : LegState
+            State one tick before.
+        x, x_dot : ndarray (2,)
+            The leg's oscillator state and its derivative [1/s].
+        r : ndarray (3,)
+            Reference v_x, v_y [m/s], γ [rad/s].
+        feedback : LegFeedback
+            What the body's feedback asks of this leg.
+        dt : float
+            Time since the last tick [s].
+
+        Returns
+        -------
+        state : LegState
+        goal, goal_velocity : ndarray (3,)
+            g_θ [rad] and g_θ̇ [rad/s].
+        """
+        p, gait = self.parameters, self.gait
+        v_x, v_y, gamma = gait.limited(r.tolist(), self.scale)
+        speed = self.scale.foot_speed(v_x, v_y, gamma)
+        duty = gait.duty(speed, self.scale)
+        omega = gait.own_omega(self.place, gait.omega(speed, self.scale))
+        x_1, x_2 = x.tolist()
+        rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
+        position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
+        activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
+        swinging = abs(position) < 0.5 * (1.0 - duty)
+        at = self.kinematics.foot(feedback.joint_position)
+        target = self.kinematics.foot(state.joints.position)
+        away = minus(at, target)
+        more_x, more_y, more_gamma = feedback.correction.tolist()
+        path = FootPath(
+            self._foothold,
+            v_x + more_x,
+            v_y + more_y,
+            gamma + more_gamma,
+            omega,
+            duty,
+            activity * (self.clearance + (self.stumble_lift if state.stumble.wary else 0.0)),
+            self.rolling,
+        )
+        foot, slope = path.at(position)
+        path_velocity = moved((0.0, 0.0, 0.0), slope, rate / (2.0 * pi))
+        shift, stumble = triple(state.shift_in_base.tolist()), state.stumble
+        if dt <= 0.0:
+            shift_rate = (0.0, 0.0, 0.0)
+        elif swinging:
+            swung = path.swung(position)
+            touches = feedback.foot_force > self.touch_force
+            way = way_of(path, swung, at, target, touches) if self.stumble_lift else None
+            stumble = stumble_step(
+                stumble, way, activity * self.stumble_lift, self.stumble_lag, dt)
+            height, _ = swing_height(swung)
+            shift_rate = self.shift_rates.in_swing(
+                shift, triple(feedback.shift_in_base.tolist()), height, activity, dt)
+            shift_rate = yielding(stumble, shift_rate, path_velocity, away)
+        else:
+            stumble = stumble_step(stumble, None, self.stumble_lift, self.stumble_lag, dt)
+            shift_rate = self.shift_rates.in_stance(
+                shift, pair(feedback.drift_in_base.tolist()), away[:2], activity, dt)
+        shift = moved(shift, shift_rate, dt)
+        bounce = gait.bounce(position, duty, omega)
+        foot = plus(plus(foot, shift), (0.0, 0.0, stumble.height - activity * bounce.height))
+        velocity = plus(plus(shift_rate, path_velocity), (0.0, 0.0, stumble.rate))
+        velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
+        goal, goal_velocity = self._goal(foot, velocity)
+        joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
+        return LegState(joints, activity, np.array(shift), stumble), goal, goal_velocity
+
+    def _goal(self, foot: Triple, velocity: Triple) -> tuple[Array, Array]:
+        """g_θ [rad] and g_θ̇ [rad/s] of a foot in the base."""
+        angles = self.kinematics.angles(foot)
+        _, jacobian = self.kinematics.foot_and_jacobian(angles)
+        return np.array(angles), np.array(_joint_velocity(jacobian, velocity))
+
+    def targets(
+        self,
+        state: LegState,
+        goal: Array,
+        goal_velocity: Array,
+        feedback: Array,
+        measured: TransformationState | None = None,
+    ) -> JointTargets:
+        """Joint targets of the parameters' reading.
+
+        Parameters
+        ----------
+        state : LegState
+            State after :meth:`step`.
+        goal, goal_velocity : ndarray (3,)
+            Goals from :meth:`step`.
+        feedback : ndarray (3,)
+            τ_fb [N m].
+        measured : TransformationState, optional
+            Measured angles and velocities, needed for the torque reading.
+
+        Returns
+        -------
+        JointTargets
+        """
+        joints = state.joints if measured is None else measured
+        acceleration = self.transformation.acceleration(
+            joints.position, joints.velocity, goal, goal_velocity
+        )
+        return JointTargets(
+            joints.position, joints.velocity, self.transformation.torque(acceleration, feedback)
+        )
+
+
+def body_scale(description: RobotDescription) -> BodyScale:
+    """Lengths that make the robot's speeds dimensionless."""
+    foothold = nominal_foothold(description, LEGS[0])
+    hip_height = description.stance_height + float(description.legs[0].hip_in_base[2])
+    return BodyScale(hip_height, float(np.hypot(foothold[0], foothold[1])))
+
+
+def nominal_foothold(description: RobotDescription, leg: str) -> Array:
+    """Foot centre at mid-stance: under the hip, shifted so that the feet are around the centre
+    of mass.
+
+    Returns
+    -------
+    ndarray (3,)
+        In ``base_link`` [m].
+    """
+    geometry = description.legs[LEGS.index(leg)]
+    kinematics = LegKinematics(geometry)
+    x = geometry.hip_in_base[0] + geometry.hip_offset[0] + description.com_in_base[0]
+    y = geometry.hip_in_base[1] + kinematics.lateral_offset
+    return np.array((x, y, geometry.foot_radius - description.stance_height))
+
+
+def _joint_velocity(J: Matrix, velocity: Triple) -> Triple:
+    """Solve J q̇ = v by Cramer's rule; damped near singular postures."""
+    (a, b, c), (d, e, f), (g, h, i) = J
+    x, y, z = velocity
+    minor_0, minor_1, minor_2 = e * i - f * h, f * g - d * i, d * h - e * g
+    determinant = a * minor_0 + b * minor_1 + c * minor_2
+    inverse = determinant / (determinant * determinant + 1e-12)
+    return (
+        (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
+        (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
+        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse,
+    )

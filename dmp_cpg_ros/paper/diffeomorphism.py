@@ -1,0 +1,202 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Changes of space y' = T(y) that scale a primitive (paper, Section 3.2)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.paper.numerical_inverse import (
+    complex_step_jacobian,
+    difference_jacobian,
+    newton_inverse,
+)
+
+Array = NDArray[np.float64]
+
+
+class Diffeomorphism(ABC):
+    """A smooth map of ℝⁿ with a smooth inverse."""
+
+    @abstractmethod
+    def forward(self, y: Array) -> Array:
+        """T(y).
+
+        Parameters
+        ----------
+        y : ndarray (n,)
+
+        Returns
+        -------
+        ndarray (n,)
+        """
+
+    @abstractmethod
+    def jacobian(self, y: Array) -> Array:
+        """J = ∂T/∂y.
+
+        Parameters
+        ----------
+        y : ndarray (n,)
+
+        Returns
+        -------
+        ndarray (n, n)
+        """
+
+    @abstractmethod
+    def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
+        """T⁻¹(y').
+
+        Parameters
+        ----------
+        y_prime : ndarray (n,)
+        guess : ndarray (n,), optional
+            A point near the answer; maps with a closed inverse do not need it.
+
+        Returns
+        -------
+        ndarray (n,)
+        """
+
+    def velocity(self, y: Array, y_dot: Array) -> Array:
+        """Velocity of the image, J(y) ẏ.
+
+        Parameters
+        ----------
+        y, y_dot : ndarray (n,)
+
+        Returns
+        -------
+        ndarray (n,)
+        """
+        return self.jacobian(y) @ y_dot
+
+
+@dataclass(frozen=True)
+class FunctionDiffeomorphism(Diffeomorphism):
+    """A diffeomorphism given by its function, with or without Jacobian and inverse.
+
+    Attributes
+    ----------
+    function : callable
+        T: ndarray (n,) → ndarray (n,).
+    jacobian_function : callable, optional
+        J: ndarray (n,) → ndarray (n, n). Without, T is differentiated numerically.
+    inverse_function : callable, optional
+        T⁻¹: ndarray (n,) → ndarray (n,). Without, it is found by Newton's method.
+    derivative : {'difference', 'complex'}
+        Numerical differentiation: five-point differences (relative error about 1e-11), or the
+        complex step (exact to rounding) for functions that are analytic and take complex numbers.
+    """
+
+    function: Callable[[Array], Array]
+    jacobian_function: Callable[[Array], Array] | None = None
+    inverse_function: Callable[[Array], Array] | None = None
+    derivative: Literal['difference', 'complex'] = 'difference'
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        if self.derivative not in ('difference', 'complex'):
+            raise ParameterError(
+                f"derivative must be 'difference' or 'complex', not {self.derivative!r}"
+            )
+
+    def forward(self, y: Array) -> Array:
+        """T(y)."""
+        return np.asarray(self.function(np.asarray(y, dtype=float)), dtype=float)
+
+    def jacobian(self, y: Array) -> Array:
+        """J(y), given or numerical."""
+        y = np.asarray(y, dtype=float)
+        if self.jacobian_function is not None:
+            return np.asarray(self.jacobian_function(y), dtype=float)
+        return (
+            complex_step_jacobian(self.function, y)
+            if self.derivative == 'complex'
+            else difference_jacobian(self.function, y)
+        )
+
+    def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
+        """T⁻¹(y'), given or by Newton's method (:func:`newton_inverse`)."""
+        y_prime = np.asarray(y_prime, dtype=float)
+        if self.inverse_function is not None:
+            return np.asarray(self.inverse_function(y_prime), dtype=float)
+        return newton_inverse(
+            self.forward, self.jacobian, y_prime, y_prime if guess is None else guess
+        )
+
+
+@dataclass(frozen=True)
+class Composition(Diffeomorphism):
+    """T = T_k ∘ … ∘ T_1; the first of the list acts first.
+
+    Attributes
+    ----------
+    parts : tuple of Diffeomorphism
+    """
+
+    parts: tuple[Diffeomorphism, ...]
+
+    def forward(self, y: Array) -> Array:
+        """T(y)."""
+        for part in self.parts:
+            y = part.forward(y)
+        return y
+
+    def jacobian(self, y: Array) -> Array:
+        """J(y) by the chain rule."""
+        J = np.eye(len(y))
+        for part in self.parts:
+            J, y = part.jacobian(y) @ J, part.forward(y)
+        return J
+
+    def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
+        """T⁻¹(y'), part by part."""
+        guesses: list[Array | None] = [guess]
+        for part in self.parts[:-1]:
+            last = guesses[-1]
+            guesses.append(None if last is None else part.forward(last))
+        for part, near in zip(reversed(self.parts), reversed(guesses), strict=True):
+            y_prime = part.inverse(y_prime, near)
+        return y_prime
+
+
+@dataclass(frozen=True)
+class TangentLift(Diffeomorphism):
+    """The map (y, v) → (T(y), J(y) v) on ℝ²ⁿ that T induces on positions and velocities.
+
+    Attributes
+    ----------
+    base : Diffeomorphism
+        T on ℝⁿ.
+    """
+
+    base: Diffeomorphism
+
+    def forward(self, y: Array) -> Array:
+        """(T(y), J v)."""
+        position, velocity = np.split(np.asarray(y, dtype=float), 2)
+        return np.concatenate(
+            [self.base.forward(position), self.base.velocity(position, velocity)]
+        )
+
+    def jacobian(self, y: Array) -> Array:
+        """[[J, 0], [∂(J v)/∂y, J]]; the lower left block by differences of J along v."""
+        position, velocity = np.split(np.asarray(y, dtype=float), 2)
+        J = self.base.jacobian(position)
+        bend = difference_jacobian(lambda at: self.base.jacobian(at) @ velocity, position)
+        return np.block([[J, np.zeros_like(J)], [bend, J]])
+
+    def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
+        """(T⁻¹(y'), J⁻¹ v')."""
+        position, velocity = np.split(np.asarray(y_prime, dtype=float), 2)
+        y = self.base.inverse(position, None if guess is None else np.split(guess, 2)[0])
+        return np.concatenate([y, np.linalg.solve(self.base.jacobian(y), velocity)])
