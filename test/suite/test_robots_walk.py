@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
+from checkout import ROOT
 
 from dmp_cpg_ros.core.robot_model.state import JointTargets
 from dmp_cpg_ros.core.walking_loop import WalkingLoop
@@ -17,7 +17,7 @@ from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.suite import load_suite
 
-ROBOTS = sorted((Path(__file__).parents[1] / 'config' / 'robots').glob('*.yaml'))
+ROBOTS = sorted((ROOT / 'config' / 'robots').glob('*.yaml'))
 PUSH_DURATION = 0.1
 
 

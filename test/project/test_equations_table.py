@@ -101,7 +101,7 @@ def test_the_tests_exist(row: Row) -> None:
     assert row.named('test'), 'names no test'
     for test in row.named('test'):
         file, _, name = test.partition('::')
-        path = ROOT / 'test' / file
+        path = next((ROOT / 'test').rglob(file), ROOT / 'test' / file)
         assert path.is_file(), f'{file} does not exist'
         assert name.startswith('test_') and name in members(tree(path)), f'{file} has no {name}'
 

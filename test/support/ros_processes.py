@@ -33,7 +33,7 @@ from rclpy.task import Future
 
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 
 DEADLINE_S = 30.0
 """How long a condition may take before a test fails; a loaded machine is no failure."""

@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import re
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
+from checkout import ROOT
 from matplotlib import image
 
 from dmp_cpg_ros.commands.inspect_robot import main
@@ -19,7 +19,7 @@ from dmp_cpg_ros.robot.inspector import inspect_model
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
 
-ROBOTS = Path(__file__).parents[1] / 'config' / 'robots'
+ROBOTS = ROOT / 'config' / 'robots'
 
 HINGE = ('<joint name="{name}" axis="{axis}" range="{range}" actuatorfrcrange="-30 30"/>'
          '<geom type="capsule" size="0.02" fromto="0 0 0 0 0 -0.2"/>')

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from checkout import ROOT
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.scenario.events import EVENT_KINDS
 from dmp_cpg_ros.core.scenario.scenario import COMMAND_PERIOD_NS, Scenario, play
 from dmp_cpg_ros.suite import load_gaits
 
-SCENARIOS = Path(__file__).resolve().parent.parent / 'config' / 'scenarios'
+SCENARIOS = ROOT / 'config' / 'scenarios'
 TICK_NS = 4_000_000
 
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
+from checkout import ROOT
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
@@ -22,7 +22,7 @@ from dmp_cpg_ros.robot.model_reader import find_ids, load_description, pose, rea
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
 
-ROBOTS = Path(__file__).parents[1] / 'config' / 'robots'
+ROBOTS = ROOT / 'config' / 'robots'
 FOREIGN = ('aliengo', 'go1', 'go2', 'mini_cheetah', 'spot')
 
 
