@@ -100,7 +100,7 @@ doc-images: $(INSTALLED) ## make the pictures of the README
 	  --start 12.5 --end 20.5 --fps 12.5 --width 480
 
 bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
-	$(BIN)/python -m dmp_cpg_ros.commands.bench $(BENCH_ARGS)
+	$(BIN)/python -m dmp_cpg_ros.studies.bench $(BENCH_ARGS)
 
 lint: $(INSTALLED) ## ruff, mypy and the rules for package.xml
 	$(BIN)/python -m ruff check

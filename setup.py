@@ -34,9 +34,9 @@ EXECUTABLES = {
     'analyze': 'dmp_cpg_ros.commands.analyze:main',
     'learn': 'dmp_cpg_ros.commands.learn:main',
     'inspect_robot': 'dmp_cpg_ros.commands.inspect_robot:main',
-    'study_stops': 'dmp_cpg_ros.commands.study_stops:main',
-    'benchmark_walking': 'dmp_cpg_ros.commands.benchmark_walking:main',
-    'study_recovery': 'dmp_cpg_ros.commands.study_recovery:main',
+    'study_stops': 'dmp_cpg_ros.studies.study_stops:main',
+    'benchmark_walking': 'dmp_cpg_ros.studies.benchmark_walking:main',
+    'study_recovery': 'dmp_cpg_ros.studies.study_recovery:main',
 }
 
 WRAPPER = """\

@@ -13,13 +13,13 @@ from typing import Any
 from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters

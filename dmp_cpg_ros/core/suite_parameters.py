@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters, VotingSwitch
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingSwitch
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters

@@ -27,13 +27,13 @@ from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running_network import RunningNetwork
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
+from dmp_cpg_ros.core.loop import initial_canonical_state
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
     CertificateParameters,
     GaitParameters,
 )
-from dmp_cpg_ros.core.walking_loop import initial_canonical_state
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, read_reference
 from dmp_cpg_ros.nodes.executors import run_node

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.ballot import Ballot
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.vote_counter import VoteCounter
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_sensors import VoteSensors
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range

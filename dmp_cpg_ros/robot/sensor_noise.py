@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.updated import updated
 
 STREAM = 1
 """Tells the sensors' random numbers from others of the same seed."""

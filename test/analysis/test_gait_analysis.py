@@ -16,13 +16,13 @@ from dmp_cpg_ros.analysis.figures.footfall import planned_stance
 from dmp_cpg_ros.analysis.gait_in_force import gait_rows, gaits_walked
 from dmp_cpg_ros.analysis.metrics.gait import gait_metrics, phase_errors
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.commands.loop_recording import recording_of
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.gait.transition import BlendedGait
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
+from dmp_cpg_ros.studies.loop_recording import recording_of
 
 ROBOT = quadruped()
 

@@ -15,11 +15,11 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 from dmp_cpg_ros.commands.film import Shot, film, main
 from dmp_cpg_ros.commands.film_files import checked_film_path, has_encoder, write_film
-from dmp_cpg_ros.commands.loop_recording import recording_of
 from dmp_cpg_ros.commands.walk import main as walk
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.loop_recording import recording_of
 
 SMALL = Shot(fps=10.0, width=160, height=90)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from dmp_cpg_ros.core.updated import updated
+from dmp_cpg_ros.core.maths.updated import updated
 
 
 @dataclass(frozen=True)

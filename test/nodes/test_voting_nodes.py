@@ -24,8 +24,8 @@ from dmp_cpg_ros.commands.walk import load_scenario, main
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.inhibition.vote_box import VoteBox
+from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.scenario.scenario import play
-from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, ReferenceWriter
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.interfaces import interface

@@ -76,7 +76,7 @@ def test_the_gait_diagram_has_bars_of_the_duty_factor_at_the_lags(name: str) -> 
 
 def test_the_command_writes_every_figure(tmp_path: Path) -> None:
     pytest.importorskip('mujoco')
-    from dmp_cpg_ros.commands.paper_figures import main
+    from dmp_cpg_ros.studies.paper_figures import main
 
     assert main(['--out', str(tmp_path)]) == 0
     names = {path.stem for path in tmp_path.glob('*.png')}
@@ -89,7 +89,7 @@ def test_the_command_writes_every_figure(tmp_path: Path) -> None:
 def test_a_file_that_is_not_there_ends_with_status_2(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('mujoco')
-    from dmp_cpg_ros.commands.paper_figures import main
+    from dmp_cpg_ros.studies.paper_figures import main
 
     assert main(['none.yaml', '--out', str(tmp_path)]) == 2
     assert 'none.yaml' in capsys.readouterr().err

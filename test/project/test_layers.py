@@ -23,17 +23,25 @@ EVERYTHING = {'numpy', 'yaml', 'mujoco', *ROS, *RECORDS, *FIGURES, *FILMS}
 # layer: (own layers below it, packages of others); the standard library is everyone's.
 LAYERS = {
     'core': (set(), {'numpy'}),
+    'paper': ({'core'}, {'numpy'}),
     'configuration': ({'core'}, {'yaml'}),
     'suite': ({'core', 'configuration'}, set()),
     'primitive_files': ({'core', 'configuration'}, {'numpy', 'yaml'}),
     'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml'}),
     'nodes': ({'core', 'configuration', 'suite', 'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
-    'analysis': ({'core', 'configuration', 'suite'}, {'numpy', *RECORDS, *FIGURES}),
+    'analysis': ({'core', 'paper', 'configuration', 'suite'}, {'numpy', *RECORDS, *FIGURES}),
     'commands': ({'core', 'configuration', 'suite', 'primitive_files', 'robot', 'nodes',
                   'analysis'}, EVERYTHING),
+    'studies': ({'core', 'paper', 'configuration', 'suite', 'primitive_files', 'robot', 'nodes',
+                 'analysis', 'commands'}, EVERYTHING),
     'models': (set(), set()),
     '': (set(), set()),  # the package itself: its version
 }
+
+CORE = ['errors', 'maths', 'parameters', 'robot_model', 'canonical', 'gait', 'reference',
+        'primitives', 'learning', 'transformation', 'contraction', 'inhibition', 'balance',
+        'estimation', 'modes', 'suite_parameters', 'certificates', 'scenario', 'loop']
+"""Folders and files of the core, each above all that it may import."""
 
 
 def layer_of(module: str) -> str:
@@ -69,6 +77,19 @@ def test_a_layer_imports_only_what_is_below_it(layer: str) -> None:
     assert not wrong, '\n'.join(wrong)
 
 
+def test_each_folder_of_the_core_imports_only_folders_below_it() -> None:
+    wrong = []
+    for module, path in modules().items():
+        words = module.split('.')
+        if layer_of(module) != 'core' or len(words) < 3:
+            continue
+        for name in sorted(imports(module, path)):
+            if layer_of(name) == 'core' and name.count('.') > 1:
+                above = CORE.index(name.split('.')[2]) > CORE.index(words[2])
+                wrong += [f'{module} imports {name}'] if above else []
+    assert not wrong, '\n'.join(wrong)
+
+
 def test_no_import_runs_in_a_circle() -> None:
     known = modules()
     graph = {module: imports(module, path, at_import_time=True) & set(known) - {module}
@@ -77,7 +98,7 @@ def test_no_import_runs_in_a_circle() -> None:
 
 
 @pytest.mark.parametrize(('layers', 'unwanted'), [
-    (['core'], EVERYTHING - {'numpy'}),
+    (['core', 'paper'], EVERYTHING - {'numpy'}),
     (['configuration', 'suite', 'primitive_files', 'models', 'analysis'], ROS | {'mujoco'}),
     (['robot'], ROS | RECORDS),
 ])

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip('mujoco')
-from dmp_cpg_ros.commands.bench import main, seconds_of
+from dmp_cpg_ros.studies.bench import main, seconds_of
 
 
 def test_it_prints_and_writes_its_tables(

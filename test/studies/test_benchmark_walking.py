@@ -10,12 +10,12 @@ from math import isnan, nan, pi
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.commands.markdown_table import markdown_table
+from dmp_cpg_ros.studies.markdown_table import markdown_table
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.commands import benchmark_tables
-from dmp_cpg_ros.commands.benchmark_walking import main
-from dmp_cpg_ros.commands.walking_trials import (
+from dmp_cpg_ros.studies.benchmark_walking import main
+from dmp_cpg_ros.studies.walking_trials import (
     CrossingCase,
     SteadyOutcome,
     Walk,

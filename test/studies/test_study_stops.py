@@ -71,7 +71,7 @@ def test_a_stop_that_never_came_to_rest_exceeds_its_bound() -> None:
 def test_the_command_prints_a_row_per_method_and_writes_every_case(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('mujoco')
-    from dmp_cpg_ros.commands.study_stops import main
+    from dmp_cpg_ros.studies.study_stops import main
 
     written = []
     for jobs in ('1', '2'):
@@ -89,7 +89,7 @@ def test_the_command_prints_a_row_per_method_and_writes_every_case(
 def test_bad_arguments_end_with_status_2_and_a_reason(
         arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip('mujoco')
-    from dmp_cpg_ros.commands.study_stops import main
+    from dmp_cpg_ros.studies.study_stops import main
 
     assert main(arguments) == 2
     assert 'study_stops: ' in capsys.readouterr().err

@@ -21,8 +21,8 @@ from ros_processes import Processes, Ros
 
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.scenario.scenario import play
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.suite import load_suite

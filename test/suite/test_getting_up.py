@@ -11,10 +11,10 @@ import pytest
 from core_examples import GAITS, GRAVITY, TICK, suite_parameters
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.modes.movements import Movements
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.refuge import Refuge
 from dmp_cpg_ros.robot.target_guard import CARRIED_NS, TargetGuard

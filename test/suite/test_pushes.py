@@ -8,7 +8,7 @@ from math import pi
 
 import pytest
 
-from dmp_cpg_ros.commands.walking_trials import Walk, survives
+from dmp_cpg_ros.studies.walking_trials import Walk, survives
 
 SPEED_CHANGE = 1.2
 

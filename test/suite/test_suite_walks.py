@@ -23,9 +23,9 @@ from ros_processes import NodeProcess, Processes
 from dmp_cpg_ros.analysis.digests import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.scenario.scenario import play
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.suite import load_gaits, load_suite
 

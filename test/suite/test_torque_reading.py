@@ -10,8 +10,8 @@ import pytest
 pytest.importorskip('mujoco')
 
 from dmp_cpg_ros.commands.walk import load_scenario
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.scenario.scenario import play
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.suite import load_suite

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.canonical.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.parameters import parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
 

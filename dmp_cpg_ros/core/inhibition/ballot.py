@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.inhibition.voting_parameters import SUM
+from dmp_cpg_ros.core.canonical.voting_parameters import SUM
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]

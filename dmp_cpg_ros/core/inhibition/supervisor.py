@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
+from dmp_cpg_ros.core.canonical.voting_parameters import SUM
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, Ballot
-from dmp_cpg_ros.core.inhibition.voting_parameters import SUM
+from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.swing_activity import activities_step
-from dmp_cpg_ros.core.updated import updated
 
 Array = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.canonical.voting_parameters import WINNER_TAKE_ALL
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.voting import MajorityClamp, majority_clamp
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.voting_parameters import WINNER_TAKE_ALL
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 
 Array = NDArray[np.float64]

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.gait.gait import GRAVITY
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, Ballot
 from dmp_cpg_ros.core.inhibition.vote_box import VoteBox
 from dmp_cpg_ros.core.inhibition.voting import Voting, VotingState
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_sensors import VoteSensors
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 

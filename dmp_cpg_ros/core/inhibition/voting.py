@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, Ballot, acting_gains
 from dmp_cpg_ros.core.inhibition.threshold import VoteClamp, holds_at_rest, vote_clamp
@@ -23,7 +24,6 @@ from dmp_cpg_ros.core.inhibition.up_direction import UpDirection
 from dmp_cpg_ros.core.inhibition.vote_box import COLLISION, FOOTING, SILENCE, TILT, Vote
 from dmp_cpg_ros.core.inhibition.vote_memory import VoteMemory
 from dmp_cpg_ros.core.inhibition.voting_contact import ContactState, judge_contact
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_sensors import LastGood, VoteSensors
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range

@@ -15,7 +15,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
+from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase_rate
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE, REST_SPEED
+from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.modes.body_command import BALANCED
 from dmp_cpg_ros.core.modes.body_condition import BodySense
 from dmp_cpg_ros.core.modes.body_mode import BodyModes, ModeParameters, ModeState
@@ -18,7 +19,6 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.legs import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.transformation.leg import body_scale
-from dmp_cpg_ros.core.updated import updated
 
 Array = NDArray[np.float64]
 

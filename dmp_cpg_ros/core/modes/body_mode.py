@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.modes.body_command import BALANCED, BodyCommand
 from dmp_cpg_ros.core.modes.body_condition import BodyCondition
 from dmp_cpg_ros.core.modes.fall_detection import FallDetector, FallParameters, FallState
@@ -20,7 +21,6 @@ from dmp_cpg_ros.core.modes.motion import phase_at
 from dmp_cpg_ros.core.modes.movements import SIDES, Movements
 from dmp_cpg_ros.core.parameters import parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.updated import updated
 
 UPRIGHT_TILT = 0.5
 """Tilt up to which a robot on the ground can rise without rolling over [rad]."""

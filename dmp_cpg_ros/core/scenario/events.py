@@ -4,7 +4,7 @@
 
 A new kind is one entry in :data:`EVENT_KINDS` here and one in the tables of those who act on it:
 :class:`~dmp_cpg_ros.nodes.scenario_player.ScenarioPlayer` for the nodes, and
-:meth:`~dmp_cpg_ros.core.walking_loop.WalkingLoop.takers` for the plain loop (pushes go to
+:meth:`~dmp_cpg_ros.core.loop.WalkingLoop.takers` for the plain loop (pushes go to
 :attr:`~dmp_cpg_ros.robot.mujoco_robot.MujocoRobot.takers`).
 """
 

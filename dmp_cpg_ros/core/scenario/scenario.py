@@ -142,7 +142,7 @@ def play(scenario: Scenario, tick_ns: int, step: Callable[[], Any], takers: Take
         Runs one tick of loop and robot.
     takers : mapping of str to callable (value)
         Take events of their kind before the tick at which they act, such as
-        :meth:`~dmp_cpg_ros.core.walking_loop.WalkingLoop.takers`.
+        :meth:`~dmp_cpg_ros.core.loop.WalkingLoop.takers`.
 
     Raises
     ------

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.commands.walking_trials import relative_error, steady
 from dmp_cpg_ros.core.balance.sway import STRAIGHT, planned_sway
 from dmp_cpg_ros.core.gait.com_height import GRAVITY
+from dmp_cpg_ros.studies.walking_trials import relative_error, steady
 from dmp_cpg_ros.suite import load_gaits
 
 OMEGA, HEIGHT, ACROSS = 16.0, 0.27, (0.11, -0.11, 0.11, -0.11)

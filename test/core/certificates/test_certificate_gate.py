@@ -19,9 +19,9 @@ from dmp_cpg_ros.core.gait.gait_word import gait_word, read_gait_word
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running_network import CADENCE_RATE, RunningNetwork
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
+from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER, SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
-from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
 
 RUNNING = Running(SuiteParameters(), GAITS['amble'], body_scale(quadruped()), TICK)
 WEAK = RUNNING.changed({'coupling_gain': 30.0})

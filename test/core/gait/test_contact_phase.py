@@ -26,8 +26,8 @@ from dmp_cpg_ros.core.gait.contact_feedback import (
 from dmp_cpg_ros.core.gait.foot_contact import LOADED, UNLOADED, standing
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.transformation.leg import body_scale
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.suite import Suite, load_gait, load_gaits, load_suite

@@ -14,7 +14,6 @@ from core_examples import GAITS, TICK, quadruped, standing_state
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.commands.walking_trials import Walk
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
@@ -30,6 +29,7 @@ from dmp_cpg_ros.core.transformation.leg import (
     LegPrimitive,
     body_scale,
 )
+from dmp_cpg_ros.studies.walking_trials import Walk
 
 ROBOT = quadruped()
 SCALE = body_scale(ROBOT)

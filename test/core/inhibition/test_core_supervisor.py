@@ -30,9 +30,9 @@ from dmp_cpg_ros.core.canonical.inhibition import (
 from dmp_cpg_ros.core.canonical.phase import phase, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.inhibition.supervisor import STATE_WORDS
+from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
-from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
 
 ROBOT = quadruped()
 STANDING = standing_state(ROBOT)

@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, acting_gains
 from dmp_cpg_ros.core.inhibition.threshold import holds_at_rest, vote_clamp
@@ -22,7 +23,6 @@ from dmp_cpg_ros.core.inhibition.vote_box import MOST_VOTERS, VoteBox
 from dmp_cpg_ros.core.inhibition.vote_memory import FADE_STEPS, VoteMemory
 from dmp_cpg_ros.core.inhibition.voting import Voting
 from dmp_cpg_ros.core.inhibition.voting_contact import ContactState, judge_contact
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_sensors import LastGood, vote_sensors
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range

@@ -12,9 +12,9 @@ from core_examples import GAITS, TICK, suite_parameters
 
 from dmp_cpg_ros.core.learning.period import find_period, spread_between_cycles
 from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic, reproduction_errors
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot

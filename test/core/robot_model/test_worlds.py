@@ -11,7 +11,6 @@ import pytest
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import fell
-from dmp_cpg_ros.commands.loop_recording import recording_of
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.robot_model.state import JointTargets
 from dmp_cpg_ros.core.robot_model.world import PATCH, Blocks, LowFriction, Slope, Steps, World
@@ -20,6 +19,7 @@ from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.robot.camera import Camera
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.loop_recording import recording_of
 from dmp_cpg_ros.suite import load_suite
 
 ZERO = np.zeros(12)

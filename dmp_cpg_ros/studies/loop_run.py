@@ -6,8 +6,8 @@ from __future__ import annotations
 
 from typing import Generic, TypeVar
 
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
 Loop = TypeVar('Loop', bound=WalkingLoop)

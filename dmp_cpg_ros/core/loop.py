@@ -38,6 +38,7 @@ from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.vote_counter import VoteCounter
 from dmp_cpg_ros.core.inhibition.voting_sensors import vote_sensors
+from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.modes.body_command import BodyCommand
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.body_mode import ModeState
@@ -51,7 +52,6 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.joint_system import TransformationState
 from dmp_cpg_ros.core.transformation.leg import LegPrimitive, LegState, body_scale
-from dmp_cpg_ros.core.updated import updated
 
 Array = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How tight the certificates are: certified values over those that work, by bisection.
 
-``python -m dmp_cpg_ros.commands.tightness`` prints the table for four oscillators of radius 1. A
+``python -m dmp_cpg_ros.studies.tightness`` prints the table for four oscillators of radius 1. A
 ratio of 1 is a condition that cannot be improved; each condition that is looser says why.
 """
 
@@ -16,7 +16,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.commands.tightness_trials import (
+from dmp_cpg_ros.core.certificates.step import longest_step
+from dmp_cpg_ros.core.contraction.capture import capture_set
+from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_margin
+from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
+from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
+from dmp_cpg_ros.core.contraction.voting import certified_threshold, rest_threshold
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.studies.tightness_trials import (
     SIZE,
     keeps_walking,
     network,
@@ -26,13 +33,6 @@ from dmp_cpg_ros.commands.tightness_trials import (
     synchronises,
     threshold,
 )
-from dmp_cpg_ros.core.certificates.step import longest_step
-from dmp_cpg_ros.core.contraction.capture import capture_set
-from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_margin
-from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
-from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
-from dmp_cpg_ros.core.contraction.voting import certified_threshold, rest_threshold
-from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 
 Array = NDArray[np.float64]
 

@@ -22,14 +22,14 @@ from pathlib import Path
 
 from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, summary
 from dmp_cpg_ros.analysis.strict_json import write_json
-from dmp_cpg_ros.commands.markdown_table import markdown_table
-from dmp_cpg_ros.commands.stop_trial import METHODS, StopCase, run_trials
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.markdown_table import markdown_table
+from dmp_cpg_ros.studies.stop_trial import METHODS, StopCase, run_trials
 from dmp_cpg_ros.suite import Suite, load_gait, load_suite
 
 Results = list[tuple[StopCase, StopOutcome]]

@@ -16,11 +16,11 @@ from dmp_cpg_ros.analysis import paper_data, paper_figures
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.commands.loop_recording import recording_of
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.transformation.leg import body_scale
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.loop_recording import recording_of
 from dmp_cpg_ros.suite import Suite, load_suite
 
 SPEED = 0.5

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from math import nan, pi
 
 from dmp_cpg_ros.analysis.stop_outcome import summary
-from dmp_cpg_ros.commands.stop_trial import StopCase, run_trials
-from dmp_cpg_ros.commands.walking_trials import (
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.stop_trial import StopCase, run_trials
+from dmp_cpg_ros.studies.walking_trials import (
     PushCase,
     SteadyOutcome,
     relative_error,
     steady,
     survived_pushes,
 )
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.suite import load_gait, load_suite
 
 ROBOTS = tuple(f'robots/{name}.yaml' for name in

@@ -14,10 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.commands.benchmark_robots import ROBOTS, RobotCase, run_robot
-from dmp_cpg_ros.commands.gait_change_trials import SPEEDS, change_cases, run_changes
-from dmp_cpg_ros.commands.markdown_table import markdown_table
-from dmp_cpg_ros.commands.walking_trials import (
+from dmp_cpg_ros.core.errors import MissingFileError
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.benchmark_robots import ROBOTS, RobotCase, run_robot
+from dmp_cpg_ros.studies.gait_change_trials import SPEEDS, change_cases, run_changes
+from dmp_cpg_ros.studies.markdown_table import markdown_table
+from dmp_cpg_ros.studies.walking_trials import (
     CrossingCase,
     PushCase,
     SteadyOutcome,
@@ -28,8 +30,6 @@ from dmp_cpg_ros.commands.walking_trials import (
     suite_of,
     survived_pushes,
 )
-from dmp_cpg_ros.core.errors import MissingFileError
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
 DIRECTIONS = tuple(i * pi / 4.0 for i in range(8))
 """Directions of the pushes, from ahead to the left [rad]."""

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
+from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.transformation.joint_system import TransformationState
-from dmp_cpg_ros.core.walking_loop import Tick, WalkingLoop
 
 Array = NDArray[np.float64]
 

@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
-from dmp_cpg_ros.commands.loop_recording import recording_of
-from dmp_cpg_ros.commands.loop_run import LoopRun
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WORLDS
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.loop_recording import recording_of
+from dmp_cpg_ros.studies.loop_run import LoopRun
 from dmp_cpg_ros.suite import Suite, load_gait, load_gaits, load_suite
 
 Array = NDArray[np.float64]

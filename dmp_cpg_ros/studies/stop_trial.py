@@ -16,16 +16,16 @@ import numpy as np
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.stop_outcome import WALKING_ERROR, StopOutcome, body_at_rest
-from dmp_cpg_ros.commands.loop_recording import recording_of
-from dmp_cpg_ros.commands.loop_run import LoopRun
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.stop_baselines import FreezingLoop
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.loop_recording import recording_of
+from dmp_cpg_ros.studies.loop_run import LoopRun
+from dmp_cpg_ros.studies.stop_baselines import FreezingLoop
 
 METHODS = ('inhibition', 'freeze', 'finish_swing')
-"""Ways to stop: sparse inhibition, and the two of core/stop_baselines.py."""
+"""Ways to stop: sparse inhibition, and the two of studies/stop_baselines.py."""
 
 WALKING_BEFORE, WALKING_AFTER = 4.0, 3.5
 """Time from the start to the first request, and from the resume to the end [s]."""

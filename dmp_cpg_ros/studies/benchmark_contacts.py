@@ -9,9 +9,9 @@ from multiprocessing.pool import Pool
 
 import numpy as np
 
-from dmp_cpg_ros.commands.benchmark_tables import ROUGH_GAITS, Table
-from dmp_cpg_ros.commands.markdown_table import markdown_table
-from dmp_cpg_ros.commands.walking_trials import CrossingCase, CrossingOutcome, Values, cross
+from dmp_cpg_ros.studies.benchmark_tables import ROUGH_GAITS, Table
+from dmp_cpg_ros.studies.markdown_table import markdown_table
+from dmp_cpg_ros.studies.walking_trials import CrossingCase, CrossingOutcome, Values, cross
 
 GROUNDS: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = (
     ('blocks', (('height', 0.03),)),

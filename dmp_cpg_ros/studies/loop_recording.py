@@ -19,8 +19,8 @@ from dmp_cpg_ros.analysis.recording import (
     StatusEvent,
     VelocitySeries,
 )
+from dmp_cpg_ros.core.loop import Tick
 from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.walking_loop import Tick
 
 
 def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> Recording:

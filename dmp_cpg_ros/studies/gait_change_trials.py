@@ -12,8 +12,8 @@ from math import ceil, nan, pi
 import numpy as np
 
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
-from dmp_cpg_ros.commands.walking_trials import Walk
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.studies.walking_trials import Walk
 from dmp_cpg_ros.suite import load_gaits
 
 SPEEDS = (0.4, 0.6)

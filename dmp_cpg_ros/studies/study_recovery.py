@@ -22,11 +22,11 @@ from pathlib import Path
 import numpy as np
 
 from dmp_cpg_ros.analysis.strict_json import write_json
-from dmp_cpg_ros.commands.loop_run import LoopRun
-from dmp_cpg_ros.commands.markdown_table import markdown_table
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.walking_loop import WalkingLoop
+from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.loop_run import LoopRun
+from dmp_cpg_ros.studies.markdown_table import markdown_table
 from dmp_cpg_ros.suite import load_suite
 
 OWN_ROBOT = 'robots/mini_quadruped.yaml'
