@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.analysis.strict_json import write_json
-from dmp_cpg_ros.commands import benchmark_contacts, benchmark_tables
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.studies import benchmark_contacts, benchmark_tables
 
 TABLES = ('speeds', 'pushes', 'rough', 'contacts', 'gaits', 'robots')
 """What can be measured."""

@@ -13,7 +13,7 @@ import pytest
 from dmp_cpg_ros.studies.markdown_table import markdown_table
 
 pytest.importorskip('mujoco')
-from dmp_cpg_ros.commands import benchmark_tables
+from dmp_cpg_ros.studies import benchmark_tables
 from dmp_cpg_ros.studies.benchmark_walking import main
 from dmp_cpg_ros.studies.walking_trials import (
     CrossingCase,

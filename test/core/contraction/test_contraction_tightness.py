@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from dmp_cpg_ros.commands import tightness
+from dmp_cpg_ros.studies import tightness
 from dmp_cpg_ros.studies.tightness_trials import threshold
 
 Trial = Callable[[str], tightness.Row]
