@@ -239,3 +239,24 @@ def test_a_bare_bag_gets_its_results_beside_it(walked: Recording, tmp_path: Path
     assert (
         analyze_run(tmp_path / 'outing', report=False, out=tmp_path / 'x').folder == tmp_path / 'x'
     )
+
+
+def test_a_bare_bag_that_is_called_bag_is_no_run(
+    walked: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_bag(walked, tmp_path / 'bag')
+    monkeypatch.chdir(tmp_path)
+    for name in ('bag', 'bag/bag.mcap', 'bag/metadata.yaml'):
+        assert main([name, '--no-pictures']) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['bag', 'bag_analysis']
+    inside = [path.name for path in (tmp_path / 'bag').iterdir() if path.is_dir()]
+    assert inside == ['bag_analysis']
+    monkeypatch.chdir(tmp_path / 'bag')
+    assert analyze_run('.', report=False).folder == tmp_path / 'bag_analysis'
+
+
+def test_the_bag_of_a_run_has_its_results_in_the_run(walked: Recording, tmp_path: Path) -> None:
+    bag = write_bag(walked, tmp_path / 'bag')
+    assert analyze_run(tmp_path, report=False).folder == tmp_path
+    for path in (bag, bag / 'bag.mcap'):
+        assert analyze_run(path, report=False).folder == tmp_path
