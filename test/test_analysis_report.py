@@ -25,7 +25,7 @@ from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
 from dmp_cpg_ros.analysis.pictures import moments, write_pictures
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 from dmp_cpg_ros.analysis.report_parts import flattened, label
 from dmp_cpg_ros.analysis.run import RunResults, write_results
 from dmp_cpg_ros.commands.analyze import BAD_INPUT, analyze_run, main
@@ -166,6 +166,28 @@ def test_the_folder_holds_strict_json(results: RunResults) -> None:
 def test_every_number_is_defined(results: RunResults) -> None:
     numbers = {key: value for key, value in results.metrics.items() if key != 'certificate'}
     assert set(flattened(numbers)) == set(DEFINITIONS)
+
+
+def test_texts_of_a_recording_are_no_markup(context: RunContext, tmp_path: Path) -> None:
+    hostile = '<script>alert("&")</script>'
+    walk = WALK.recording()
+    values = {'requested': 'true', 'cause': hostile, 'request_stamp': hostile}
+    changed = dataclasses.replace(
+        walk,
+        inhibition=tuple(dataclasses.replace(event, values={**event.values, **values})
+                         for event in walk.inhibition),
+        statuses={hostile: (StatusEvent(1.0, 2, hostile, {hostile: hostile}),)},
+        modes=(StatusEvent(0.0, 0, hostile, {'reason': hostile}),),
+        canonical=dataclasses.replace(
+            walk.canonical, frame=(hostile,) * len(walk.canonical.time)))
+    manifest = {'scenario': hostile, hostile: [hostile, {hostile: hostile}],
+                'parameters': {hostile: hostile}}
+    certificate = [{'name': hostile, hostile: hostile, 'holds': True}]
+    written = write_results(tmp_path, changed, context, manifest, certificate, no_pictures)
+    assert written.report is not None
+    page = written.report.read_text(encoding='utf-8')
+    assert '<script' not in page
+    assert '&lt;script&gt;' in page
 
 
 def test_labels_have_units() -> None:

@@ -228,8 +228,11 @@ def test_ctrl_c_ends_the_run_with_a_readable_bag(
     process = start_walk(processes, scenario, tmp_path / 'run', '--lock-step')
     process.wait_for_output('walking', RUN_S)
     process.interrupt()
-    assert process.wait(RUN_S) == 130
-    assert 'interrupted' in process.output
+    process.wait_for_output('making the report, which a second Ctrl-C skips', RUN_S)
+    process.interrupt()
+    # Python itself ends by the signal when it came while it ran generated code.
+    assert process.wait(RUN_S) in (130, -signal.SIGINT), process.output
+    assert 'report skipped' in process.output and 'Traceback' not in process.output, process
     assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
 
 
