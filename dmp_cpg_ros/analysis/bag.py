@@ -1,14 +1,19 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Opening a rosbag2 folder: sound, damaged or no bag at all."""
+"""Opening a rosbag2 recording: sound, damaged or none at all. Nothing that is read is changed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+import logging
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
 from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.interfaces import Connection
 from rosbags.typesys import Stores, get_typestore
 
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
@@ -16,8 +21,8 @@ from dmp_cpg_ros.core.errors import DataError, MissingFileError
 STORAGE_SUFFIXES = ('.mcap', '.db3')
 
 
-def bag_folder(path: Path | str) -> Path:
-    """Folder of the bag that a path names: itself, in a run's folder, or around a file.
+def find_bag(path: Path | str) -> Path:
+    """Recording that a path names: a file of one, a bag's folder, or a run's folder around it.
 
     Raises
     ------
@@ -31,59 +36,113 @@ def bag_folder(path: Path | str) -> Path:
         raise MissingFileError(
             f"'{path}' does not exist; name a rosbag2 folder or a run's folder with bag/ inside"
         )
-    if path.is_file() and path.suffix in STORAGE_SUFFIXES + ('.yaml',):
-        path = path.parent
+    if path.is_file():
+        if path.suffix in STORAGE_SUFFIXES:
+            return path
+        if path.suffix == '.yaml':
+            path = path.parent
     for folder in (path, path / 'bag'):
         if folder.is_dir() and (_storage_files(folder) or (folder / 'metadata.yaml').is_file()):
             return folder
     raise DataError(
-        f"'{path}' holds no rosbag2 recording; valid are a folder with *.mcap or *.db3, "
-        f"or a run's folder with such a folder bag/ inside"
+        f"'{path}' holds no rosbag2 recording; valid are a folder with *.mcap or *.db3, such a "
+        f"file, or a run's folder with such a folder bag/ inside"
     )
 
 
 @contextmanager
-def opened(folder: Path) -> Iterator[AnyReader]:
-    """Reader over a bag; a bag that was not closed is rescued first.
+def opened(bag: Path) -> Iterator[AnyReader]:
+    """Reader over a bag; what was not closed is read from a copy of all that is complete in it.
 
     Parameters
     ----------
-    folder : Path
-        As from :func:`bag_folder`.
+    bag : Path
+        As from :func:`find_bag`.
 
     Raises
     ------
     DataError
-        If the bag cannot be read.
+        If the bag cannot be read, or a folder holds several that do not belong together.
     """
-    try:
-        reader = _reader(folder)
-    except DataError as damage:
-        reader = _reader(_rescued(folder, damage))
-    try:
+    with ExitStack() as stack:
+        try:
+            reader = _reader([bag])
+        except DataError as damage:
+            reader = _reader([_readable(file, bag, stack) for file in _parts(bag, damage)])
+        stack.callback(reader.close)
         yield reader
-    finally:
-        reader.close()
 
 
-def _reader(folder: Path) -> AnyReader:
+def decoded(
+    reader: AnyReader, connections: Collection[Connection], skipped: Counter[str]
+) -> Iterator[tuple[Connection, int, Any]]:
+    """Messages of some connections with their record times [ns], in the order of these.
+
+    Parameters
+    ----------
+    reader : AnyReader
+        Open.
+    connections : collection of Connection
+        Those that are wanted.
+    skipped : Counter
+        Gets by topic how many messages were left out because they could not be decoded; a warning
+        names them at the end.
+    """
+    for connection, bag_ns, raw in reader.messages(connections) if connections else ():
+        try:
+            message = reader.deserialize(raw, connection.msgtype)
+        except AnyReaderError:
+            skipped[connection.topic] += 1
+        else:
+            yield connection, bag_ns, message
+    if skipped:
+        listed = ', '.join(f'{count} on {topic}' for topic, count in sorted(skipped.items()))
+        logging.getLogger(__name__).warning('left out what cannot be decoded: %s', listed)
+
+
+def _reader(paths: Sequence[Path]) -> AnyReader:
     try:
-        reader = AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_JAZZY))
+        reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_JAZZY))
         reader.open()
-    except (AnyReaderError, OSError, AssertionError, TypeError, KeyError) as error:
-        raise DataError(f"the bag '{folder}' cannot be read: {error}") from error
+    except (AnyReaderError, OSError, AssertionError, TypeError, KeyError, ValueError) as error:
+        raise DataError(f"the bag '{paths[0]}' cannot be read: {error}") from error
     return reader
 
 
-def _rescued(folder: Path, damage: DataError) -> Path:
-    """Folder of a readable copy of what a damaged bag still holds."""
-    if not any(file.suffix == '.mcap' for file in _storage_files(folder)):
+def _parts(bag: Path, damage: DataError) -> list[Path]:
+    """Files of a bag whose metadata are of no help."""
+    files = [bag] if bag.is_file() else _storage_files(bag)
+    if not files:
         raise damage
+    split = re.compile(rf'{re.escape(bag.resolve().name)}_(\d+)')
+    numbers = [split.fullmatch(file.stem) for file in files]
+    if len(files) > 1 and not all(numbers):
+        raise DataError(
+            f"'{bag}' holds {len(files)} recordings and no usable metadata.yaml that makes them "
+            f'one; name one of them: {", ".join(file.name for file in files)}'
+        )
+    return files
+
+
+def _readable(file: Path, bag: Path, stack: ExitStack) -> Path:
+    """Return a file of a bag, or a copy of what is in it."""
     try:
-        from dmp_cpg_ros.analysis.rescue import rescue
-    except ImportError as error:
-        raise DataError(f"{damage}; rescuing it needs the package '{error.name}'") from error
-    return rescue(folder)
+        _reader([file]).close()
+        return file
+    except DataError as damage:
+        if file.suffix != '.mcap':
+            raise
+        try:
+            from dmp_cpg_ros.analysis import rescue
+        except ImportError as error:
+            raise DataError(f"{damage}; rescuing it needs the package '{error.name}'") from error
+    if not rescue.is_closed(file):
+        file = rescue.rescued(file, bag, stack)
+    try:
+        _reader([file]).close()
+        return file
+    except DataError:
+        return rescue.ros_part(file, stack)
 
 
 def _storage_files(folder: Path) -> list[Path]:

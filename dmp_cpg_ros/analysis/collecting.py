@@ -31,6 +31,7 @@ from dmp_cpg_ros.analysis.recording import (
     Recording,
     StatusEvent,
     VelocitySeries,
+    WorkSeries,
 )
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
@@ -42,6 +43,7 @@ JOINT_TOPICS = (
     'canonical_state',
     'foot_contacts',
     'posture_feedback',
+    'joint_work',
 )
 
 
@@ -53,9 +55,9 @@ class Collector:
         self._named = {topic: NamedValues() for topic in JOINT_TOPICS}
         self._rows: dict[str, Rows] = {
             topic: ([], [])
-            for topic in ('reference', 'cmd_vel', 'odom', 'estimated_odom', 'imu')
+            for topic in ('reference', 'odom', 'estimated_odom', 'imu')
         }
-        self._unstamped_commands: Rows = ([], [])
+        self._commands: Rows = ([], [])  # bag time [ns], velocity
         self._frames: dict[int, str] = {}  # stamp [ns], gait in force
         self._clock: tuple[list[int], list[int]] = ([], [])  # bag time, robot's clock [ns]
         self._ticks: tuple[list[int], list[int]] = ([], [])
@@ -71,9 +73,9 @@ class Collector:
                 for name in JOINT_TOPICS[3:]
             },
             ('canonical_state', 'sensor_msgs/msg/JointState'): self._take_canonical,
-            ('reference', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('reference'),
-            ('cmd_vel', 'geometry_msgs/msg/TwistStamped'): self._taker_of_twists('cmd_vel'),
-            ('cmd_vel', 'geometry_msgs/msg/Twist'): self._take_unstamped_twist,
+            ('reference', 'geometry_msgs/msg/TwistStamped'): self._take_reference,
+            ('cmd_vel', 'geometry_msgs/msg/TwistStamped'): self._take_stamped_command,
+            ('cmd_vel', 'geometry_msgs/msg/Twist'): self._take_command,
             **{
                 (name, 'nav_msgs/msg/Odometry'): self._taker_of_odometry(name)
                 for name in ('odom', 'estimated_odom')
@@ -97,7 +99,7 @@ class Collector:
         """
         return self._handlers.get((topic, msgtype))
 
-    def recording(self, counts: dict[str, int]) -> Recording:
+    def recording(self, counts: dict[str, int], undecodable: dict[str, int]) -> Recording:
         """Stack everything that was taken."""
         time, canonical = self._named['canonical_state'].table(
             [f'{leg}_x{k}' for leg in LEGS for k in (1, 2)]
@@ -107,9 +109,10 @@ class Collector:
         return Recording(
             joints=self._joints('joint_states'),
             targets=self._joints('joint_targets'),
+            work=self._work(),
             canonical=CanonicalSeries(time, x, x_dot, self._gaits(len(time))),
             reference=VelocitySeries(*stacked(self._rows['reference'], 3)),
-            commands=self._commands(),
+            commands=self._command_series(),
             odometry=self._odometry('odom'),
             estimate=self._odometry('estimated_odom'),
             imu=ImuSeries(imu[0], *np.split(imu[1], (4, 7), axis=1)),
@@ -120,11 +123,16 @@ class Collector:
             statuses={name: tuple(history) for name, history in self._statuses.items()},
             arrivals=self._arrivals(),
             counts=counts,
+            undecodable=undecodable,
         )
 
     def _joints(self, topic: str) -> JointSeries:
         time, values = self._named[topic].table(JOINT_NAMES)
         return JointSeries(time, values['position'], values['velocity'], values['effort'])
+
+    def _work(self) -> WorkSeries:
+        time, values = self._named['joint_work'].table(JOINT_NAMES)
+        return WorkSeries(time, values['position'], values['effort'])
 
     def _odometry(self, topic: str) -> OdometrySeries:
         time, rows = stacked(self._rows[topic], 13)
@@ -143,11 +151,11 @@ class Collector:
         )
         return PostureSeries(time, torques['effort'], shifts['position'].reshape(-1, len(LEGS), 2))
 
-    def _commands(self) -> VelocitySeries:
-        stamps, rows = self._rows['cmd_vel']
-        bag_ns, unstamped = self._unstamped_commands
-        stamped = [*stamps, *robot_clock(bag_ns, self._clock if self._clock[0] else self._ticks)]
-        return VelocitySeries(*stacked((stamped, rows + unstamped), 3))
+    def _command_series(self) -> VelocitySeries:
+        """Commands when they were received: a sender's stamps may be of another clock."""
+        bag_ns, rows = self._commands
+        stamps = robot_clock(bag_ns, self._ticks if self._ticks[0] else self._clock)
+        return VelocitySeries(*stacked((stamps, rows), 3))
 
     def _arrivals(self) -> ArrivalSeries:
         stamps = np.array(self._ticks[1], dtype=np.int64)
@@ -183,15 +191,15 @@ class Collector:
         named = self._named[topic]
         return lambda _, message: named.add(stamp_ns(message.header.stamp), message)
 
-    def _taker_of_twists(self, topic: str) -> Callable[[int, Any], None]:
-        def handle(_: int, message: Any) -> None:
-            self._row(topic, message, twist(message.twist))
+    def _take_reference(self, _: int, message: Any) -> None:
+        self._row('reference', message, twist(message.twist))
 
-        return handle
+    def _take_stamped_command(self, bag_ns: int, message: Any) -> None:
+        self._take_command(bag_ns, message.twist)
 
-    def _take_unstamped_twist(self, bag_ns: int, message: Any) -> None:
-        self._unstamped_commands[0].append(bag_ns)
-        self._unstamped_commands[1].append(twist(message))
+    def _take_command(self, bag_ns: int, message: Any) -> None:
+        self._commands[0].append(bag_ns)
+        self._commands[1].append(twist(message))
 
     def _taker_of_odometry(self, topic: str) -> Callable[[int, Any], None]:
         def handle(_: int, message: Any) -> None:

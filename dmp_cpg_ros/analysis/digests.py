@@ -10,7 +10,7 @@ from pathlib import Path
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.rosbag2 import ReaderError
 
-from dmp_cpg_ros.analysis.bag import bag_folder, opened
+from dmp_cpg_ros.analysis.bag import find_bag, opened
 from dmp_cpg_ros.core.errors import DataError
 
 TOPICS = ('canonical_state', 'joint_states', 'joint_targets')
@@ -40,10 +40,10 @@ def payload_digests(path: Path | str) -> dict[str, str]:
     MissingFileError, DataError
         If there is no readable bag.
     """
-    folder = bag_folder(path)
+    bag = find_bag(path)
     hashes: dict[str, hashlib._Hash] = {}
     try:
-        with opened(folder) as reader:
+        with opened(bag) as reader:
             used = [
                 connection
                 for connection in reader.connections
@@ -57,7 +57,7 @@ def payload_digests(path: Path | str) -> dict[str, str]:
                     raw = _content(reader, raw, connection.msgtype)
                 hashes.setdefault(key, hashlib.sha256()).update(raw)
     except (AnyReaderError, ReaderError, OSError) as error:
-        raise DataError(f"the bag '{folder}' is damaged: {error}") from error
+        raise DataError(f"the bag '{bag}' is damaged: {error}") from error
     return {key: value.hexdigest() for key, value in sorted(hashes.items())}
 
 

@@ -16,6 +16,12 @@ SPEED_TOLERANCE = 0.10
 REAL_TIME_FACTOR = 0.98
 """Least real-time factor of a run that was to keep wall time."""
 
+COSTS = {
+    'joint_work': 'from the work of every physics step',
+    'joint_states': 'estimated from torque and speed at the stamps alone',
+}
+"""What a cost of transport was taken from, in words."""
+
 
 @dataclass(frozen=True)
 class Fact:
@@ -53,6 +59,7 @@ def facts(metrics: Mapping[str, Any], lock_step: bool | None = None) -> list[Fac
         In the order of importance.
     """
     return [
+        *_decoding(metrics),
         *_walking(metrics),
         *_stops(metrics),
         *_timing(metrics, lock_step),
@@ -60,13 +67,24 @@ def facts(metrics: Mapping[str, Any], lock_step: bool | None = None) -> list[Fac
     ]
 
 
+def _decoding(metrics: Mapping[str, Any]) -> list[Fact]:
+    lost = metrics['recording']['undecodable_messages']
+    if not lost:
+        return []
+    return [Fact('Every message could be decoded', f'{lost} could not and were left out', False)]
+
+
 def _walking(metrics: Mapping[str, Any]) -> list[Fact]:
     robot, gait = metrics['robot'], metrics['gait']
     error = metrics['tracking']['v_error_max']
     fell = robot['fell']
     finding = 'not recorded' if fell is None else 'it fell' if fell else 'it did'
+    holds = None if fell is None else not fell
+    if robot['down_at_start']:
+        again = ', and fell again' if fell else ''
+        finding, holds = f'it was down at the beginning{again}', False if fell else None
     found = [
-        Fact('The robot stayed on its feet', finding, None if fell is None else not fell),
+        Fact('The robot stayed on its feet', finding, holds),
         Fact('Distance walked', _number(robot['distance_m'], '{:.2f} m'), None),
         Fact(
             f'Mean speed within {SPEED_TOLERANCE:.0%} of the reference wherever that was constant',
@@ -74,6 +92,9 @@ def _walking(metrics: Mapping[str, Any]) -> list[Fact]:
             None if error is None else error <= SPEED_TOLERANCE,
         ),
     ]
+    if robot['cost_of_transport'] is not None:
+        finding = f'{robot["cost_of_transport"]:.2f}, {COSTS[robot["cost_of_transport_from"]]}'
+        found.append(Fact('Cost of transport', finding, None))
     drift, phase_error = robot['yaw_drift_deg_per_10m'], gait['phase_error_rad_max']
     if drift is not None:
         found.append(Fact('Yaw drift on straight stretches', f'{drift:.2f}° per 10 m', None))

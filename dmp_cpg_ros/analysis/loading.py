@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.rosbag2 import ReaderError
 
-from dmp_cpg_ros.analysis.bag import bag_folder, opened
+from dmp_cpg_ros.analysis.bag import decoded, find_bag, opened
 from dmp_cpg_ros.analysis.collecting import Collector
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.errors import DataError
@@ -21,7 +22,7 @@ def load_recording(path: Path | str) -> Recording:
     Parameters
     ----------
     path : path-like
-        A rosbag2 folder (MCAP or SQLite) or a run's folder with ``bag/`` inside.
+        A rosbag2 folder (MCAP or SQLite), one file of it, or a run's folder with ``bag/`` inside.
 
     Returns
     -------
@@ -32,25 +33,26 @@ def load_recording(path: Path | str) -> Recording:
     MissingFileError
         If the path does not exist.
     DataError
-        If it is not a readable bag, or holds the topics of more than one robot.
+        If it is not a readable bag, or holds the topics of more than one robot. Single messages
+        that cannot be decoded are no error: they are left out, counted and warned of.
     """
-    folder = bag_folder(path)
-    collector = Collector()
+    bag = find_bag(path)
+    collector, skipped = Collector(), Counter[str]()
     try:
-        with opened(folder) as reader:
+        with opened(bag) as reader:
             _check_one_robot(reader)
-            handlers = {}
-            for connection in reader.connections:
-                handler = collector.handler(_base_name(connection.topic), connection.msgtype)
-                if handler is not None:
-                    handlers[connection.id] = handler
-            used = [connection for connection in reader.connections if connection.id in handlers]
-            for connection, bag_ns, raw in reader.messages(used) if used else ():
-                handlers[connection.id](bag_ns, reader.deserialize(raw, connection.msgtype))
+            handlers = {
+                (connection.topic, connection.msgtype): handler
+                for connection in reader.connections
+                if (handler := collector.handler(_base_name(connection.topic), connection.msgtype))
+            }
+            used = [c for c in reader.connections if (c.topic, c.msgtype) in handlers]
+            for connection, bag_ns, message in decoded(reader, used, skipped):
+                handlers[connection.topic, connection.msgtype](bag_ns, message)
             counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}
     except (AnyReaderError, ReaderError, OSError) as error:
-        raise DataError(f"the bag '{folder}' is damaged: {error}") from error
-    return collector.recording(counts)
+        raise DataError(f"the bag '{bag}' is damaged: {error}") from error
+    return collector.recording(counts, dict(skipped))
 
 
 def _base_name(topic: str) -> str:

@@ -54,7 +54,7 @@ def stacked(rows: Rows, width: int) -> tuple[Array, Array]:
 
 
 def robot_clock(bag_ns: list[int], clock: tuple[list[int], list[int]]) -> list[int]:
-    """Stamps on the robot's clock for messages without one.
+    """Stamps on the robot's clock for messages whose own stamps are not of it.
 
     The bag's record time may be wall time: each message gets the stamp of the tick that was
     recorded last before it. A bag without ticks keeps its own time.

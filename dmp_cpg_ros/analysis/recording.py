@@ -45,6 +45,25 @@ class JointSeries:
 
 
 @dataclass(frozen=True)
+class WorkSeries:
+    """What the joints' torques did, taken at every physics step.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    work : ndarray (n, 12)
+        Positive mechanical work since time 0 [J].
+    peak_effort : ndarray (n, 12)
+        Largest size of the torque since the row before [N m].
+    """
+
+    time: Array = field(default_factory=no_rows)
+    work: Array = field(default_factory=lambda: no_rows(N_JOINTS))
+    peak_effort: Array = field(default_factory=lambda: no_rows(N_JOINTS))
+
+
+@dataclass(frozen=True)
 class CanonicalSeries:
     """Canonical states.
 
@@ -220,6 +239,8 @@ class Recording:
     ----------
     joints, targets : JointSeries
         Measured joint states, and the four legs' targets merged by stamp.
+    work : WorkSeries
+        Work and largest torques, where the robot told them.
     canonical : CanonicalSeries
         Oscillators.
     reference, commands : VelocitySeries
@@ -242,10 +263,14 @@ class Recording:
         Record times of the ticks.
     counts : mapping of str to int
         Messages per recorded topic.
+    undecodable : mapping of str to int
+        Those among them, on topics that the analysis reads, that were left out because they could
+        not be decoded.
     """
 
     joints: JointSeries = field(default_factory=JointSeries)
     targets: JointSeries = field(default_factory=JointSeries)
+    work: WorkSeries = field(default_factory=WorkSeries)
     canonical: CanonicalSeries = field(default_factory=CanonicalSeries)
     reference: VelocitySeries = field(default_factory=VelocitySeries)
     commands: VelocitySeries = field(default_factory=VelocitySeries)
@@ -259,6 +284,7 @@ class Recording:
     statuses: Mapping[str, tuple[StatusEvent, ...]] = field(default_factory=dict)
     arrivals: ArrivalSeries = field(default_factory=ArrivalSeries)
     counts: Mapping[str, int] = field(default_factory=dict)
+    undecodable: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def diagnostics(self) -> dict[str, StatusEvent]:

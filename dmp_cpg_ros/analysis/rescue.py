@@ -1,125 +1,170 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Makes a sound rosbag2 folder of an MCAP recording that was not closed.
+"""Makes sound copies of MCAP recordings that the usual readers refuse.
 
-The usual readers refuse a file without its summary. The file is therefore read as a stream, record
-by record, up to where it breaks off, and written anew.
+They refuse a file that was not closed, for it has no summary, and one with channels that are not
+ROS's. Such a file is read as a stream, record by record, up to where it breaks off, and written
+anew. The file itself stays as it is.
 """
 
 from __future__ import annotations
 
 import fcntl
-import shutil
+import filecmp
+import logging
+import os
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 from mcap.exceptions import McapError
-from mcap.records import Channel, McapRecord, Message, Schema
+from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
-from rosbags.interfaces import Connection
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.rosbag2.metadata import parse_qos
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from mcap.writer import MCAP0_MAGIC, Writer
 
-from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.numbered_paths import numbered
+
+ROS_SCHEMAS = ('ros2msg', 'ros2idl', 'omgidl')
+"""Encodings of definitions that readers of ROS know."""
 
 
-def rescue(bag: Path | str) -> Path:
-    """Rewrite an MCAP bag from every record of it that is complete.
+def is_closed(file: Path) -> bool:
+    """Whether an MCAP file ends as one that was closed."""
+    with file.open('rb') as stream:
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(0, size - len(MCAP0_MAGIC)))
+        return stream.read() == MCAP0_MAGIC
 
-    The damaged file is replaced only when its replacement is complete, so that an interrupted
-    rescue can be repeated.
+
+def rescued(file: Path, bag: Path, stack: ExitStack) -> Path:
+    """Copy every complete record of an MCAP file into ``BAG.rescued/``, beside the bag.
+
+    Where that cannot be written the copy is temporary. A copy that is there already is never
+    overwritten: when it differs, the next free name is taken.
 
     Parameters
     ----------
-    bag : path-like
-        Folder of the bag.
+    file : Path
+        The file.
+    bag : Path
+        The bag that it belongs to: itself or its folder.
+    stack : ExitStack
+        Removes what is temporary.
 
     Returns
     -------
     Path
-        The same folder, now with a sound file and ``metadata.yaml``.
+        The copy.
 
     Raises
     ------
-    MissingFileError
-        If there is no such folder.
     DataError
-        If it holds no MCAP file or no message, is still being recorded, or cannot be written.
+        If it holds no complete message, is still being recorded, or cannot be copied.
     """
-    bag = Path(bag)
-    if not bag.is_dir():
-        raise MissingFileError(f"'{bag}' is no folder; name the folder of a rosbag2 recording")
     bag = bag.resolve()
-    sources = sorted(bag.glob('*.mcap'))
-    if not sources:
-        raise DataError(f"'{bag}' holds no *.mcap file; only MCAP recordings can be rescued")
-    work = bag / '.rescue'
     try:
-        shutil.rmtree(work, ignore_errors=True)
-        work.mkdir()
-        count = _rewrite(sources, work / bag.name)
-        if count == 0:
-            raise DataError(f"'{bag}' holds no complete message")
-        _replace(bag, work / bag.name, sources)
-    except OSError as error:
-        raise DataError(f"'{bag}' cannot be rescued: {error}") from error
-    finally:
-        shutil.rmtree(work, ignore_errors=True)
-    return bag
+        scratch, lasting = _scratch(bag.parent, stack), True
+    except OSError:
+        scratch, lasting = _scratch(None, stack), False
+    copy = scratch / file.name
+    count = _copy(file, copy, ros_only=False)
+    if lasting:
+        copy = _settled(copy, bag.with_name(f'{bag.stem if bag.is_file() else bag.name}.rescued'))
+    _log().warning(
+        "'%s' was not closed: reading its %d complete messages from the %scopy '%s'",
+        file, count, '' if lasting else 'temporary ', copy)
+    return copy
 
 
-def _rewrite(sources: list[Path], target: Path) -> int:
-    """Write every complete message of some files into a new bag; returns their number."""
+def ros_part(file: Path, stack: ExitStack) -> Path:
+    """Return a temporary copy of an MCAP file without the channels that are not ROS's.
+
+    Raises
+    ------
+    DataError
+        If it holds no message of ROS, or cannot be copied.
+    """
+    copy = _scratch(None, stack) / file.name
+    _copy(file, copy, ros_only=True)
+    _log().warning("'%s': leaving out what is not of ROS", file)
+    return copy
+
+
+def _log() -> logging.Logger:
+    return logging.getLogger(__name__)
+
+
+def _scratch(folder: Path | None, stack: ExitStack) -> Path:
+    return Path(stack.enter_context(TemporaryDirectory(prefix='.rescue_', dir=folder)))
+
+
+def _settled(copy: Path, folder: Path) -> Path:
+    """Move a copy into the first of the numbered folders where it or nothing of its name is."""
+    target = next(place / copy.name for place in numbered(folder)
+                  if not (place / copy.name).exists()
+                  or filecmp.cmp(copy, place / copy.name, shallow=False))
+    target.parent.mkdir(exist_ok=True)
+    return copy.replace(target)
+
+
+def _copy(source: Path, target: Path, *, ros_only: bool) -> int:
+    """Write what is complete in a file into a new one; returns the number of messages."""
     count = 0
-    with Writer(target, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        copier = _Copier(writer)
-        for source in sources:
-            with _unlocked(source) as file:
-                copier.start_file()
-                for record in _complete_records(file):
-                    count += copier.copy(record)
+    try:
+        with source.open('rb') as file, target.open('wb') as copy:
+            _refuse_recording(file, source)
+            copier = _Copier(Writer(copy), ros_only)
+            for record in _complete_records(file):
+                count += copier.take(record)
+            copier.writer.finish()
+    except OSError as error:
+        raise DataError(f"'{source}' cannot be rescued: {error}") from error
+    if count == 0:
+        raise DataError(f"'{source}' holds no complete message")
     return count
 
 
 class _Copier:
-    """Copies schemas, channels and messages into a writer."""
+    """Copies records into a writer, which numbers schemas and channels anew."""
 
-    def __init__(self, writer: Writer) -> None:
-        self._writer = writer
-        self._store = get_typestore(Stores.ROS2_JAZZY)
-        self._by_topic: dict[tuple[str, str], Connection] = {}
+    def __init__(self, writer: Writer, ros_only: bool) -> None:
+        self.writer, self._ros_only = writer, ros_only
+        self._schemas, self._channels = {0: 0}, dict[int, int]()  # new numbers by old ones
 
-    def start_file(self) -> None:
-        """Forget the numbers of schemas and channels; every file has its own."""
-        self._schemas: dict[int, Schema] = {}
-        self._connections: dict[int, Connection] = {}
-
-    def copy(self, record: McapRecord) -> int:
-        """Copy a record; returns 1 for a message, 0 for everything else."""
-        if isinstance(record, Schema):
-            self._schemas[record.id] = record
+    def take(self, record: McapRecord) -> int:
+        """Copy a record; returns 1 for a message that was copied, 0 for everything else."""
+        writer = self.writer
+        if isinstance(record, Header):
+            writer.start('ros2' if self._ros_only else record.profile)
+        elif isinstance(record, Schema):
+            wanted = record.encoding in ROS_SCHEMAS or not self._ros_only
+            if wanted and record.id not in self._schemas:
+                self._schemas[record.id] = writer.register_schema(
+                    record.name, record.encoding, record.data)
         elif isinstance(record, Channel):
-            self._connections[record.id] = self._connection(
-                record, self._schemas[record.schema_id])
+            if record.id not in self._channels and self._is_wanted(record):
+                self._channels[record.id] = writer.register_channel(
+                    record.topic, record.message_encoding, self._schemas[record.schema_id],
+                    record.metadata)
         elif isinstance(record, Message):
-            self._writer.write(self._connections[record.channel_id], record.log_time, record.data)
-            return 1
+            if record.channel_id in self._channels:
+                writer.add_message(self._channels[record.channel_id], record.log_time, record.data,
+                                   record.publish_time, record.sequence)
+                return 1
+        elif isinstance(record, Attachment):
+            writer.add_attachment(record.create_time, record.log_time, record.name,
+                                  record.media_type, record.data)
+        elif isinstance(record, Metadata):
+            writer.add_metadata(record.name, record.metadata)
         return 0
 
-    def _connection(self, channel: Channel, schema: Schema) -> Connection:
-        key = (channel.topic, schema.name)
-        if key not in self._by_topic:
-            if schema.name not in self._store.types:
-                self._store.register(get_types_from_msg(schema.data.decode(), schema.name))
-            self._by_topic[key] = self._writer.add_connection(
-                channel.topic, schema.name, typestore=self._store,
-                serialization_format=channel.message_encoding,
-                offered_qos_profiles=parse_qos(channel.metadata.get('offered_qos_profiles', '')))
-        return self._by_topic[key]
+    def _is_wanted(self, channel: Channel) -> bool:
+        return not self._ros_only or (
+            channel.message_encoding == 'cdr' and channel.schema_id in self._schemas)
 
 
 def _complete_records(file: BinaryIO) -> Iterator[McapRecord]:
@@ -130,22 +175,9 @@ def _complete_records(file: BinaryIO) -> Iterator[McapRecord]:
         return
 
 
-@contextmanager
-def _unlocked(path: Path) -> Iterator[BinaryIO]:
-    """Open a file that nobody is recording into; raises DataError when somebody is."""
-    with path.open('rb') as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise DataError(f"'{path}' is still being recorded; stop its recorder first") from None
-        yield file
-
-
-def _replace(bag: Path, rescued: Path, sources: list[Path]) -> None:
-    """Put the new file in the place of the old ones, then the metadata."""
-    new = rescued / f'{rescued.name}.mcap'
-    new.replace(bag / new.name)
-    (rescued / 'metadata.yaml').replace(bag / 'metadata.yaml')
-    for source in sources:
-        if source.name != new.name:
-            source.unlink()
+def _refuse_recording(file: BinaryIO, path: Path) -> None:
+    """Raise DataError when somebody is recording into a file."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise DataError(f"'{path}' is still being recorded; stop its recorder first") from None

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.analysis.bag import bag_folder
+from dmp_cpg_ros.analysis.bag import find_bag
 from dmp_cpg_ros.analysis.context import find_parameter
 from dmp_cpg_ros.analysis.digests import payload_digests
 from dmp_cpg_ros.analysis.facts import facts
@@ -51,6 +51,7 @@ def analyze_run(
         Run's folder with ``bag/`` inside, or a bag.
     out : path-like, optional
         Where to write; without, the run's folder, or ``NAME_analysis`` beside a bare bag ``NAME``.
+        A bag is bare unless it is named by the folder around it, or a run's manifest is beside it.
     robot_file : path-like, optional
         The robot that walked; without, the one that the parameters name, else the package's own.
     parameters : mapping, optional
@@ -76,8 +77,8 @@ def analyze_run(
     MissingFileError, DataError, ParameterError
         If there is no readable bag, or ``robot_file`` cannot be used.
     """
-    bag = bag_folder(run_dir)
-    run = bag.parent if bag.name == 'bag' else None
+    bag = find_bag(run_dir)
+    run = _run_of(bag, Path(run_dir))
     earlier = {} if run is None or parameters is not None else read_json(run / 'manifest.json')
     if certificate is None and run is not None:
         certificate = read_json(run / 'metrics.json').get('certificate')
@@ -97,7 +98,7 @@ def analyze_run(
     draw = None
     if pictures and report and context.robot is not None:
         draw = picture_taker(robot_path, context.world)
-    folder = Path(out) if out is not None else run or bag.with_name(f'{bag.name}_analysis')
+    folder = Path(out) if out is not None else run or _beside(bag)
     return write_results(folder, recording, context, manifest, certificate, draw, report)
 
 
@@ -124,6 +125,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _run_of(bag: Path, given: Path) -> Path | None:
+    """Run's folder around a bag; None for a bare bag."""
+    if bag == given / 'bag':
+        return given
+    folder = bag.resolve() if bag.is_dir() else bag.resolve().parent
+    is_run = folder.name == 'bag' and (folder.parent / 'manifest.json').is_file()
+    return folder.parent if is_run else None
+
+
+def _beside(bag: Path) -> Path:
+    """Folder for the results of a bare bag."""
+    bag = bag.resolve()
+    return bag.with_name(f'{bag.name if bag.is_dir() else bag.stem}_analysis')
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='analyze',
@@ -133,7 +149,7 @@ def _parser() -> argparse.ArgumentParser:
         'bag',
         metavar='BAG_OR_RUN',
         type=Path,
-        help="rosbag2 folder (MCAP or SQLite), or a run's folder with bag/ inside",
+        help="rosbag2 folder or file (MCAP or SQLite), or a run's folder with bag/ inside",
     )
     parser.add_argument(
         '--out',

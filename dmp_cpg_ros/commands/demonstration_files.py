@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis.bag import bag_folder, opened
+from dmp_cpg_ros.analysis.bag import decoded, find_bag, opened
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 
@@ -150,7 +151,7 @@ def _from_numpy(path: Path) -> Demonstration:
 def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:
     """Positions by joint name at every stamp at which all wanted joints are known."""
     samples: dict[int, dict[str, tuple[float, float | None]]] = {}
-    with opened(bag_folder(path)) as reader:
+    with opened(find_bag(path)) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         full = next((t for t in kinds if t == topic or t.endswith('/' + topic.lstrip('/'))), None)
         usable = sorted(t for t, kind in kinds.items() if kind == _JOINT_STATE)
@@ -160,8 +161,7 @@ def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:
                 f'{", ".join(usable) or "none in this bag"}'
             )
         chosen = [c for c in reader.connections if c.topic == full]
-        for connection, bag_ns, raw in reader.messages(connections=chosen):
-            message: Any = reader.deserialize(raw, connection.msgtype)
+        for _, bag_ns, message in decoded(reader, chosen, Counter()):
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             row = samples.setdefault(stamp or bag_ns, {})
             for i, name in enumerate(message.name):

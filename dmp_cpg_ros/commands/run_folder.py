@@ -12,6 +12,7 @@ from typing import Any
 import yaml
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.numbered_paths import first_free
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
 from dmp_cpg_ros.suite import node_sets
@@ -41,9 +42,7 @@ def make_run_folder(out: Path | None) -> Path:
             return out.resolve()
         runs = Path('runs')
         runs.mkdir(exist_ok=True)
-        stem = datetime.datetime.now().strftime('%Y-%m-%d_%H-%M-%S')
-        names = (stem if not again else f'{stem}_{again}' for again in range(1000))
-        folder = next(runs / name for name in names if not (runs / name).exists())
+        folder = first_free(runs / datetime.datetime.now().strftime('%Y-%m-%d_%H-%M-%S'))
         folder.mkdir()
         latest = runs / 'latest'
         if latest.is_symlink() or not latest.exists():

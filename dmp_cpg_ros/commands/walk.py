@@ -71,10 +71,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         flush=True,
     )
     status = _run(scenario, suite, overrides, folder, options)
-    if (folder / 'bag').is_dir():
-        status = max(status, _analyze(scenario, suite, certificate, overrides, folder, options))
-    if options.video is not None and (folder / 'bag').is_dir():
-        _film(folder, film_path(options.video, folder))
+    recorded = (folder / 'bag').is_dir()
+    try:
+        if recorded and status == INTERRUPTED:
+            print('walk: making the report, which a second Ctrl-C skips', file=sys.stderr)
+        if recorded:
+            found = _analyze(scenario, suite, certificate, overrides, folder, options)
+            status = max(status, found)
+        if recorded and options.video is not None:
+            _film(folder, film_path(options.video, folder))
+    except KeyboardInterrupt:
+        print(f'walk: report skipped; make it with: analyze {folder}', file=sys.stderr)
+        status = INTERRUPTED
     print(f'{folder.name}: {time.monotonic() - begin:.0f} s in all')
     return status
 

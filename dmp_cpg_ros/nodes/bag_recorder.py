@@ -20,14 +20,16 @@ from rosgraph_msgs.msg import Clock
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.nodes.bag_writing import STORAGES, BagWriter
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL, TOPICS, Interface
+from dmp_cpg_ros.nodes.interfaces import RECORDED, STAMPED_CMD_VEL, Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.tick_inputs import drain
 
 ALL = 'all'
 
-CLOCK_TOPICS = ('/clock', 'joint_states', 'imu', 'odom', 'foot_contacts')
-"""Topics whose stamps are the robot's clock, because the robot itself writes them."""
+CLOCK_TOPICS = ('joint_states', 'imu', 'odom', 'foot_contacts')
+"""Topics whose stamps are the robot's clock, because this robot itself writes them; of ``/clock``
+there may be several.
+"""
 
 TICK_TOPIC = 'joint_states'
 
@@ -36,11 +38,12 @@ TICK_TOPIC = 'joint_states'
 class RecorderParameters(Parameters):
     """Parameters of the recorder."""
 
-    output: str = parameter('bag', 'folder of the recording; must not exist yet')
+    output: str = parameter('bag', 'folder of the recording; where it exists the next free of '
+                            'bag_1, bag_2, ...')
     storage: str = parameter('mcap', 'kind of file; only mcap survives a killed recorder',
                              choices=STORAGES)
     topics: tuple[str, ...] = parameter((ALL,), 'topics to record', choices=(
-        ALL, *(topic.name for topic in TOPICS)))
+        ALL, *(topic.name for topic in RECORDED)))
     flush_period: float = parameter(0.25, 'time between flushes; what is older survives a kill',
                                     unit='s', minimum=0.02, maximum=60.0)
     stamped_cmd_vel: bool = parameter(False, 'whether cmd_vel is TwistStamped')
@@ -59,10 +62,18 @@ class BagRecorder(ManagedNode):
     def configure(self) -> None:
         """Open the bag and subscribe."""
         parameters = self.parameters_of(RecorderParameters)
-        self._bag = BagWriter(Path(parameters.output).expanduser(), parameters.storage)
+        wanted = Path(parameters.output).expanduser()
+        self._bag = BagWriter(wanted, parameters.storage)
+        if self._bag.folder != wanted:
+            self.get_logger().warning(f"'{wanted}' exists: recording into '{self._bag.folder}'")
+        topics = [topic for topic in RECORDED
+                  if ALL in parameters.topics or topic.name in parameters.topics]
+        stamped = [topic.name for topic in topics if _bears_robot_time(topic)]
+        clocks = [name for name in stamped if name in CLOCK_TOPICS] or stamped
         self._subscriptions_drained_at_end = [
-            self._record(self._offered(topic, parameters)) for topic in TOPICS
-            if ALL in parameters.topics or topic.name in parameters.topics]
+            self._record(self._offered(topic, parameters), topic.name in stamped,
+                         topic.name in clocks)
+            for topic in topics]
         self.serve('~/recorded', self._answer_recorded)
         self._started = time.monotonic()
         # The wall clock drives only how much a kill may cost.
@@ -103,7 +114,7 @@ class BagRecorder(ManagedNode):
     def _offered(self, topic: Interface, parameters: RecorderParameters) -> Interface:
         return STAMPED_CMD_VEL if parameters.stamped_cmd_vel and topic.name == 'cmd_vel' else topic
 
-    def _record(self, topic: Interface) -> Any:
+    def _record(self, topic: Interface, stamped: bool, clock: bool) -> Any:
         """Subscribe; the writer needs the full name that only the subscription knows."""
         writers: list[Callable[[bytes], None]] = []
         is_tick = topic.name == TICK_TOPIC
@@ -116,12 +127,16 @@ class BagRecorder(ManagedNode):
 
         subscription = self.listen(topic, receive, raw=True, qos=topic.recorder_qos)
         assert subscription is not None, 'the recorder is a process of its own'
-        fields = topic.type.get_fields_and_field_types()
         writers.append(self._bag.add_topic(
-            subscription.topic_name, topic.type_name, topic.publisher_qos,
-            stamped='header' in fields or topic.type is Clock,
-            clock=topic.name in CLOCK_TOPICS))
+            subscription.topic_name, topic.type_name, topic.publisher_qos, stamped=stamped,
+            clock=clock))
         return subscription
+
+
+def _bears_robot_time(topic: Interface) -> bool:
+    """Whether the messages of a topic begin with a stamp that the suite itself sets."""
+    begins = 'header' in topic.type.get_fields_and_field_types() or topic.type is Clock
+    return begins and 'user' not in topic.publishers
 
 
 def main() -> int:

@@ -4,14 +4,17 @@
 
 MCAP files consist of chunks; what lies in closed chunks survives. :meth:`BagWriter.flush` closes
 the chunk and hands it to the operating system, so that a killed recorder loses no more than what
-came after the last flush; :func:`~dmp_cpg_ros.analysis.rescue.rescue` makes a sound bag of the
-file. SQLite recordings are one transaction, which is committed when the bag is closed: a killed
-recorder leaves an empty one.
+came after the last flush; :mod:`~dmp_cpg_ros.analysis.rescue` makes a sound copy of the file.
+SQLite recordings are one transaction, which is committed when the bag is closed: a killed recorder
+leaves an empty one.
 
-Time of a record: the stamp of the message. A recording then does not depend on when its messages
-happened to arrive, and in lock-step not on the machine. Messages without a stamp (``cmd_vel``, or
-stamp zero from a node that knows no time yet) bear the newest time of the robot's clock; those
-that arrive before the clock is known wait for it.
+Time of a record: when the message was received, on the robot's clock, which is the newest stamp
+among the robot's own topics. Topics of the suite bear stamps of that clock: there the stamp itself
+is the time, so that a lock-step recording does not depend on when its messages happened to arrive.
+A message that comes before the clock has reached its stamp waits for it. All others get the time
+that the clock shows: those of users, who may stamp with the time of the day; those without a
+stamp (stamp zero comes from a node that knows no time yet); and those whose stamp is before the
+recording or more than ``LAG_NS`` ahead. Nothing lies outside the time of the robot.
 """
 
 from __future__ import annotations
@@ -36,12 +39,18 @@ from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_typestore
 
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.core.numbered_paths import first_free
 
 STORAGES = ('mcap', 'sqlite3')
 
 _STAMP_LITTLE, _STAMP_BIG = struct.Struct('<iI'), struct.Struct('>iI')
 _STAMP_AT = 4
 """A stamp that begins a message lies behind the four bytes that say how it is encoded."""
+
+LAG_NS = 1_000_000_000
+"""How far the robot's topics may come apart on their way to the recorder [ns]; a clock that goes
+back by more has begun anew.
+"""
 
 _UNSET = QosTime(9223372036, 854775807)
 
@@ -56,36 +65,43 @@ class BagWriter:
     Parameters
     ----------
     folder : Path
-        Must not exist; parents are made.
+        Where there is something already, the next free of ``NAME_1``, ``NAME_2``, …; parents are
+        made.
     storage : str
         ``mcap`` or ``sqlite3``.
 
     Attributes
     ----------
+    folder : Path
+        The folder that was made.
     counts : dict of str to int
         Messages per topic.
+    newest_ns : int or None
+        Time on the robot's clock [ns].
     flushed : int
         Messages that survive a kill.
 
     Raises
     ------
     ParameterError
-        If the folder exists or cannot be made.
+        If the folder cannot be made.
     """
 
     def __init__(self, folder: Path, storage: str = 'mcap') -> None:
         """Open the bag."""
-        self.folder, self.flushed = folder, 0
+        self.folder, self.flushed = first_free(folder), 0
         self.counts: dict[str, int] = {}
         self.newest_ns: int | None = None
-        self._waiting: list[tuple[Connection, bytes]] = []
+        self._first_ns = 0
+        self._waiting: list[tuple[Connection, int, bytes]] = []
         self._store = get_typestore(Stores.ROS2_JAZZY)
         try:
-            self._writer = Writer(folder, version=9, storage_plugin=StoragePlugin[storage.upper()])
+            self._writer = Writer(
+                self.folder, version=9, storage_plugin=StoragePlugin[storage.upper()])
             self._writer.open()
         except (WriterError, OSError) as error:
-            raise ParameterError(f"output '{folder}' must be a folder that does not exist and "
-                                 f'can be made: {error}') from error
+            raise ParameterError(
+                f"output '{folder}' must be a folder that can be made: {error}") from error
         self._file = getattr(self._writer.storage, 'bio', None)
         if self._file is not None:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -103,9 +119,9 @@ class BagWriter:
         qos : QoSProfile
             Profile that its publishers offer.
         stamped : bool
-            Whether its messages begin with a stamp.
+            Whether its messages begin with a stamp of the robot's clock.
         clock : bool
-            Whether their stamps are the robot's clock.
+            Whether these stamps are what makes that clock.
 
         Returns
         -------
@@ -118,15 +134,13 @@ class BagWriter:
 
         def write(data: bytes) -> None:
             self.counts[topic] += 1
-            time_ns = _leading_stamp(data) if stamped else 0
+            stamp = _leading_stamp(data) if stamped else 0
             if clock:
-                self._set_clock(time_ns)
-            elif time_ns == 0:
-                if self.newest_ns is None:
-                    self._waiting.append((connection, data))
-                    return
-                time_ns = self.newest_ns
-            self._write(connection, time_ns, data)
+                self._advance(stamp)
+            if self._is_early(stamp):
+                self._waiting.append((connection, stamp, data))
+            else:
+                self._write(connection, stamp, data)
 
         return write
 
@@ -146,8 +160,10 @@ class BagWriter:
 
     def close(self) -> None:
         """Write what still waits for a clock with the time of the day, and complete the bag."""
-        if self._waiting:
-            self._set_clock(time.time_ns())
+        if self.newest_ns is None:
+            self._advance(time.time_ns())
+        for message in self._waiting:
+            self._write(*message)
         try:
             if not any(self._writer.counts.values()):
                 self._writer.min_timestamp = 0
@@ -155,13 +171,31 @@ class BagWriter:
         except OSError as error:
             raise RecordingError(f"cannot complete '{self.folder}': {error}") from error
 
-    def _set_clock(self, time_ns: int) -> None:
-        waiting, self._waiting = self._waiting, []
-        self.newest_ns = time_ns
-        for connection, data in waiting:
-            self._write(connection, time_ns, data)
+    def _advance(self, stamp: int) -> None:
+        """Set the clock; write what waited for this time."""
+        if self.newest_ns is None:
+            self._first_ns = self.newest_ns = stamp
+        elif not self.newest_ns - LAG_NS <= stamp <= self.newest_ns:
+            self.newest_ns, self._first_ns = stamp, min(stamp, self._first_ns)
+        if self._waiting:
+            waiting, self._waiting = self._waiting, []
+            for message in waiting:
+                if self._is_early(message[1]):
+                    self._waiting.append(message)
+                else:
+                    self._write(*message)
 
-    def _write(self, connection: Connection, time_ns: int, data: bytes) -> None:
+    def _is_early(self, stamp: int) -> bool:
+        """Whether the clock is about to reach a stamp, or is not known yet."""
+        return self.newest_ns is None or self.newest_ns < stamp <= self.newest_ns + LAG_NS
+
+    def _write(self, connection: Connection, stamp: int, data: bytes) -> None:
+        """Write a message with its stamp, or with the time of the clock where that is no time of
+        this recording.
+        """
+        assert self.newest_ns is not None
+        in_recording = 0 < stamp and self._first_ns <= stamp <= self.newest_ns
+        time_ns = stamp if in_recording else self.newest_ns
         try:
             self._writer.write(connection, time_ns, data)
         except OSError as error:

@@ -71,13 +71,16 @@ class Interface:
         What it carries, in a few words.
     publishers, subscribers : tuple of str
         Kinds of nodes that write and read it; of a service: that serve and call it. The recorder
-        reads every topic and is named nowhere; ``user`` stands for whoever is outside the suite.
+        reads what is ``recorded`` and is named nowhere; ``user`` stands for whoever is outside the
+        suite.
     sometimes : tuple of str
         Of both: those that write or read it with some parameters only.
     latched : bool
         Whether a late reader gets the last message (transient local, depth 1).
     service : bool
         Whether it is a service.
+    recorded : bool
+        Whether the recorder takes it: not what only keeps the pace of a run.
     """
 
     name: str
@@ -88,6 +91,7 @@ class Interface:
     latched: bool = False
     service: bool = False
     sometimes: tuple[str, ...] = ()
+    recorded: bool = True
 
     @property
     def publisher_qos(self) -> QoSProfile:
@@ -149,6 +153,10 @@ TOPICS: tuple[Interface, ...] = (
     Interface('foot_contacts', JointState, 'effort = normal force of each foot',
               (_ROBOT,), (_CANONICAL, _LEG, _INHIBITION, _POSTURE),
               sometimes=(_CANONICAL, _LEG, _INHIBITION, _POSTURE)),
+    Interface('joint_work', JointState,
+              'position = positive work of each joint since time 0 [J], effort = largest torque '
+              'since the last message [N m], over every physics step; at every tenth tick',
+              (_ROBOT,), (), sometimes=(_ROBOT,)),
     Interface('estimated_odom', Odometry,
               "estimated pose and twist of base_link, at the parameter's rate",
               (_POSTURE,), (), sometimes=(_POSTURE,)),
@@ -161,12 +169,15 @@ TOPICS: tuple[Interface, ...] = (
               (_POSTURE,), (_INHIBITION, _ROBOT), latched=True),
     Interface('/diagnostics', DiagnosticArray, 'health of every node', SUITE, ()),
     Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds',
-              (_ROBOT,), ('user',), latched=True, sometimes=(_ROBOT,)),
+              (_ROBOT,), ('user',), latched=True, sometimes=(_ROBOT,), recorded=False),
     Interface(f'{GATE_OWNER}/advance_until', Clock,
               'stamp up to which the gate lets ticks pass', ('user',), (_ROBOT,),
-              sometimes=(_ROBOT,)),
+              sometimes=(_ROBOT,), recorded=False),
 )
 """Topics of the suite."""
+
+RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
+"""Topics that a bag can have."""
 
 SERVICES: tuple[Interface, ...] = (
     Interface('inhibit', SetBool, 'true stops the gait, false resumes it',
@@ -215,9 +226,9 @@ def published_by(kind: str) -> tuple[Interface, ...]:
 
 
 def read_by(kind: str) -> tuple[Interface, ...]:
-    """Topics that a kind of node reads; the recorder reads all."""
+    """Topics that a kind of node reads."""
     if kind == 'bag_recorder':
-        return TOPICS
+        return RECORDED
     return tuple(topic for topic in TOPICS if kind in topic.subscribers)
 
 
@@ -228,7 +239,8 @@ def served_by(kind: str) -> tuple[Interface, ...]:
 
 def partners(topic: Interface, *, readers: bool) -> tuple[str, ...]:
     """Kinds of nodes that always read (the recorder included) or always write a topic."""
-    kinds = (*topic.subscribers, 'bag_recorder') if readers else topic.publishers
+    recorder = ('bag_recorder',) if topic.recorded else ()
+    kinds = (*topic.subscribers, *recorder) if readers else topic.publishers
     return tuple(kind for kind in kinds if kind in SUITE and kind not in topic.sometimes)
 
 

@@ -95,6 +95,8 @@ class MujocoRobotNode(ManagedNode):
         self._state: RobotState = self._robot.reset()
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._state_publishers = [self.publisher(name) for name in STATE_TOPICS]
+        if self._state.joint_work is not None:
+            self._work_publisher = self.publisher('joint_work')
         self.listen('joint_targets', self._on_targets)
         self.listen('body_mode', self._on_body_mode)
         self.listen('push', self._on_push, command=True)
@@ -181,6 +183,8 @@ class MujocoRobotNode(ManagedNode):
             self._state_publishers[first:], messages[first:], strict=True
         ):
             publisher.publish(message)
+        if writer.joint_work is not None:
+            self._work_publisher.publish(writer.joint_work)
         self.end_tick()
 
     def _step(self) -> None:

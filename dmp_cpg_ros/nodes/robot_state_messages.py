@@ -26,6 +26,9 @@ from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraf
 
 BASE_FRAME, WORLD_FRAME = 'base_link', 'odom'
 
+WORK_EVERY = 10
+"""``joint_work`` comes with every so many states: it is a sum, of which nothing is lost."""
+
 FOOT_NAMES = tuple(f'{leg}_foot' for leg in LEGS)
 
 
@@ -39,12 +42,15 @@ class RobotStateWriter:
     ----------
     clock, imu, odom, foot_contacts, joint_states : messages
         Valid after :meth:`fill`.
+    joint_work : message or None
+        Only of every tenth state, and of a robot that knows its work.
     """
 
     imu: SerializedImu
     odom: SerializedOdometry
     foot_contacts: SerializedJointState
     joint_states: SerializedJointState
+    joint_work: SerializedJointState | None
 
     def __init__(self) -> None:
         """Lay the messages out."""
@@ -52,6 +58,8 @@ class RobotStateWriter:
         self._imu, self._odom = _imu_message(), OdometryMessage()
         self._joints = JointStateWriter(JOINT_NAMES, FIELDS, BASE_FRAME)
         self._feet = JointStateWriter(FOOT_NAMES, ('effort',), BASE_FRAME)
+        self._work = JointStateWriter(JOINT_NAMES, ('position', 'effort'), BASE_FRAME)
+        self._peak, self._fills = np.zeros(len(JOINT_NAMES)), 0
 
     def fill(self, state: RobotState) -> None:
         """Refill all messages from a state; raises DataError when a number is not finite."""
@@ -69,6 +77,17 @@ class RobotStateWriter:
             checked(state.base_quaternion, 'base_quaternion'),
             checked(state.base_velocity_in_base, 'base_velocity_in_base'),
             checked(state.base_rate_in_base, 'base_rate_in_base'))
+        self.joint_work = self._filled_work(state)
+
+    def _filled_work(self, state: RobotState) -> SerializedJointState | None:
+        if state.joint_work is None or state.joint_peak_effort is None:
+            return None
+        self._peak = np.maximum(self._peak, state.joint_peak_effort)
+        due, self._fills = self._fills % WORK_EVERY == 0, self._fills + 1
+        if not due:
+            return None
+        peak, self._peak = self._peak, np.zeros(len(JOINT_NAMES))
+        return self._work.fill(state.time_ns, state.joint_work, peak)
 
 
 def _imu_message() -> RefilledMessage:

@@ -46,6 +46,8 @@ class MujocoRobot:
     Two runs from ``reset`` with the same targets are identical bit for bit. Contact forces and
     efforts are those of the last physics step before the stamp; the accelerometer's reading is
     its mean over the tick, as a sensor gives that samples faster and filters before it reports.
+    Work and the largest torques are taken at every physics step: most of what the drive does
+    about a new target is over at the next stamp.
 
     Parameters
     ----------
@@ -110,6 +112,8 @@ class MujocoRobot:
         self._start = (
             None if start_pose == 'standing' else pose_of(start_pose, self.description, seed))
         self.data = mujoco.MjData(model)
+        self._torques = np.zeros((self._steps, 12))  # of each physics step of the tick
+        self._rates = np.zeros((self._steps + 1, 12))  # before each of them and after the last
         self._tick = 0
         self._push: tuple[Vector, int] = (np.zeros(3), 0)
         self._pushing = False
@@ -128,7 +132,7 @@ class MujocoRobot:
         data, b = self.data, self._base_qpos
         mujoco.mj_resetData(self.model, data)
         self._drive.reset()
-        self._push = (np.zeros(3), 0)
+        self._push, self._work = (np.zeros(3), 0), np.zeros(12)
         data.qpos[b:b + 3] = start.base_position
         data.qpos[b + 3:b + 7] = start.base_quaternion
         data.qpos[self._qpos] = held = start.joint_position
@@ -137,7 +141,7 @@ class MujocoRobot:
             state = self.step(JointTargets(held, np.zeros(12), np.zeros(12)))
             held = state.joint_position if start.limp else held
         self._drive.reset()
-        self._tick, data.time = 0, 0.0
+        self._tick, data.time, self._work = 0, 0.0, np.zeros(12)
         return self._state()
 
     def _reset_standing(self) -> RobotState:
@@ -157,6 +161,7 @@ class MujocoRobot:
         mujoco.mj_forward(model, data)
         holding = standing_torque(model, data, self._ids, self._dof)
         self._effort = self._drive.limited(holding, np.zeros(12))
+        self._peak_effort, self._work = np.abs(self._effort), np.zeros(12)
         self._actuators.apply(data, self._effort)
         mujoco.mj_forward(model, data)
         # As held at rest: the first instant of the contacts is nothing that a sensor would show.
@@ -181,8 +186,10 @@ class MujocoRobot:
         d, specific_force = self._base_dof, np.zeros(3)
         R_world_base = data.xmat[self._ids.base].reshape(3, 3)  # a view, of the step's begin
         base_velocity = qvel[d:d + 3]
+        torques, rates = self._torques, self._rates
         for i in range(self._steps):
-            self._effort = drive.torque(i, qpos[self._qpos], qvel[self._dof])
+            rates[i] = qvel[self._dof]
+            torques[i] = self._effort = drive.torque(i, qpos[self._qpos], rates[i])
             self._actuators.apply(data, self._effort)
             self._push_on()
             before = base_velocity.copy()
@@ -195,6 +202,12 @@ class MujocoRobot:
                              f'{self._tick * self.tick_ns * 1e-9:.3f} s; lower the gains kp and '
                              'kd or the physics step')
         self._specific_force = specific_force / self._steps
+        rates[-1] = qvel[self._dof]
+        # Over a physics step the torque is constant and the velocity changes evenly: with their
+        # mean the work is what the step adds to the kinetic energy.
+        power = 0.5 * torques * (rates[1:] + rates[:-1])
+        self._work = self._work + np.maximum(power, 0.0).sum(axis=0) * self._step_s
+        self._peak_effort = np.abs(torques).max(axis=0)
         return self._state()
 
     def apply_push(self, force_in_world: Vector, duration_ns: int) -> None:
@@ -288,7 +301,9 @@ class MujocoRobot:
             base_velocity_in_base=qvel[d:d + 3] @ R_world_base,
             base_rate_in_base=qvel[d + 3:d + 6].copy(),
             acceleration_in_base=self._specific_force.copy(),
-            foot_force=self._contacts.foot_force(data))
+            foot_force=self._contacts.foot_force(data),
+            joint_work=self._work,
+            joint_peak_effort=self._peak_effort)
         return state if self._sensors is None else self._sensors.measured(state)
 
 

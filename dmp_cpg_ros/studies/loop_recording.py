@@ -18,6 +18,7 @@ from dmp_cpg_ros.analysis.recording import (
     Recording,
     StatusEvent,
     VelocitySeries,
+    WorkSeries,
 )
 from dmp_cpg_ros.core.loop import Tick
 from dmp_cpg_ros.core.robot_model.state import RobotState
@@ -44,7 +45,8 @@ def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> Re
         odometry=OdometrySeries(
             time, _column(states, 'base_position_in_world'), _column(states, 'base_quaternion'),
             _column(states, 'base_velocity_in_base'), _column(states, 'base_rate_in_base')),
-        feet=FootForceSeries(time, _column(states, 'foot_force')))
+        feet=FootForceSeries(time, _column(states, 'foot_force')),
+        work=_work(time, states))
     if not ticks:
         return robot
     time = _column(ticks, 'time_ns') * 1e-9
@@ -57,6 +59,12 @@ def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> Re
                                   tuple(tick.gait for tick in ticks)),
         reference=VelocitySeries(time, _column(ticks, 'r')), inhibition=tuple(_events(ticks)),
         modes=tuple(_modes(ticks)))
+
+
+def _work(time: NDArray[np.float64], states: Sequence[RobotState]) -> WorkSeries:
+    if any(state.joint_work is None for state in states):
+        return WorkSeries()
+    return WorkSeries(time, _column(states, 'joint_work'), _column(states, 'joint_peak_effort'))
 
 
 def _column(rows: Sequence[object], name: str) -> NDArray[np.float64]:

@@ -150,7 +150,7 @@ def steady(gait: str, velocity: Velocity, robot: str | None = None,
         gained = np.polyfit(np.linspace(0.0, 1.0, len(yaw)), yaw, 1)[0]
         drift = abs(float(np.rad2deg(gained))) * 10.0 / way
         work = cost_of_transport(
-            recording_of(states), RunContext(robot=run.robot.description), way) or nan
+            recording_of(states), RunContext(robot=run.robot.description), way)[0] or nan
     v_x, v_y, gamma = mean.tolist()
     return SteadyOutcome(False, (v_x, v_y, gamma), drift, work)
 

@@ -5,15 +5,25 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
+import re
+import shutil
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import mcap.reader
+import mcap.writer
 import numpy as np
 import pytest
+from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import StoragePlugin, Writer
 from synthetic_bag import STORE, WALL_PER_ROBOT, make, write_bag
 from synthetic_walk import SyntheticWalk
 
+from dmp_cpg_ros.analysis import rescue
+from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.recording import JointSeries, Recording, StatusEvent
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 
@@ -146,12 +156,150 @@ def test_a_bag_without_our_topics_is_an_empty_recording(tmp_path: Path) -> None:
     assert loaded.canonical.x.shape == (0, 4, 2)
 
 
-def test_a_bag_that_was_not_closed_is_rescued(walked: Recording, tmp_path: Path) -> None:
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes()
+            for path in folder.rglob('*') if path.is_file()}
+
+
+def cut(file: Path) -> Path:
+    """Cut the summary at the end off, as a killed recorder does."""
+    file.write_bytes(file.read_bytes()[:-500])
+    return file
+
+
+def written_file(recording: Recording, file: Path) -> Path:
+    """Single MCAP file, without the folder of a bag around it."""
+    bag = write_bag(recording, file.with_suffix('.bag'))
+    (bag / f'{bag.name}.mcap').rename(file)
+    shutil.rmtree(bag)
+    return file
+
+
+def test_a_bag_that_was_not_closed_is_read_from_a_copy(
+    walked: Recording, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     bag = write_bag(walked, tmp_path / 'bag')
-    file = bag / 'bag.mcap'
-    file.write_bytes(file.read_bytes()[:-500])  # the summary at the end is cut off
+    cut(bag / 'bag.mcap')
     (bag / 'metadata.yaml').unlink()
-    assert_same(load_recording(bag), walked)
+    before = contents(bag)
+    assert_same(load_recording(tmp_path), walked)
+    assert contents(bag) == before
+    rescued = tmp_path / 'bag.rescued'
+    line, = caplog.messages
+    assert str(rescued) in line and 'not closed' in line
+    assert_same(load_recording(rescued), walked)
+    load_recording(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['bag', 'bag.rescued']
+    (rescued / 'bag.mcap').write_bytes(b'repaired by hand')
+    assert_same(load_recording(tmp_path), walked)
+    assert (rescued / 'bag.mcap').read_bytes() == b'repaired by hand'
+
+
+def test_a_copy_that_cannot_lie_beside_its_bag_is_temporary(
+    walked: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture
+) -> None:
+    def read_only(prefix: str, dir: Path | None) -> TemporaryDirectory[str]:
+        if dir is not None:
+            raise OSError(errno.EROFS, 'Read-only file system')
+        return TemporaryDirectory(prefix=prefix)
+
+    monkeypatch.setattr(rescue, 'TemporaryDirectory', read_only)
+    file = cut(written_file(walked, tmp_path / 'monday.mcap'))
+    assert_same(load_recording(file), walked)
+    assert list(tmp_path.iterdir()) == [file]
+    copy = re.search("temporary copy '(.*)'", caplog.text)
+    assert copy is not None and not Path(copy[1]).exists()
+
+
+def test_files_of_one_folder_are_separate_recordings(walked: Recording, tmp_path: Path) -> None:
+    less = dataclasses.replace(walked, imu=Recording().imu)
+    monday = written_file(walked, tmp_path / 'monday.mcap')
+    tuesday = cut(written_file(less, tmp_path / 'tuesday.mcap'))
+    before = contents(tmp_path)
+    assert_same(load_recording(monday), walked)
+    assert contents(tmp_path) == before
+    with pytest.raises(DataError, match=r'name one of them: monday\.mcap, tuesday\.mcap'):
+        load_recording(tmp_path)
+    assert_same(load_recording(tuesday), less)
+    assert contents(tmp_path).items() >= before.items()
+    assert set(contents(tmp_path)) - set(before) == {'tuesday.rescued/tuesday.mcap'}
+
+
+def test_the_parts_of_a_split_bag_are_one(walked: Recording, tmp_path: Path) -> None:
+    empty = Recording()
+    rest = {field.name: getattr(empty, field.name) for field in dataclasses.fields(empty)
+            if field.name != 'joints'}
+    (tmp_path / 'day').mkdir()
+    written_file(dataclasses.replace(walked, joints=empty.joints), tmp_path / 'day' / 'day_0.mcap')
+    cut(written_file(dataclasses.replace(walked, **rest), tmp_path / 'day' / 'day_1.mcap'))
+    assert_same(load_recording(tmp_path / 'day'), walked)
+
+
+@pytest.mark.parametrize('closed', [True, False])
+def test_what_is_not_of_ros_is_kept_and_does_not_disturb(
+    walked: Recording, tmp_path: Path, closed: bool
+) -> None:
+    source, file = written_file(walked, tmp_path / 'source.mcap'), tmp_path / 'mixed.mcap'
+    with source.open('rb') as read, file.open('wb') as stream:
+        writer = mcap.writer.Writer(stream, chunk_size=10_000)
+        writer.start(profile='')
+        schema = writer.register_schema('weather', 'jsonschema', b'{"type": "object"}')
+        weather = writer.register_channel('/weather', 'json', schema)
+        writer.add_attachment(1, 2, 'photo.jpg', 'image/jpeg', b'no photo')
+        writer.add_metadata('operator', {'name': 'Ada'})
+        channels: dict[int, int] = {}
+        for number, (schema_there, channel, message) in enumerate(
+                mcap.reader.make_reader(read).iter_messages()):
+            if channel.id not in channels:
+                kind = writer.register_schema(
+                    schema_there.name, schema_there.encoding, schema_there.data)
+                channels[channel.id] = writer.register_channel(
+                    channel.topic, channel.message_encoding, kind, channel.metadata)
+            writer.add_message(channels[channel.id], message.log_time, message.data,
+                               message.publish_time + 7, number)
+            writer.add_message(weather, message.log_time, b'{"rain": false}', message.log_time)
+        writer.finish()
+    source.unlink()
+    before = contents(tmp_path)
+    if closed:
+        assert_same(load_recording(file), walked)
+        assert contents(tmp_path) == before
+        return
+    cut(file)
+    assert_same(load_recording(file), walked)
+    with (tmp_path / 'mixed.rescued' / 'mixed.mcap').open('rb') as read:
+        copy = mcap.reader.make_reader(read)
+        assert [a.data for a in copy.iter_attachments()] == [b'no photo']
+        assert [m.metadata for m in copy.iter_metadata()] == [{'name': 'Ada'}]
+        ours, others = [], []
+        for _, channel, message in copy.iter_messages():
+            (others if channel.topic == '/weather' else ours).append(message)
+    assert len(ours) == len(others)
+    assert all(message.publish_time == message.log_time + 7 for message in ours)
+    assert sorted(message.sequence for message in ours) == list(range(len(ours)))
+
+
+def test_one_message_that_cannot_be_decoded_is_left_out(
+    walked: Recording, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    bag = write_bag(walked, tmp_path / 'bag')
+    kinds = {'/clock': 'rosgraph_msgs/msg/Clock', '/joint_states': 'sensor_msgs/msg/JointState'}
+    with Writer(tmp_path / 'spoiled', version=9) as writer, AnyReader([bag]) as reader:
+        connections = {c.topic: writer.add_connection(c.topic, c.msgtype, typestore=STORE)
+                       for c in reader.connections}
+        for number, (connection, bag_ns, raw) in enumerate(reader.messages()):
+            if number == 20:
+                for topic in kinds:
+                    writer.write(connections[topic], bag_ns, b'\x00\x01\x00\x00\xff\xfe')
+            writer.write(connections[connection.topic], bag_ns, raw)
+    loaded = load_recording(tmp_path / 'spoiled')
+    assert_same(loaded, walked)
+    assert loaded.undecodable == {'/clock': 1, '/joint_states': 1}
+    assert '1 on /clock, 1 on /joint_states' in caplog.text
+    lost = [fact for fact in facts(compute_metrics(loaded)) if 'decoded' in fact.statement]
+    assert [(fact.holds, fact.finding[0]) for fact in lost] == [(False, '2')]
+    assert not any('decoded' in fact.statement for fact in facts(compute_metrics(walked)))
 
 
 def test_what_is_no_bag_is_said_so(tmp_path: Path) -> None:

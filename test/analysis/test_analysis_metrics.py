@@ -13,6 +13,7 @@ import pytest
 from synthetic_walk import BELIEVED, MASS, SyntheticWalk, robot
 
 from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.foot_motion import feet_in_base, foot_slip, shank_rate_in_base
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import rotations
@@ -22,6 +23,7 @@ from dmp_cpg_ros.analysis.recording import (
     OdometrySeries,
     Recording,
     StatusEvent,
+    WorkSeries,
 )
 from dmp_cpg_ros.analysis.strict_json import to_json
 
@@ -235,6 +237,40 @@ def test_cost_of_transport_is_work_over_weight_and_distance() -> None:
     assert metrics['cost_of_transport'] == pytest.approx(
         20.0 * duration / (MASS * 9.81 * metrics['distance_m']), rel=1e-6
     )
+
+
+def test_work_that_the_robot_told_is_believed_rather_than_the_stamps() -> None:
+    walk = SyntheticWalk()
+    recording = walk.recording()
+    n = len(recording.joints.time)
+    joints = dataclasses.replace(
+        recording.joints, velocity=np.ones((n, 12)), effort=np.full((n, 12), 20.0))
+    told = np.zeros((2, 12))
+    told[:, 3], told[:, 7] = (100.0, 160.0), (5.0, 45.0)
+    work = WorkSeries(recording.joints.time[[0, -1]], told, np.full((2, 12), 25.0))
+    metrics = metrics_of(walk, joints=joints, work=work)['robot']
+    estimate = metrics_of(walk, joints=joints)['robot']
+    assert metrics['cost_of_transport'] == pytest.approx(
+        100.0 / (MASS * 9.81 * metrics['distance_m']), rel=1e-9)
+    assert metrics['cost_of_transport_from'] == 'joint_work'
+    assert estimate['cost_of_transport_from'] == 'joint_states'
+    assert metrics['peak_torque_share'] == pytest.approx(1.25 * estimate['peak_torque_share'])
+    for series, words in ((work, 'every physics step'), (WorkSeries(), 'estimated')):
+        fact, = (fact for fact in facts(metrics_of(walk, joints=joints, work=series))
+                 if fact.statement == 'Cost of transport')
+        assert words in fact.finding
+
+
+@pytest.mark.parametrize('falls_again', [False, True])
+def test_a_recording_that_begins_after_a_fall_says_so(falls_again: bool) -> None:
+    walk = SyntheticWalk()
+    words = ['damped', 'recovering', 'standing'] + ['damped'] * falls_again
+    modes = tuple(StatusEvent(0.1 * k, 0, word, {}) for k, word in enumerate(words))
+    fact, = (fact for fact in facts(metrics_of(walk, modes=modes))
+             if fact.statement == 'The robot stayed on its feet')
+    assert 'down at the beginning' in fact.finding
+    assert ('fell again' in fact.finding) == falls_again
+    assert fact.holds is (False if falls_again else None)
 
 
 @pytest.mark.parametrize('what', ['height', 'tilt'])

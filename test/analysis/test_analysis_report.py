@@ -25,7 +25,7 @@ from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
 from dmp_cpg_ros.analysis.pictures import moments, write_pictures
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 from dmp_cpg_ros.analysis.report_parts import flattened, label
 from dmp_cpg_ros.analysis.run import RunResults, write_results
 from dmp_cpg_ros.commands.analyze import BAD_INPUT, analyze_run, main
@@ -168,6 +168,28 @@ def test_every_number_is_defined(results: RunResults) -> None:
     assert set(flattened(numbers)) == set(DEFINITIONS)
 
 
+def test_texts_of_a_recording_are_no_markup(context: RunContext, tmp_path: Path) -> None:
+    hostile = '<script>alert("&")</script>'
+    walk = WALK.recording()
+    values = {'requested': 'true', 'cause': hostile, 'request_stamp': hostile}
+    changed = dataclasses.replace(
+        walk,
+        inhibition=tuple(dataclasses.replace(event, values={**event.values, **values})
+                         for event in walk.inhibition),
+        statuses={hostile: (StatusEvent(1.0, 2, hostile, {hostile: hostile}),)},
+        modes=(StatusEvent(0.0, 0, hostile, {'reason': hostile}),),
+        canonical=dataclasses.replace(
+            walk.canonical, frame=(hostile,) * len(walk.canonical.time)))
+    manifest = {'scenario': hostile, hostile: [hostile, {hostile: hostile}],
+                'parameters': {hostile: hostile}}
+    certificate = [{'name': hostile, hostile: hostile, 'holds': True}]
+    written = write_results(tmp_path, changed, context, manifest, certificate, no_pictures)
+    assert written.report is not None
+    page = written.report.read_text(encoding='utf-8')
+    assert '<script' not in page
+    assert '&lt;script&gt;' in page
+
+
 def test_labels_have_units() -> None:
     assert label('body_speed_at_rest_m_s') == 'body speed at rest [m/s]'
     assert label('request_s') == 'request [s]'
@@ -239,3 +261,24 @@ def test_a_bare_bag_gets_its_results_beside_it(walked: Recording, tmp_path: Path
     assert (
         analyze_run(tmp_path / 'outing', report=False, out=tmp_path / 'x').folder == tmp_path / 'x'
     )
+
+
+def test_a_bare_bag_that_is_called_bag_is_no_run(
+    walked: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_bag(walked, tmp_path / 'bag')
+    monkeypatch.chdir(tmp_path)
+    for name in ('bag', 'bag/bag.mcap', 'bag/metadata.yaml'):
+        assert main([name, '--no-pictures']) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['bag', 'bag_analysis']
+    inside = [path.name for path in (tmp_path / 'bag').iterdir() if path.is_dir()]
+    assert inside == ['bag_analysis']
+    monkeypatch.chdir(tmp_path / 'bag')
+    assert analyze_run('.', report=False).folder == tmp_path / 'bag_analysis'
+
+
+def test_the_bag_of_a_run_has_its_results_in_the_run(walked: Recording, tmp_path: Path) -> None:
+    bag = write_bag(walked, tmp_path / 'bag')
+    assert analyze_run(tmp_path, report=False).folder == tmp_path
+    for path in (bag, bag / 'bag.mcap'):
+        assert analyze_run(path, report=False).folder == tmp_path

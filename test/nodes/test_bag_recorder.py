@@ -5,21 +5,24 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 import ros_processes
+import yaml
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
+from hypothesis import given
+from hypothesis import strategies as st
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from ros_processes import NodeProcess, Processes, Ros
-from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from dmp_cpg_ros.analysis.rescue import rescue
-from dmp_cpg_ros.core.errors import DataError, MissingFileError, ParameterError
+from dmp_cpg_ros.analysis.bag import opened
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.nodes.bag_writing import BagWriter
 from dmp_cpg_ros.nodes.interfaces import interface
 from dmp_cpg_ros.nodes.message_values import set_stamp
@@ -38,7 +41,7 @@ def joint_state(k: int) -> JointState:
 
 
 def read(bag: Path) -> dict[str, list[tuple[int, bytes]]]:
-    with AnyReader([bag]) as reader:
+    with opened(bag) as reader:
         messages: dict[str, list[tuple[int, bytes]]] = {topic: [] for topic in reader.topics}
         for connection, time_ns, data in reader.messages():
             messages[connection.topic].append((time_ns, bytes(data)))
@@ -93,7 +96,7 @@ def test_a_stopped_recorder_has_every_byte(processes: Processes, ros: Ros, tmp_p
         ] == [TICK_NS * (k + 1) for k in range(300)]
     assert len(recorded['/cmd_vel']) == 3
     assert all(TICK_NS <= time_ns <= 300 * TICK_NS for time_ns, _ in recorded['/cmd_vel'])
-    with AnyReader([bag]) as reader:
+    with opened(bag) as reader:
         offered = {c.topic: c.ext.offered_qos_profiles[0] for c in reader.connections}
     assert offered['/inhibition_state'].durability.name == 'TRANSIENT_LOCAL'
     assert offered['/joint_states'].durability.name == 'VOLATILE'
@@ -120,23 +123,68 @@ def test_a_killed_recorder_leaves_what_it_had_flushed(
 
     ros.spin_until(enough, what=lambda: str(process))
     with pytest.raises(DataError, match='still being recorded'):
-        rescue(bag)
+        read(bag)
     on_disk = flushed()
     process.kill()
     assert not (bag / 'metadata.yaml').exists()
-    assert rescue(bag) == bag.resolve()
     recorded = read(bag)
     saved = [data for _, data in recorded['/joint_states']]
     assert saved == sent[:len(saved)]
     assert sum(map(len, recorded.values())) >= on_disk
-    assert rescue(bag) == bag.resolve()  # a sound bag stays as it is
-    assert read(bag) == recorded
+    assert read(bag) == read(bag.with_name('bag.rescued')) == recorded
+    assert sorted(path.name for path in tmp_path.iterdir()) == ['bag', 'bag.rescued']
 
 
-def test_an_output_that_exists_is_refused(processes: Processes, tmp_path: Path) -> None:
-    process = processes.node('bag_recorder', output=tmp_path)
+def test_a_second_recording_gets_a_name_of_its_own(processes: Processes, ros: Ros,
+                                                   tmp_path: Path) -> None:
+    for _ in range(2):
+        process = started(processes, ros, tmp_path / 'bag')
+        process.interrupt()
+        assert process.wait() == 0, process
+    assert process.output.count('WARN') == 1
+    assert f"'{tmp_path / 'bag'}' exists" in process.output
+    for name in ('bag', 'bag_1'):
+        assert (tmp_path / name / 'metadata.yaml').is_file()
+
+
+def test_an_output_that_cannot_be_made_is_refused(processes: Processes, tmp_path: Path) -> None:
+    (tmp_path / 'file').touch()
+    process = processes.node('bag_recorder', output=tmp_path / 'file' / 'bag')
     assert process.wait() == 2
     assert 'output' in process.output and str(tmp_path) in process.output
+
+
+def test_a_real_time_recording_is_as_long_as_the_robot_walked(processes: Processes, ros: Ros,
+                                                              tmp_path: Path) -> None:
+    """Whatever users stamp, and whatever opens the gate."""
+    joints, clock, push = (publisher(ros, name) for name in ('joint_states', '/clock', 'push'))
+    gate = publisher(ros, 'mujoco_robot/advance_until')
+    command = ros.node.create_publisher(TwistStamped, 'cmd_vel', 10)
+    bag = tmp_path / 'bag'
+    process = started(processes, ros, bag, stamped_cmd_vel=True)
+    ros.spin_until(push.get_subscription_count, what=lambda: f'matching with {process}')
+    wall, far = TwistStamped(), Clock()
+    set_stamp(wall.header.stamp, 1_795_314_289_790_000_000)
+    set_stamp(far.clock, (2**31 - 1) * 1_000_000_000)
+    assert gate.get_subscription_count() == 0
+    for k in range(100):
+        joints.publish(joint_state(k))
+        if k % 20 == 10:
+            joints.wait_for_all_acked()
+            command.publish(wall)
+            push.publish(WrenchStamped(header=wall.header))
+            clock.publish(far)
+    for sender in (command, push, clock, joints):
+        sender.wait_for_all_acked()
+    process.interrupt()
+    assert process.wait() == 0, process
+    recorded = read(bag)
+    times = [time_ns for messages in recorded.values() for time_ns, _ in messages]
+    assert [len(recorded[name]) for name in ('/cmd_vel', '/push', '/clock')] == [5, 5, 5]
+    assert min(times) == TICK_NS and max(times) == 100 * TICK_NS
+    information = yaml.safe_load((bag / 'metadata.yaml').read_text())
+    duration = information['rosbag2_bagfile_information']['duration']['nanoseconds']
+    assert duration == 99 * TICK_NS
 
 
 def test_a_node_outside_the_table_is_refused(processes: Processes, tmp_path: Path) -> None:
@@ -149,7 +197,7 @@ def test_a_node_outside_the_table_is_refused(processes: Processes, tmp_path: Pat
 def writer(bag: Path) -> tuple[BagWriter, dict[str, object]]:
     bag_writer = BagWriter(bag)
     writers = {}
-    for name in ('joint_states', 'cmd_vel', 'inhibition_state'):
+    for name in ('joint_states', 'cmd_vel', 'inhibition_state', 'canonical_state'):
         topic = interface(name)
         writers[name] = bag_writer.add_topic(
             f'/{name}', topic.type_name, topic.publisher_qos, stamped=name != 'cmd_vel',
@@ -170,6 +218,35 @@ def test_messages_without_a_stamp_bear_the_time_of_the_robot(tmp_path: Path) -> 
     recorded = read(tmp_path / 'bag')
     assert [time_ns // TICK_NS for time_ns, _ in recorded['/cmd_vel']] == [10, 10, 11]
     assert [time_ns // TICK_NS for time_ns, _ in recorded['/inhibition_state']] == [10]
+
+
+@given(st.permutations([(name, k) for name in ('joint_states', 'canonical_state')
+                        for k in range(3, 9)]))
+def test_record_times_of_the_suite_do_not_depend_on_arrival(order: list[tuple[str, int]]) -> None:
+    with TemporaryDirectory() as folder:
+        bag = Path(folder) / 'bag'
+        closing, write = writer(bag)
+        write['joint_states'](serialize_message(joint_state(2)))
+        for name, k in order:
+            write[name](serialize_message(joint_state(k)))
+        closing.close()
+        recorded = read(bag)
+    for name, first in (('/joint_states', 2), ('/canonical_state', 3)):
+        assert sorted(time_ns for time_ns, _ in recorded[name]
+                      ) == [(k + 1) * TICK_NS for k in range(first, 9)]
+
+
+@pytest.mark.parametrize('stamp_ns', [10**18, 2 * 10**9, 15 * TICK_NS, 3 * TICK_NS])
+def test_no_stamp_leads_out_of_the_time_of_the_robot(tmp_path: Path, stamp_ns: int) -> None:
+    bag, write = writer(tmp_path / 'bag')
+    foreign = JointState()
+    set_stamp(foreign.header.stamp, stamp_ns)
+    write['joint_states'](serialize_message(joint_state(9)))
+    write['canonical_state'](serialize_message(foreign))
+    write['joint_states'](serialize_message(joint_state(10)))
+    bag.close()
+    (time_ns, _), = read(tmp_path / 'bag')['/canonical_state']
+    assert 10 * TICK_NS <= time_ns <= 11 * TICK_NS
 
 
 def test_a_recording_without_a_robot_is_kept(tmp_path: Path) -> None:
@@ -199,24 +276,23 @@ def test_a_file_cut_anywhere_keeps_its_closed_chunks(tmp_path: Path, kept: float
     with file.open('r+b') as stream:
         stream.truncate(size)
     (tmp_path / 'bag' / 'metadata.yaml').unlink()
-    rescue(tmp_path / 'bag')
     expected = max((count for end, count in sizes if end <= size), default=0)
+    if not expected:
+        with pytest.raises(DataError, match='no complete message'):
+            read(tmp_path / 'bag')
+        return
     saved = [data for _, data in read(tmp_path / 'bag')['/joint_states']]
     assert saved[:expected] == [serialize_message(joint_state(k)) for k in range(expected)]
     assert expected <= len(saved) <= expected + 10
 
 
-def test_what_cannot_be_rescued_is_named(tmp_path: Path) -> None:
-    with pytest.raises(MissingFileError, match='nowhere'):
-        rescue(tmp_path / 'nowhere')
-    with pytest.raises(DataError, match='mcap'):
-        rescue(tmp_path)
+def test_what_cannot_be_read_or_made_is_named(tmp_path: Path) -> None:
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'bag.mcap').write_bytes(b'no mcap at all')
     with pytest.raises(DataError, match='no complete message'):
-        rescue(tmp_path / 'bag')
+        read(tmp_path / 'bag')
     with pytest.raises(ParameterError, match='output'):
-        BagWriter(tmp_path / 'bag')
+        BagWriter(tmp_path / 'bag' / 'bag.mcap' / 'bag')
 
 
 def test_clock_is_stamped_like_a_header() -> None:

@@ -147,6 +147,24 @@ def test_robot_state(time_ns: int, values: np.ndarray) -> None:
         *(getattr(sent, name) for name in names))
 
 
+def test_work_comes_at_every_tenth_state_with_the_largest_torque_since() -> None:
+    rng, writer, sent = np.random.default_rng(0), RobotStateWriter(), []
+    peaks = rng.uniform(0.0, 9.0, (31, 12))
+    for k, peak in enumerate(peaks):
+        plain = state_of(np.ones(59), k)
+        writer.fill(dataclasses.replace(
+            plain, joint_work=np.full(12, float(k)), joint_peak_effort=peak))
+        if writer.joint_work is not None:
+            sent.append((k, wire(writer.joint_work)))
+    assert [k for k, _ in sent] == [0, 10, 20, 30]
+    for k, message in sent:
+        assert (header_ns(message), message.name) == (k, list(JOINT_NAMES))
+        assert bits(message.position) == bits(np.full(12, float(k)))
+        assert bits(message.effort) == bits(peaks[max(0, k - 9):k + 1].max(axis=0))
+    writer.fill(state_of(np.ones(59)))  # of a robot that does not know its work
+    assert writer.joint_work is None
+
+
 @given(st.permutations(range(12)), st.booleans(), numbers(12))
 def test_joints_are_taken_by_name(order: list[int], more: bool, position: np.ndarray) -> None:
     names = [JOINT_NAMES[i] for i in order] + (['tail'] if more else [])

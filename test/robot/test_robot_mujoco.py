@@ -188,6 +188,28 @@ def test_effort_stays_within_the_limits(robot):
         assert (np.abs(state.joint_effort) <= limit + 1e-12).all()
 
 
+def test_work_and_peaks_are_those_of_every_physics_step(robot, monkeypatch):
+    steps, advance = [], mujoco.mj_step
+
+    def watched(model, data):
+        before = data.qvel[6:].copy()
+        advance(model, data)
+        way = 0.5 * (before + data.qvel[6:]) * model.opt.timestep
+        steps.append((data.qfrc_actuator[6:].copy(), way))
+
+    monkeypatch.setattr(mujoco, 'mj_step', watched)
+    states = wriggle(robot, 30)
+    work, per_tick = np.zeros(12), len(steps) // 30
+    np.testing.assert_array_equal(states[0].joint_work, 0.0)
+    for k, state in enumerate(states[1:]):
+        inside = steps[k * per_tick:(k + 1) * per_tick]
+        work += sum(np.maximum(torque * way, 0.0) for torque, way in inside)
+        np.testing.assert_allclose(state.joint_work, work, rtol=1e-9)
+        peak = np.max([np.abs(torque) for torque, _ in inside], axis=0)
+        np.testing.assert_allclose(state.joint_peak_effort, peak, rtol=1e-9)
+    assert per_tick > 1
+
+
 def test_a_seed_makes_the_start_vary_reproducibly():
     starts = [MujocoRobot(seed=seed, initial_spread=0.02).reset().joint_position
               for seed in (0, 0, 1)]

@@ -5,16 +5,22 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from dataclasses import replace
+from functools import lru_cache
 from math import isnan, nan, pi
 
 import numpy as np
 import pytest
 
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport
+from dmp_cpg_ros.analysis.recording import WorkSeries
 from dmp_cpg_ros.studies.markdown_table import markdown_table
 
 pytest.importorskip('mujoco')
-from dmp_cpg_ros.studies import benchmark_tables
+from dmp_cpg_ros.commands import benchmark_tables
 from dmp_cpg_ros.studies.benchmark_walking import main
+from dmp_cpg_ros.studies.loop_recording import recording_of
 from dmp_cpg_ros.studies.walking_trials import (
     CrossingCase,
     SteadyOutcome,
@@ -45,6 +51,33 @@ def test_a_copy_of_a_walk_goes_on_as_the_walk_does() -> None:
     np.testing.assert_array_equal(run.state.joint_position, other.state.joint_position)
     np.testing.assert_array_equal(
         run.state.base_position_in_world, other.state.base_position_in_world)
+
+
+@lru_cache
+def costs(control_rate: float) -> dict[str, float]:
+    """Cost of transport of a steady amble by what it is taken from."""
+    run = Walk('amble', values=(('control_rate', control_rate),))
+    assert run.reach((0.5, 0.0, 0.0)) and run.walk(1.5)
+    run.states = [run.state]
+    assert run.walk(2.5)
+    way = np.hypot(*(run.states[-1].base_position_in_world
+                     - run.states[0].base_position_in_world)[:2])
+    whole, context = recording_of(run.states), RunContext(robot=run.robot.description)
+    stamps = replace(whole, work=WorkSeries())
+    found = [cost_of_transport(recording, context, way) for recording in (whole, stamps)]
+    assert all(cost is not None for cost, _ in found)
+    return {source: cost for cost, source in found}
+
+
+def test_the_cost_hardly_depends_on_how_often_it_is_told() -> None:
+    """What is left is the work itself: held longer, targets are followed less smoothly."""
+    assert costs(100.0)['joint_work'] == pytest.approx(costs(500.0)['joint_work'], rel=0.08)
+
+
+def test_an_estimate_from_the_stamps_alone_misses_more_the_fewer_they_are() -> None:
+    missed = [1.0 - costs(rate)['joint_states'] / costs(rate)['joint_work']
+              for rate in (500.0, 100.0)]
+    assert 0.0 < missed[0] < 0.5 * missed[1]
 
 
 def test_a_push_is_felt_and_a_blow_is_fatal() -> None:

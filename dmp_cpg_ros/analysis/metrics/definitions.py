@@ -22,6 +22,20 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
         '',
         'positive mechanical work of all joints, ∫Σ max(τ q̇, 0) dt, over m g distance',
     ),
+    'robot.cost_of_transport_from': (
+        '',
+        'topic of that work: joint_work, summed over every physics step, or joint_states, an '
+        'estimate from torque and velocity at the stamps alone',
+    ),
+    'robot.peak_torque_share': (
+        '',
+        'largest torque of a joint over its limit, of every physics step where joint_work tells',
+    ),
+    'robot.down_at_start': ('', 'whether the robot lay fallen when the recording began'),
+    'recording.undecodable_messages': (
+        '',
+        'messages on topics that the analysis reads that could not be decoded and were left out',
+    ),
     'robot.foot_slip_m': (
         'm',
         'distance that contact points slid under load, summed over the four feet and the run',

@@ -37,8 +37,11 @@ def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     dict
         ``fell``; ``distance_m``, the length of the horizontal path without sway;
         ``yaw_drift_deg_per_10m``, the size of the yaw gained on straight, steady stretches;
-        ``cost_of_transport``, positive mechanical joint work over m g distance; ``foot_slip_m``,
-        the sum over feet and run of sliding under load, and ``foot_slip_m_per_foot_and_m``.
+        ``cost_of_transport``, positive mechanical joint work over m g distance, and
+        ``cost_of_transport_from``, the topic that it was taken from;
+        ``peak_torque_share``, the largest torque of a joint over its limit; ``foot_slip_m``,
+        the sum over feet and run of sliding under load, and ``foot_slip_m_per_foot_and_m``;
+        ``down_at_start``, whether the recording begins with a fall that was before it.
     """
     distance = distance_walked(recording)
     slip = (
@@ -48,11 +51,15 @@ def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     )
     total = None if slip is None else float(slip.sum())
     far = distance if distance is not None and distance >= SHORTEST_DISTANCE else None
+    cost, source = cost_of_transport(recording, context, far)
     return {
         'fell': fell(recording, context),
+        'down_at_start': down_at_start(recording),
         'distance_m': distance,
         'yaw_drift_deg_per_10m': yaw_drift(recording),
-        'cost_of_transport': cost_of_transport(recording, context, far),
+        'cost_of_transport': cost,
+        'cost_of_transport_from': source,
+        'peak_torque_share': peak_torque_share(recording, context),
         'foot_slip_m': total,
         'foot_slip_m_per_foot_and_m': total / 4.0 / far if far and total is not None else None,
     }
@@ -70,6 +77,11 @@ def fell(recording: Recording, context: RunContext) -> bool | None:
     too_low = height < FALLEN_HEIGHT_SHARE * standing
     down = too_low | (tilt(odometry.quaternion) > FALLEN_TILT)
     return fall_noticed(recording) or bool(np.any(down & should_stand(recording, odometry.time)))
+
+
+def down_at_start(recording: Recording) -> bool | None:
+    """Whether the robot lay fallen when the recording began; None where nothing tells."""
+    return recording.modes[0].message == 'damped' if recording.modes else None
 
 
 def distance_walked(recording: Recording) -> float | None:
@@ -114,10 +126,35 @@ def yaw_drift(recording: Recording) -> float | None:
 
 def cost_of_transport(
     recording: Recording, context: RunContext, distance: float | None
-) -> float | None:
-    """Positive mechanical work of all joints over m g d; no losses, no recuperation."""
-    joints = recording.joints
-    if context.robot is None or not distance or not joints.time.size:
-        return None
+) -> tuple[float | None, str | None]:
+    """Positive mechanical work of all joints over m g d; no losses, no recuperation.
+
+    Returns
+    -------
+    cost : float or None
+    source : str or None
+        ``joint_work``, which was integrated at every physics step, or else ``joint_states``: an
+        estimate, from torque times velocity at the stamps alone. It misses what a drive does
+        between two stamps, such as correcting an error at once when a target comes.
+    """
+    joints, work = recording.joints, recording.work
+    if context.robot is None or not distance:
+        return None, None
+    weight = context.robot.mass * 9.81
+    if work.time.size > 1:
+        return float((work.work[-1] - work.work[0]).sum() / (weight * distance)), 'joint_work'
+    if not joints.time.size:
+        return None, None
     power = np.maximum(joints.effort * joints.velocity, 0.0).sum(axis=1)
-    return float(integral(joints.time, power)[-1] / (context.robot.mass * 9.81 * distance))
+    return float(integral(joints.time, power)[-1] / (weight * distance)), 'joint_states'
+
+
+def peak_torque_share(recording: Recording, context: RunContext) -> float | None:
+    """Largest torque of a joint over its limit: of every physics step where the robot told it,
+    otherwise at the stamps of its states.
+    """
+    effort = recording.work.peak_effort if recording.work.time.size else recording.joints.effort
+    if context.robot is None or not np.isfinite(effort).any():
+        return None
+    limit = np.concatenate([leg.torque_limit for leg in context.robot.legs])
+    return float(np.nanmax(np.abs(effort) / limit))

@@ -47,5 +47,6 @@ def compute_metrics(
         'stop': stop_metrics(recording, context),
         'start': start_metrics(recording),
         'timing': timing_metrics(recording),
+        'recording': {'undecodable_messages': sum(recording.undecodable.values())},
         'certificate': None if certificate is None else list(certificate),
     }

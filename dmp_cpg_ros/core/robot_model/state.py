@@ -43,6 +43,11 @@ class RobotState:
         Gyroscope reading [rad/s].
     ground_normal_in_world : ndarray (3,), optional
         Of the ground under the feet, upwards, as far as an estimator knows it.
+    joint_work : ndarray (12,), optional
+        Positive mechanical work that each joint's torque has done since time 0 [J].
+    joint_peak_effort : ndarray (12,), optional
+        Largest size of each joint's torque during the tick that ends here [N m]. Both are known
+        where torques are applied more often than states are told: in a simulator, in a drive.
 
     Joints, efforts, gyroscope, accelerometer and forces are measured; position, orientation and
     velocities of the base are the truth in a simulator's state and an estimate in a controller's.
@@ -60,6 +65,8 @@ class RobotState:
     foot_force: NDArray[np.float64]
     gyro_in_base: NDArray[np.float64] | None = None
     ground_normal_in_world: NDArray[np.float64] | None = None
+    joint_work: NDArray[np.float64] | None = None
+    joint_peak_effort: NDArray[np.float64] | None = None
 
     @property
     def measured_rate_in_base(self) -> NDArray[np.float64]:
