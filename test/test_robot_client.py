@@ -16,7 +16,6 @@ import subprocess
 import sys
 import termios
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -137,8 +136,8 @@ def test_a_suite_in_a_namespace_is_found_there_and_elsewhere_named(
         await_stop(ros, 'at_rest', 'robot1/inhibition_state')
         answer = said(suite, 'resume', '--ros-args', '-r', '__ns:=/robot1')
         assert answer.startswith('walking in')
-        said(suite, '--namespace', 'robot1', 'cmd_vel', '0.3', '--for', '1')
-        ros.spin_until(lambda: any(entry.twist.linear.x > 0.1 for entry in references))
+        suite.python(*CLIENT, '--namespace', 'robot1', 'cmd_vel', '0.3')
+        ros.spin_until(lambda: any(entry.twist.linear.x > 0.2 for entry in references))
         assert 'ready' in said(suite, '--namespace', '/robot1', 'nodes')
         assert '--namespace /robot1' in refused(suite, '--wait', '3', 'inhibit')
 
@@ -151,23 +150,27 @@ def test_all_nodes_are_ready(suite: Processes) -> None:
 
 
 def test_a_request_is_asked_once_and_its_answer_printed(suite: Processes, ros: Ros) -> None:
-    said(suite, 'nodes')
-    await_stop(ros, 'at_rest')
-    for command, verb, word in (('resume', 'walking', 'free'), ('inhibit', 'at rest', 'at_rest')):
+    # A command starts the gait, and keeps the automatic stop away.
+    driving = suite.python(*CLIENT, 'cmd_vel', '0.2')
+    await_stop(ros, 'free')
+    for command, verb, word in (('inhibit', 'at rest', 'at_rest'), ('resume', 'walking', 'free')):
         answer = said(suite, command)
         found = re.match(rf'{verb} in (\S+) s, at most (\S+) s; certificate holds', answer)
         assert found, answer
         assert 0.0 < float(found[1]) <= float(found[2])
         await_stop(ros, word)
-    assert said(suite, 'inhibit') == 'already at_rest'
+    assert said(suite, 'resume') == 'already walking'
+    driving.kill()
 
 
 def test_a_velocity_reaches_the_reference_and_ends_with_zero(suite: Processes, ros: Ros) -> None:
     sent = ros.collect(interface('cmd_vel').type, 'cmd_vel')
     references = ros.collect(interface('reference').type, 'reference',
                              interface('reference').reader_qos)
+    said(suite, 'resume')
     client = suite.python(*CLIENT, 'cmd_vel', '-0.2', '0.05', '0.1', '--rate', '20')
-    ros.spin_until(lambda: references and abs(references[-1].twist.linear.x + 0.2) < 0.01)
+    ros.spin_until(
+        lambda: sent and references and abs(references[-1].twist.linear.x + 0.2) < 0.01)
     twist = references[-1].twist
     assert abs(twist.linear.y - 0.05) < 0.01 and abs(twist.angular.z - 0.1) < 0.01
     client.signal(signal.SIGTERM)
@@ -268,25 +271,25 @@ def terminal(suite: Processes) -> Iterator[Terminal]:
 
 
 def test_keys_drive_stop_and_quit_and_the_terminal_is_as_it_was(
-        terminal: Terminal, ros: Ros) -> None:
+        terminal: Terminal, suite: Processes, ros: Ros) -> None:
     before = termios.tcgetattr(terminal.inside)
     references = ros.collect(interface('reference').type, 'reference',
                              interface('reference').reader_qos)
-    terminal.wait_for('+0.0 m/s, +0.0 rad/s')
+    said(suite, 'inhibit')
+    await_stop(ros, 'at_rest')
+    terminal.wait_for('at rest')
     assert termios.tcgetattr(terminal.inside) != before
+    terminal.press(' ')
+    terminal.wait_for('walking in')
     terminal.press('w\x1b[Aa\x1b[Cw')
     terminal.wait_for('+0.3 m/s, +0.0 rad/s')
     ros.spin_until(lambda: references and references[-1].twist.linear.x > 0.29)
-    terminal.wait_for('free')
     terminal.press(' ')
     terminal.wait_for('at rest in')
     await_stop(ros, 'at_rest')
-    terminal.press(' ')
-    terminal.wait_for('walking in')
     terminal.press('xq')
     assert terminal.status() == 0, terminal.output
     assert termios.tcgetattr(terminal.inside) == before
-    await_stop(ros, 'at_rest')
 
 
 def test_a_terminated_teleop_leaves_the_terminal_as_it_was(terminal: Terminal) -> None:
