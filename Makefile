@@ -68,6 +68,7 @@ BENCHMARK_ARGS ?=
 help: ## list these targets
 	@echo 'make TARGET, with Python 3.10-3.13, its venv module and make; ROS 2 Jazzy is used if sourced'
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 19
+	@echo 'Afterwards, in every terminal: . .venv/bin/activate'
 
 demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ (WALK_ARGS=...)
 	$(ACTIVATED) walk $(WALK_ARGS)

@@ -55,7 +55,8 @@ def transcripts() -> list[tuple[str, str]]:
     """Every command of the console blocks, in order, with the output that is shown."""
     blocks = re.findall(r'```console\n(.*?)```', README, re.DOTALL)
     return [(command.strip(), output) for block in blocks
-            for command, output in re.findall(r'^\$ (.*)\n((?:(?!\$ ).*\n)*)', block, re.MULTILINE)]
+            for command, output in re.findall(
+                r'^\$ (.*)\n((?:(?!\$ ).*\n)*)', block, re.MULTILINE)]
 
 
 def as_shown(output: str, shown: str) -> bool:

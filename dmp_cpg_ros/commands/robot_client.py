@@ -37,8 +37,11 @@ from dmp_cpg_ros.nodes.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.ros_parameters import plain
 from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
 
-OK, FAILED, BAD_INPUT = 0, 1, 2
-"""Exit statuses: done, refused or nobody there, bad input."""
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+"""Exit statuses: done, refused or nobody there, bad input, Ctrl-C."""
+
+ENDLESS = ('cmd_vel', 'teleop', 'echo')
+"""Commands that Ctrl-C ends as it should."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -61,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (DmpCpgError, RuntimeError) as error:
         return _said(error, FAILED)
     except KeyboardInterrupt:
-        return OK
+        return OK if options.command in ENDLESS else INTERRUPTED
     finally:
         rclpy.try_shutdown()
 
@@ -157,6 +160,7 @@ def show_nodes(client: SuiteClient, options: argparse.Namespace) -> int:
 
 def echo(client: SuiteClient, options: argparse.Namespace) -> int:
     """Print the messages of a topic as YAML."""
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # echo TOPIC | head ends quietly
     client.meet(['inhibition'])
     known = INTERFACES.get(options.topic)
     name = client.node.resolve_topic_name(options.topic)
@@ -249,11 +253,11 @@ def _parser() -> argparse.ArgumentParser:
         description='Command a running suite (start one with walk). It is looked for in the '
         'domain of ROS_DOMAIN_ID; --ros-args are taken as by every node.',
         epilog='Exit status: 0 when it was done, 1 when nobody is there or the suite refuses, 2 '
-        'for bad input.',
+        'for bad input, 130 for Ctrl-C before it was done.',
     )
     parser.add_argument('--namespace', metavar='NAME', help="the suite's namespace")
-    parser.add_argument('--wait', metavar='SECONDS', type=_positive, default=5.0,
-                        help='how long to look for the suite (default: 5)')
+    parser.add_argument('--wait', metavar='SECONDS', type=_positive, default=10.0,
+                        help='how long to look for the suite (default: 10)')
     commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
 
     def command(name: str, run: Any, text: str) -> argparse.ArgumentParser:
