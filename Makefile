@@ -31,7 +31,7 @@ READY := $(VENV)/.dependencies-$(ROS)
 # Exists when .venv has the package as it is now: a copy, so that nothing half-edited runs.
 INSTALLED := $(VENV)/.installed
 SOURCES := $(shell find dmp_cpg_ros config launch resource -not -name '*.pyc' -not -name __pycache__) \
-  setup.py setup.cfg package.xml
+  setup.py setup.cfg package.xml Makefile
 
 ifeq ($(ROS),sourced)
   VENV_FLAGS := --system-site-packages
@@ -56,15 +56,8 @@ export DIST_EXTRA_CONFIG := $(BUILD)/setup.cfg
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check \
   --no-build-isolation --use-pep517 --constraint $(VENV)/constraints.txt
 
-# The runs see only this machine, on a domain that nobody else has by default.
-export AMENT_PREFIX_PATH := $(VENV)$(if $(AMENT_PREFIX_PATH),:$(AMENT_PREFIX_PATH))
-export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
-export ROS_DOMAIN_ID ?= 87
-# Without a screen: pictures offscreen, figures to files.
-ifeq ($(DISPLAY)$(WAYLAND_DISPLAY),)
-  export MUJOCO_GL ?= egl
-  export MPLBACKEND ?= Agg
-endif
+# What every run needs is in environment.sh, for users' shells as for these commands.
+ACTIVATED := . $(BIN)/activate &&
 
 STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
@@ -75,37 +68,38 @@ BENCHMARK_ARGS ?=
 help: ## list these targets
 	@echo 'make TARGET, with Python 3.10-3.13, its venv module and make; ROS 2 Jazzy is used if sourced'
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 19
+	@echo 'Afterwards, in every terminal: . .venv/bin/activate'
 
 demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ (WALK_ARGS=...)
-	$(BIN)/walk $(WALK_ARGS)
+	$(ACTIVATED) walk $(WALK_ARGS)
 
 test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
-	cd test && $(BIN)/python -m pytest $(PYTEST_ARGS)
+	$(ACTIVATED) cd test && python -m pytest $(PYTEST_ARGS)
 
 study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, walk, trot (STUDY_ARGS=...)
-	$(BIN)/study_stops $(STUDY_ARGS)
+	$(ACTIVATED) study_stops $(STUDY_ARGS)
 
 study-recovery: $(INSTALLED) ## stand up, lie down, recover from 50 falls (STUDY_ARGS=...)
-	$(BIN)/study_recovery $(STUDY_ARGS)
+	$(ACTIVATED) study_recovery $(STUDY_ARGS)
 
 benchmark-walking: $(INSTALLED) ## measure speeds, pushes, rough ground, gait changes (BENCHMARK_ARGS=...)
-	$(BIN)/benchmark_walking $(BENCHMARK_ARGS)
+	$(ACTIVATED) benchmark_walking $(BENCHMARK_ARGS)
 
 doc-images: $(INSTALLED) ## make the pictures of the README
 	rm -rf build/doc_images
-	$(BIN)/walk --lock-step --out build/doc_images
+	$(ACTIVATED) walk --lock-step --out build/doc_images
 	mkdir -p doc/images
 	cp $(addprefix build/doc_images/figures/,walking.png canonical_states.png footfall.png phase_portrait.png) doc/images/
-	$(BIN)/python -m dmp_cpg_ros.commands.film build/doc_images doc/images/stop_and_start.gif \
+	$(ACTIVATED) python -m dmp_cpg_ros.commands.film build/doc_images doc/images/stop_and_start.gif \
 	  --start 12.5 --end 20.5 --fps 12.5 --width 480
 
 bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
-	$(BIN)/python -m dmp_cpg_ros.studies.bench $(BENCH_ARGS)
+	$(ACTIVATED) python -m dmp_cpg_ros.studies.bench $(BENCH_ARGS)
 
 lint: $(INSTALLED) ## ruff, mypy and the rules for package.xml
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m mypy
-	cd test && $(BIN)/python -m pytest --quiet test_packaging.py -k package_xml
+	$(ACTIVATED) cd test && python -m pytest --quiet test_packaging.py -k package_xml
 
 install: $(INSTALLED) ## make .venv and install the package into it
 
@@ -118,6 +112,9 @@ $(INSTALLED): $(READY) $(SOURCES)
 	@rm -rf $(BUILD) && mkdir -p $(BUILD)
 	@printf '[build]\nbuild_base=%s\n[egg_info]\negg_base=%s\n' $(BUILD) $(BUILD) > $(DIST_EXTRA_CONFIG)
 	@$(PIP_INSTALL) --no-deps --force-reinstall .
+	@grep -q environment.sh $(BIN)/activate || { \
+	  sed -i 's/^deactivate () {/&\n    ! command -v _dmp_cpg_ros_restore > \/dev\/null || _dmp_cpg_ros_restore/' $(BIN)/activate; \
+	  echo '. "$$VIRTUAL_ENV/../environment.sh"' >> $(BIN)/activate; }
 	@touch $@
 
 $(READY): setup.py constraints.txt

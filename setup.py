@@ -34,6 +34,7 @@ EXECUTABLES = {
     'analyze': 'dmp_cpg_ros.commands.analyze:main',
     'learn': 'dmp_cpg_ros.commands.learn:main',
     'inspect_robot': 'dmp_cpg_ros.commands.inspect_robot:main',
+    'robot_client': 'dmp_cpg_ros.commands.robot_client:main',
     'study_stops': 'dmp_cpg_ros.studies.study_stops:main',
     'benchmark_walking': 'dmp_cpg_ros.studies.benchmark_walking:main',
     'study_recovery': 'dmp_cpg_ros.studies.study_recovery:main',

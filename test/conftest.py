@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
+from pathlib import Path
 
 from hypothesis import settings
 
@@ -13,13 +15,9 @@ from hypothesis import settings
 settings.register_profile('suite', deadline=None, derandomize=True, print_blob=True)
 settings.load_profile('suite')
 
-os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-os.environ.setdefault('ROS_DOMAIN_ID', '87')
 os.environ.setdefault('MPLBACKEND', 'Agg')
-if not (os.environ.get('DISPLAY') or os.environ.get('WAYLAND_DISPLAY')):
-    os.environ.setdefault('MUJOCO_GL', 'egl')
-
-# The ROS wheels do not name their prefix; a sourced ROS 2 has.
-_prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
-if sys.prefix not in _prefixes:
-    os.environ['AMENT_PREFIX_PATH'] = os.pathsep.join(filter(None, [sys.prefix, *_prefixes]))
+# What make's commands and an activated shell have.
+_shell = subprocess.run(
+    ['sh', '-c', '. "$0" && env -0', str(Path(__file__).parent.parent / 'environment.sh')],
+    env={**os.environ, 'VIRTUAL_ENV': sys.prefix}, capture_output=True, text=True, check=True)
+os.environ.update(line.split('=', 1) for line in _shell.stdout.split('\0') if line)

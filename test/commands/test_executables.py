@@ -42,6 +42,7 @@ COMMANDS = (
     'analyze',
     'learn',
     'inspect_robot',
+    'robot_client',
     'study_stops',
     'benchmark_walking',
     'study_recovery',

@@ -1,0 +1,303 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``robot_client``: commands to a running suite from a shell, without a ROS installation."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import math
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import rclpy
+import yaml
+from geometry_msgs.msg import WrenchStamped
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from std_srvs.srv import SetBool, Trigger
+
+from dmp_cpg_ros.commands.suite_client import (
+    ClientError,
+    SuiteClient,
+    VelocityCommand,
+    deliver,
+)
+from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.core.modes.body_requests import REQUESTS
+from dmp_cpg_ros.nodes.interfaces import INTERFACES, TOPICS, interface
+from dmp_cpg_ros.nodes.middleware import prepare_middleware
+from dmp_cpg_ros.nodes.ros_parameters import plain
+from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
+
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+"""Exit statuses: done, refused or nobody there, bad input, Ctrl-C."""
+
+ENDLESS = ('cmd_vel', 'teleop', 'echo')
+"""Commands that Ctrl-C ends as it should."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(remove_ros_args(arguments))
+    if options.namespace is not None:
+        arguments += ['--ros-args', '-r', f'__ns:=/{options.namespace.strip("/")}']
+    prepare_middleware()
+    # Ends like Ctrl-C, so that the last command is zero and the terminal is as it was.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        rclpy.init(args=['robot_client', *arguments],
+                   signal_handler_options=SignalHandlerOptions.NO)
+        node = Node('robot_client', enable_rosout=False, start_parameter_services=False)
+        status: int = options.run(SuiteClient(node, options.wait), options)
+        return status
+    except ParameterError as error:
+        return _said(error, BAD_INPUT)
+    except (DmpCpgError, RuntimeError) as error:
+        return _said(error, FAILED)
+    except KeyboardInterrupt:
+        return OK if options.command in ENDLESS else INTERRUPTED
+    finally:
+        rclpy.try_shutdown()
+
+
+def request_stop(client: SuiteClient, options: argparse.Namespace) -> int:
+    """Inhibit or resume the gait."""
+    return _told(client.call('inhibit', SetBool.Request(data=options.command == 'inhibit')))
+
+
+def request_mode(client: SuiteClient, options: argparse.Namespace) -> int:
+    """Stand up, lie down or recover."""
+    return _told(client.call(options.command, Trigger.Request()))
+
+
+def publish_command(client: SuiteClient, options: argparse.Namespace) -> int:
+    """Command a velocity for some time or until Ctrl-C; the last command is zero."""
+    command = VelocityCommand(client, stamped=options.stamped)
+    begin, sent = time.monotonic(), 0
+    try:
+        while time.monotonic() - begin < options.seconds:
+            command.send((options.v_x, options.v_y, options.yaw_rate))
+            sent += 1
+            client.spin_until(lambda: False, max(
+                0.0, begin + min(sent / options.rate, options.seconds) - time.monotonic()))
+    finally:
+        command.end()
+    return OK
+
+
+def push(client: SuiteClient, options: argparse.Namespace) -> int:
+    """Push the simulated robot."""
+    message = WrenchStamped()
+    vector = message.wrench.force
+    vector.x, vector.y, vector.z = options.force
+    publisher = client.publisher(interface('push'))
+    publisher.publish(message)
+    deliver(publisher)
+    return OK
+
+
+def parameter(client: SuiteClient, options: argparse.Namespace) -> int:
+    """Get, set or list the parameters of a node."""
+    node, name, value = options.node, options.name, options.value
+    if (options.action == 'list') != (name is None) or (options.action == 'set') != (
+            value is not None):
+        raise ParameterError('param takes: list NODE, get NODE NAME, or set NODE NAME VALUE')
+    client.meet(['inhibition'])
+
+    def service(kind: Any, end: str) -> Client:
+        return client.node.create_client(kind, f'{node}/{end}')
+
+    if options.action == 'list':
+        answer = client.ask(service(ListParameters, 'list_parameters'), ListParameters.Request())
+        print('\n'.join(sorted(answer.result.names)))
+        return OK
+    setter = service(SetParameters, 'set_parameters')
+    known = client.ask(service(GetParameters, 'get_parameters'),
+                       GetParameters.Request(names=[name])).values
+    if not known or known[0].type == Parameter.Type.NOT_SET.value:
+        raise ClientError(f"{node} has no parameter '{name}'; see: robot_client param list {node}")
+    if options.action == 'get':
+        print(plain(parameter_value_to_python(known[0])))
+        return OK
+    given = parameter_value_to_python(get_parameter_value(value))
+    if known[0].type == Parameter.Type.DOUBLE.value and type(given) is int:
+        given = float(given)
+    client.meet([], setter)
+    request = SetParameters.Request(parameters=[Parameter(name, value=given).to_parameter_msg()])
+    result = client.answer([setter.call_async(request)], setter.service_name).results[0]
+    if not result.successful:
+        raise ClientError(f'Setting parameter failed: {result.reason}')
+    print('Set parameter successful')
+    return OK
+
+
+def show_nodes(client: SuiteClient, options: argparse.Namespace) -> int:
+    """List the nodes of the suite with what they wait for, and the others."""
+    client.meet(['inhibition'])
+    clients = {node.name: client.node.create_client(Trigger, f'{node.name}/ready')
+               for node in (*SUITE_NODES, RECORDER)}
+    client.spin_until(lambda: all(each.service_is_ready() for each in clients.values()),
+                      options.wait)
+    for name, each in clients.items():
+        state = (client.ask(each, Trigger.Request()).message if each.service_is_ready()
+                 else 'does not run')
+        print(f'{name:24}{state}')
+    here = {name for name, space in client.node.get_node_names_and_namespaces()
+            if space == client.node.get_namespace()}
+    for name in sorted(here - set(clients) - {client.node.get_name()}):
+        print(f'{name:24}not of the suite')
+    return OK
+
+
+def echo(client: SuiteClient, options: argparse.Namespace) -> int:
+    """Print the messages of a topic as YAML."""
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # echo TOPIC | head ends quietly
+    client.meet(['inhibition'])
+    known = INTERFACES.get(options.topic)
+    name = client.node.resolve_topic_name(options.topic)
+    ends: list[Any] = []
+
+    def found() -> list[Any]:
+        ends[:] = client.node.get_publishers_info_by_topic(name)
+        return ends
+
+    if not client.spin_until(found, options.wait):
+        raise ClientError(f"nobody publishes {name}; the suite's topics are {_topics()}")
+    profile = known.reader_qos if known else ends[0].qos_profile
+    messages: list[Any] = []
+    client.node.create_subscription(
+        _message_type(ends[0].topic_type), name, messages.append, profile)
+    while client.spin_until(lambda: messages):
+        for message in messages:
+            print(yaml.safe_dump(_as_mapping(message), sort_keys=False), end='---\n', flush=True)
+            if options.once:
+                return OK
+        messages.clear()
+    return OK
+
+
+def drive(client: SuiteClient, options: argparse.Namespace) -> int:
+    """Drive by keyboard."""
+    from dmp_cpg_ros.commands.teleop import drive_by_keyboard
+
+    command = VelocityCommand(client, stamped=options.stamped)
+    return drive_by_keyboard(client, command, options.rate)
+
+
+def _told(answer: Any) -> int:
+    """Print the answer of a service; a refusal is an error."""
+    if not answer.success:
+        raise ClientError(answer.message)
+    print(answer.message)
+    return OK
+
+
+def _said(error: Exception, status: int) -> int:
+    print(f'robot_client: {error}', file=sys.stderr)
+    return status
+
+
+def _topics() -> str:
+    return ', '.join(topic.name for topic in TOPICS)
+
+
+def _message_type(name: str) -> Any:
+    """Class of a type such as ``std_msgs/msg/String``."""
+    package, _, message = name.split('/')
+    try:
+        return getattr(importlib.import_module(f'{package}.msg'), message)
+    except ImportError as error:
+        raise ClientError(f'messages of {package} are not installed: {error}') from None
+
+
+def _as_mapping(value: Any) -> Any:
+    """A message as what YAML can write."""
+    if hasattr(value, 'get_fields_and_field_types'):
+        return {name: _as_mapping(getattr(value, name))
+                for name in value.get_fields_and_field_types()}
+    if isinstance(value, (str, int, float)):
+        return value
+    if isinstance(value, bytes):
+        return int.from_bytes(value, 'little')
+    return [_as_mapping(entry) for entry in
+            (value.tolist() if hasattr(value, 'tolist') else value)]
+
+
+def _number(text: str) -> float:
+    """A finite number of the command line."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'{text} must be finite')
+    return value
+
+
+def _positive(text: str) -> float:
+    value = _number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f'{text} must be positive')
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='robot_client',
+        description='Command a running suite (start one with walk). It is looked for in the '
+        'domain of ROS_DOMAIN_ID; --ros-args are taken as by every node.',
+        epilog='Exit status: 0 when it was done, 1 when nobody is there or the suite refuses, 2 '
+        'for bad input, 130 for Ctrl-C before it was done.',
+    )
+    parser.add_argument('--namespace', metavar='NAME', help="the suite's namespace")
+    parser.add_argument('--wait', metavar='SECONDS', type=_positive, default=10.0,
+                        help='how long to look for the suite (default: 10)')
+    commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
+
+    def command(name: str, run: Any, text: str) -> argparse.ArgumentParser:
+        added = commands.add_parser(name, help=text, description=f'{text[:1].upper()}{text[1:]}.')
+        added.set_defaults(run=run)
+        return added
+
+    def sending(added: argparse.ArgumentParser) -> None:
+        added.add_argument('--rate', metavar='HZ', type=_positive, default=10.0,
+                           help='commands per second (default: 10)')
+        added.add_argument('--stamped', action='store_true',
+                           help='send TwistStamped, for a suite with stamped_cmd_vel:=true')
+
+    velocity = command('cmd_vel', publish_command, 'command a velocity until Ctrl-C')
+    for name, text, default in (('v_x', 'forward [m/s]', None), ('v_y', 'to the left [m/s]', 0.0),
+                                ('yaw_rate', 'to the left [rad/s]', 0.0)):
+        velocity.add_argument(name, type=_number, help=text, default=default,
+                              nargs=None if default is None else '?')
+    velocity.add_argument('--for', metavar='SECONDS', dest='seconds', type=_positive,
+                          default=math.inf, help='end after so long')
+    sending(velocity)
+    command('inhibit', request_stop, 'stop the gait')
+    command('resume', request_stop, 'start the gait')
+    for name in REQUESTS:
+        command(name, request_mode, interface(name).meaning)
+    pushing = command('push', push, 'push the simulated robot for 0.1 s')
+    pushing.add_argument('force', metavar='F', type=_number, nargs=3,
+                         help='forward, to the left, up [N]')
+    parameters = command('param', parameter, 'get, set or list parameters of a node')
+    parameters.add_argument('action', choices=('get', 'set', 'list'))
+    parameters.add_argument('node', metavar='NODE')
+    parameters.add_argument('name', metavar='NAME', nargs='?')
+    parameters.add_argument('value', metavar='VALUE', nargs='?')
+    command('nodes', show_nodes, 'list the nodes and what they wait for')
+    printing = command('echo', echo, 'print what is published on a topic')
+    printing.add_argument('topic', metavar='TOPIC')
+    printing.add_argument('--once', action='store_true', help='end after the first message')
+    sending(command('teleop', drive, 'drive by keyboard'))
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,177 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A running suite as seen from outside: its services, and what it reads."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rclpy.client import Client
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL, Interface, interface
+
+ASK_AGAIN_S = 0.3
+"""Time after which a request that may be repeated is repeated [s]."""
+
+ANSWER_WITHIN_S = 60.0
+"""How long an answer may take [s]: to refuse a parameter, the nearest good value is sought."""
+
+ACKNOWLEDGED_WITHIN_S = 2.0
+"""How long to wait for readers at the end [s]."""
+
+STEP_S = 0.05
+"""How long one turn of the executor waits at most [s]."""
+
+
+class ClientError(DmpCpgError):
+    """Nobody answers, or the suite refuses."""
+
+
+class SuiteClient:
+    """A node that calls the services of a running suite and publishes to its topics.
+
+    A server drops its response when it has not yet matched the client's reply reader, and a
+    reliable volatile writer may lose what it sends before its reader knows it. Discovery tells a
+    participant's ends in the order in which they were made. So what must not be lost or repeated
+    goes out only after a client that was made later has been answered (:meth:`meet`).
+
+    Parameters
+    ----------
+    node : Node
+        Its node; its namespace is the suite's.
+    wait_s : float
+        How long to look for the suite [s].
+    """
+
+    def __init__(self, node: Node, wait_s: float) -> None:
+        """Add the node to an executor."""
+        self.node, self._wait_s = node, wait_s
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor.add_node(node)
+
+    def spin_until(self, condition: Callable[[], object], within_s: float = math.inf) -> bool:
+        """Run callbacks until a condition holds; returns whether it does."""
+        deadline = time.monotonic() + within_s
+        while not condition() and time.monotonic() < deadline:
+            self._executor.spin_once(timeout_sec=max(0.0, min(
+                STEP_S, deadline - time.monotonic())))
+        return bool(condition())
+
+    def meet(self, kinds: Sequence[str], *clients: Client) -> None:
+        """Wait until nodes of the suite know what this client has made so far, and the clients
+        their servers; raises ClientError when they are not there.
+        """
+        for kind in kinds:
+            self.ask(self.node.create_client(Trigger, f'{kind}/ready'), Trigger.Request())
+        for client in clients:
+            self._find(client)
+
+    def call(self, name: str, request: Any) -> Any:
+        """Answer of a service of the suite; asked once."""
+        service = interface(name)
+        client = self.node.create_client(service.type, service.name)
+        self.meet(service.publishers, client)
+        return self.answer([client.call_async(request)], client.service_name)
+
+    def ask(self, client: Client, request: Any) -> Any:
+        """Answer to a request that may be repeated."""
+        self._find(client)
+        futures: list[Future] = []
+        end = time.monotonic() + ANSWER_WITHIN_S
+        while time.monotonic() < end and not any(future.done() for future in futures):
+            futures.append(client.call_async(request))
+            self.spin_until(lambda: any(future.done() for future in futures), ASK_AGAIN_S)
+        return self.answer(futures, client.service_name, 0.0)
+
+    def answer(self, futures: Sequence[Future], name: str,
+               within_s: float = ANSWER_WITHIN_S) -> Any:
+        """Result of the first future that is done; raises ClientError when none is in time."""
+        if not self.spin_until(lambda: any(future.done() for future in futures), within_s):
+            raise ClientError(f'{name} did not answer within {ANSWER_WITHIN_S:g} s')
+        return next(future for future in futures if future.done()).result()
+
+    def publisher(self, topic: Interface) -> Publisher:
+        """Publisher whose readers all know it; raises ClientError when they want another type."""
+        publisher = self.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
+        self.meet(topic.subscribers)
+        expected = len(topic.subscribers)
+
+        def matched() -> bool:
+            return bool(publisher.get_subscription_count() >= expected)
+
+        def others() -> list[str]:
+            ends = self.node.get_subscriptions_info_by_topic(publisher.topic_name)
+            return sorted({end.topic_type for end in ends} - {topic.type_name})
+
+        self.spin_until(lambda: matched() or others(), self._wait_s)
+        if not matched():
+            raise ClientError(
+                f'nobody reads {publisher.topic_name} as {topic.type_name}; it is read as '
+                f'{", ".join(others()) or "nothing"}')
+        return publisher
+
+    def _find(self, client: Client) -> None:
+        if not self.spin_until(client.service_is_ready, self._wait_s):
+            raise ClientError(self._nobody(client.service_name))
+
+    def _nobody(self, service: str) -> str:
+        """Say that nobody offers a service, and what is there."""
+        node = self.node
+        nodes = node.get_node_names_and_namespaces()
+        suites = {space for name, space in nodes if name == 'inhibition'}
+        if node.get_namespace() in suites:
+            names = {name for name, space in nodes if space == node.get_namespace()}
+            return (f'nobody offers {service}; nodes are '
+                    f'{", ".join(sorted(names - {node.get_name()}))}')
+        hint = f' (there is one with --namespace {", ".join(sorted(suites))})' if suites else ''
+        return (f'no suite answers in ROS domain {node.context.get_domain_id()}{hint}: nobody '
+                f'offers {service}; start one with walk, such as: walk stand_by.yaml')
+
+
+class VelocityCommand:
+    """Sends velocity commands, as ``Twist`` or ``TwistStamped``.
+
+    Parameters
+    ----------
+    client : SuiteClient
+        Who sends.
+    stamped : bool
+        Whether the suite runs with ``stamped_cmd_vel:=true``.
+    """
+
+    def __init__(self, client: SuiteClient, *, stamped: bool) -> None:
+        """Find the readers; raises ClientError when there are none of this type."""
+        self._topic = STAMPED_CMD_VEL if stamped else interface('cmd_vel')
+        self._publisher = client.publisher(self._topic)
+
+    def send(self, velocity: Sequence[float]) -> None:
+        """Send (v_x, v_y, γ) [m/s, m/s, rad/s]; raises ClientError when nobody reads it."""
+        if not self._publisher.get_subscription_count():
+            raise ClientError('the suite has ended')
+        self._publish(velocity)
+
+    def end(self) -> None:
+        """Command zero."""
+        self._publish((0.0, 0.0, 0.0))
+        deliver(self._publisher)
+
+    def _publish(self, velocity: Sequence[float]) -> None:
+        message = self._topic.type()
+        twist = getattr(message, 'twist', message)
+        twist.linear.x, twist.linear.y, twist.angular.z = velocity
+        self._publisher.publish(message)
+
+
+def deliver(publisher: Publisher) -> None:
+    """Wait until the readers have what was published."""
+    publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_WITHIN_S))

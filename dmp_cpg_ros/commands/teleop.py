@@ -1,0 +1,144 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Drives the robot by keyboard, in a terminal that is set back at the end."""
+
+from __future__ import annotations
+
+import os
+import re
+import select
+import sys
+import termios
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rclpy.task import Future
+from std_srvs.srv import SetBool, Trigger
+
+from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, VelocityCommand
+from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
+from dmp_cpg_ros.nodes.interfaces import interface
+
+STEPS = {'w': (0.1, 0.0), 's': (-0.1, 0.0), 'a': (0.0, 0.2), 'd': (0.0, -0.2)}
+"""Change of v_x [m/s] and of the yaw rate [rad/s] by one press of a key."""
+
+ARROWS = {'A': 'w', 'B': 's', 'D': 'a', 'C': 'd'}
+"""Last letter of what an arrow key sends, and the key that does the same."""
+
+MODES = {'u': 'stand_up', 'l': 'lie_down', 'r': 'recover'}
+"""Keys that call a service."""
+
+HELP = """\
+w/s or up/down: faster, slower; a/d or left/right: turn; x: no velocity
+space: inhibit or resume; u: stand up, l: lie down, r: recover; q: quit
+"""
+
+
+class Teleop:
+    """What the keys do.
+
+    Parameters
+    ----------
+    client : SuiteClient
+        The suite.
+
+    Attributes
+    ----------
+    velocity : tuple of 3 floats
+        Commanded v_x, v_y [m/s] and yaw rate [rad/s].
+    """
+
+    def __init__(self, client: SuiteClient) -> None:
+        """Create clients, and listen to the state of the stop."""
+        node, state, inhibit = client.node, interface('inhibition_state'), interface('inhibit')
+        self.velocity = (0.0, 0.0, 0.0)
+        self._word, self._requested, self._shown = '', False, ''
+        self._inhibit = node.create_client(inhibit.type, inhibit.name)
+        self._modes = {key: node.create_client(Trigger, name) for key, name in MODES.items()}
+        node.create_subscription(state.type, state.name, self._on_state, state.reader_qos)
+        client.meet((*inhibit.publishers, *interface('stand_up').publishers),
+                    self._inhibit, *self._modes.values())
+
+    def press(self, key: str) -> None:
+        """Take a key; unknown ones do nothing."""
+        v_x, _, yaw_rate = self.velocity
+        if key in STEPS:
+            faster, further = STEPS[key]
+            self.velocity = (round(v_x + faster, 3), 0.0, round(yaw_rate + further, 3))
+        elif key == 'x':
+            self.velocity = (0.0, 0.0, 0.0)
+        elif key == ' ':
+            request = SetBool.Request(data=not self._requested)
+            self._inhibit.call_async(request).add_done_callback(self._answered)
+        elif key in self._modes:
+            self._modes[key].call_async(Trigger.Request()).add_done_callback(self._answered)
+
+    def show(self) -> None:
+        """Rewrite the last line of the terminal where it has changed."""
+        v_x, _, yaw_rate = self.velocity
+        line = f'{v_x:+.1f} m/s, {yaw_rate:+.1f} rad/s, {self._word.replace("_", " ")}'
+        if line != self._shown:
+            self._shown = line
+            print(f'\r\x1b[K{line}', end='', flush=True)
+
+    def _on_state(self, message: Any) -> None:
+        state = read_inhibition_state(message)
+        self._word, self._requested = state.word, state.flag('requested')
+
+    def _answered(self, future: Future) -> None:
+        answer = future.result()
+        print(f'\r\x1b[K{"" if answer.success else "refused: "}{answer.message}')
+        self._shown = ''
+
+
+def drive_by_keyboard(client: SuiteClient, command: VelocityCommand, rate: float) -> int:
+    """Drive until q, Ctrl-C or the end of the input; the last command is zero.
+
+    Raises
+    ------
+    ClientError
+        If the input is no terminal, or the suite ends.
+    """
+    if not sys.stdin.isatty():
+        raise ClientError('teleop reads keys from a terminal, and this input is none')
+    teleop = Teleop(client)
+    print(HELP, end='')
+    try:
+        with _key_by_key(sys.stdin.fileno()):
+            while True:
+                command.send(teleop.velocity)
+                teleop.show()
+                client.spin_until(lambda: _waiting(sys.stdin.fileno()), 1.0 / rate)
+                for key in _keys(sys.stdin.fileno()):
+                    if key == 'q':
+                        return 0
+                    teleop.press(key)
+    finally:
+        print()
+        command.end()
+
+
+@contextmanager
+def _key_by_key(terminal: int) -> Iterator[None]:
+    """Let a terminal give every key at once and show none."""
+    former = termios.tcgetattr(terminal)
+    try:
+        tty.setcbreak(terminal)
+        yield
+    finally:
+        termios.tcsetattr(terminal, termios.TCSADRAIN, former)
+
+
+def _waiting(terminal: int) -> bool:
+    return bool(select.select([terminal], [], [], 0.0)[0])
+
+
+def _keys(terminal: int) -> list[str]:
+    """Keys that were pressed, arrows by the letter that does the same; q at the end of input."""
+    if not _waiting(terminal):
+        return []
+    text = os.read(terminal, 1024).decode(errors='replace')
+    pressed = re.findall(r'\x1b[\[O](.)|(.)', text, re.DOTALL)
+    return [ARROWS.get(arrow, '') or key for arrow, key in pressed] or ['q']

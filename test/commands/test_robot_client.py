@@ -1,0 +1,310 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``robot_client`` against a running suite: every command over DDS, and the keyboard in a
+terminal.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import termios
+from collections.abc import Iterator
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import yaml
+from ros_processes import NodeProcess, Processes, Ros, reserved_domain, wait_until
+from std_srvs.srv import Trigger
+
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
+from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
+from dmp_cpg_ros.nodes.interfaces import interface
+from dmp_cpg_ros.nodes.middleware import prepare_middleware
+from dmp_cpg_ros.nodes.suite_nodes import SUITE_NODES
+
+CLIENT = ('-m', 'dmp_cpg_ros.commands.robot_client', '--wait', '20')
+
+
+@pytest.fixture(scope='module')
+def domain() -> Iterator[int]:
+    with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
+        patch.setenv('ROS_DOMAIN_ID', str(domain))
+        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        prepare_middleware()
+        yield domain
+
+
+@pytest.fixture(scope='module')
+def legs(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Parameter file that tells the nodes of the legs which leg they are."""
+    path = tmp_path_factory.mktemp('parameters') / 'legs.yaml'
+    path.write_text(yaml.safe_dump({
+        f'/**/leg_transformation_{leg}': {'ros__parameters': {'leg': leg}} for leg in LEGS}))
+    return str(path)
+
+
+@contextlib.contextmanager
+def running(domain: int, legs: str, *arguments: str) -> Iterator[Processes]:
+    """A suite in one process."""
+    started = Processes(domain)
+    try:
+        started.python('-m', 'dmp_cpg_ros.commands.composed_suite', '--ros-args',
+                       '--params-file', legs, *arguments)
+        yield started
+    finally:
+        started.end()
+
+
+@pytest.fixture(scope='module')
+def suite(domain: int, legs: str) -> Iterator[Processes]:
+    with running(domain, legs) as started:
+        yield started
+
+
+@pytest.fixture
+def ros(domain: int) -> Iterator[Ros]:
+    session = Ros(domain)
+    try:
+        yield session
+    finally:
+        session.end()
+
+
+def ended(processes: Processes, *arguments: str) -> NodeProcess:
+    """The client at its end."""
+    process = processes.python(*CLIENT, *arguments)
+    process.wait(90.0)
+    return process
+
+
+def said(processes: Processes, *arguments: str) -> str:
+    """What the client prints when all goes well."""
+    process = ended(processes, *arguments)
+    assert process.wait() == 0, process
+    return process.output.strip()
+
+
+def refused(processes: Processes, *arguments: str, status: int = 1) -> str:
+    """What the client prints when it does not go well."""
+    process = ended(processes, *arguments)
+    assert process.wait() == status, process
+    assert 'Traceback' not in process.output, process
+    return process.output.strip()
+
+
+def await_stop(ros: Ros, word: str, name: str = 'inhibition_state') -> None:
+    """Wait for a state of the stop."""
+    topic = interface('inhibition_state')
+    states = ros.collect(topic.type, name, topic.reader_qos)
+    ros.spin_until(lambda: states and read_inhibition_state(states[-1]).word == word,
+                   what=lambda: word)
+
+
+def await_mode(ros: Ros, mode: str) -> None:
+    """Wait for a mode of the body."""
+    topic = interface('body_mode')
+    modes = ros.collect(topic.type, topic.name, topic.reader_qos)
+    ros.spin_until(lambda: modes and read_body_mode(modes[-1]) == mode, what=lambda: mode)
+
+
+def test_without_a_suite_it_says_where_it_looked() -> None:
+    with reserved_domain() as empty:
+        process = subprocess.run(
+            [sys.executable, *CLIENT[:2], '--wait', '0.5', 'inhibit'], check=False, text=True,
+            capture_output=True, timeout=60, env={**os.environ, 'ROS_DOMAIN_ID': str(empty)})
+    assert process.returncode == 1
+    assert f'no suite answers in ROS domain {empty}: nobody offers' in process.stderr
+    assert 'start one with walk' in process.stderr
+    assert 'Traceback' not in process.stderr
+
+
+def test_a_suite_in_a_namespace_is_found_there_and_elsewhere_named(
+        domain: int, legs: str, ros: Ros) -> None:
+    references = ros.collect(interface('reference').type, 'robot1/reference',
+                             interface('reference').reader_qos)
+    with running(domain, legs, '-r', '__ns:=/robot1') as suite:
+        await_stop(ros, 'at_rest', 'robot1/inhibition_state')
+        answer = said(suite, 'resume', '--ros-args', '-r', '__ns:=/robot1')
+        assert answer.startswith('walking in')
+        suite.python(*CLIENT, '--namespace', 'robot1', 'cmd_vel', '0.3')
+        ros.spin_until(lambda: any(entry.twist.linear.x > 0.2 for entry in references))
+        assert 'ready' in said(suite, '--namespace', '/robot1', 'nodes')
+        assert '--namespace /robot1' in refused(suite, '--wait', '10', 'inhibit')
+
+
+def test_all_nodes_are_ready(suite: Processes) -> None:
+    lines = dict(line.split(maxsplit=1) for line in said(suite, 'nodes').splitlines())
+    assert {node.name: lines.get(node.name) for node in SUITE_NODES} == {
+        node.name: 'ready' for node in SUITE_NODES}
+    assert lines['bag_recorder'] == 'does not run'
+
+
+def test_a_request_is_asked_once_and_its_answer_printed(
+        suite: Processes, ros: Ros, request: pytest.FixtureRequest) -> None:
+    # A command starts the gait, and keeps the automatic stop away.
+    driving = suite.python(*CLIENT, 'cmd_vel', '0.2')
+    request.addfinalizer(driving.kill)
+    await_stop(ros, 'walking')
+    for command, verb, word in (
+            ('inhibit', 'at rest', 'at_rest'), ('resume', 'walking', 'walking')):
+        answer = said(suite, command)
+        found = re.match(rf'{verb} in (\S+) s, at most (\S+) s; certificate holds', answer)
+        assert found, answer
+        assert 0.0 < float(found[1]) <= float(found[2])
+        await_stop(ros, word)
+    assert said(suite, 'resume') == 'already walking'
+
+
+def test_a_velocity_reaches_the_reference_and_ends_with_zero(suite: Processes, ros: Ros) -> None:
+    sent = ros.collect(interface('cmd_vel').type, 'cmd_vel')
+    references = ros.collect(interface('reference').type, 'reference',
+                             interface('reference').reader_qos)
+    said(suite, 'resume')
+    client = suite.python(*CLIENT, 'cmd_vel', '-0.2', '0.05', '0.1', '--rate', '20')
+    ros.spin_until(
+        lambda: sent and references and abs(references[-1].twist.linear.x + 0.2) < 0.01)
+    twist = references[-1].twist
+    assert abs(twist.linear.y - 0.05) < 0.01 and abs(twist.angular.z - 0.1) < 0.01
+    client.signal(signal.SIGTERM)
+    assert client.wait() == 0, client
+    ros.spin_until(lambda: sent[-1].linear.x == sent[-1].angular.z == 0.0)
+    assert said(suite, 'cmd_vel', '0.1', '--for', '0.5') == ''
+    await_stop(ros, 'at_rest')
+
+
+def test_a_stamped_command_to_a_suite_that_reads_plain_ones_is_an_error(
+        suite: Processes) -> None:
+    assert 'it is read as geometry_msgs/msg/Twist' in refused(suite, 'cmd_vel', '0.5',
+                                                              '--stamped')
+
+
+def test_it_lies_down_refuses_to_walk_and_stands_up(suite: Processes, ros: Ros) -> None:
+    await_mode(ros, 'standing')
+    assert re.match(r'lying \S+ s|lowering', said(suite, 'lie_down'))
+    await_mode(ros, 'lying')
+    assert 'the robot is lying, not standing; call stand_up' in refused(suite, 'resume')
+    assert 'standing in' in said(suite, 'stand_up')
+    await_mode(ros, 'standing')
+    assert said(suite, 'stand_up')
+    assert 'robot_client:' in refused(suite, 'recover')
+
+
+def test_a_push_is_taken_once(suite: Processes, ros: Ros) -> None:
+    def pushes() -> int:
+        answer = ros.call(Trigger, 'mujoco_robot/commands_taken', Trigger.Request())
+        return int(re.findall(r'push (\d+)', answer.message)[0])
+
+    before = pushes()
+    said(suite, 'push', '0', '10', '0')
+    ros.spin_until(lambda: pushes() == before + 1)
+
+
+def test_parameters_are_read_set_and_refused_with_the_reason(suite: Processes) -> None:
+    owner = 'canonical_oscillators'
+    assert 'cadence_scale' in said(suite, 'param', 'list', owner).splitlines()
+    assert said(suite, 'param', 'set', owner, 'rho', '9') == 'Set parameter successful'
+    assert said(suite, 'param', 'get', f'/{owner}', 'rho') == '9.0'
+    answer = refused(suite, 'param', 'set', owner, 'cadence_scale', '3.0')
+    assert 'cadence_scale = 3.0 would lose the certificate' in answer
+    assert said(suite, 'param', 'get', owner, 'cadence_scale') == '1.0'
+    assert "has no parameter 'rhoo'" in refused(suite, 'param', 'get', owner, 'rhoo')
+    assert owner in refused(suite, '--wait', '10', 'param', 'get', 'oscillators', 'rho')
+    assert 'param takes' in refused(suite, 'param', 'get', owner, status=2)
+
+
+def test_a_message_is_printed_as_yaml(suite: Processes) -> None:
+    (message, _) = yaml.safe_load_all(said(suite, 'echo', 'joint_states', '--once'))
+    assert len(message['name']) == len(message['position']) == 3 * len(LEGS)
+    assert 'joint_states' in refused(suite, '--wait', '10', 'echo', 'joint_stats', '--once')
+
+
+def test_what_is_not_finite_is_bad_input(suite: Processes) -> None:
+    assert 'finite' in refused(suite, 'cmd_vel', 'nan', status=2)
+    assert 'finite' in refused(suite, 'push', '0', 'inf', '0', status=2)
+
+
+class Terminal:
+    """The client in a terminal of its own."""
+
+    def __init__(self, processes: Processes, *arguments: str) -> None:
+        self.end, inside = pty.openpty()
+        self.inside = inside
+        self.output = ''
+        self.process = subprocess.Popen(
+            [sys.executable, *CLIENT, *arguments], stdin=inside, stdout=inside, stderr=inside,
+            env=processes.environment, start_new_session=True)
+
+    def read(self) -> None:
+        if select.select([self.end], [], [], 0.02)[0]:
+            self.output += os.read(self.end, 4096).decode()
+
+    def wait_for(self, text: str) -> None:
+        wait_until(lambda: text in self.output, between=self.read, what=lambda: self.output)
+
+    def press(self, keys: str) -> None:
+        os.write(self.end, keys.encode())
+
+    def status(self) -> int:
+        wait_until(lambda: self.process.poll() is not None, between=self.read,
+                   what=lambda: self.output)
+        return self.process.returncode
+
+
+@pytest.fixture
+def terminal(suite: Processes) -> Iterator[Terminal]:
+    opened = Terminal(suite, 'teleop')
+    try:
+        yield opened
+    finally:
+        opened.process.kill()
+        opened.process.wait()
+        os.close(opened.end)
+        os.close(opened.inside)
+
+
+def test_keys_drive_stop_and_quit_and_the_terminal_is_as_it_was(
+        terminal: Terminal, suite: Processes, ros: Ros) -> None:
+    before = termios.tcgetattr(terminal.inside)
+    references = ros.collect(interface('reference').type, 'reference',
+                             interface('reference').reader_qos)
+    said(suite, 'inhibit')
+    await_stop(ros, 'at_rest')
+    terminal.wait_for('at rest')
+    assert termios.tcgetattr(terminal.inside) != before
+    terminal.press(' ')
+    terminal.wait_for('walking in')
+    terminal.press('w\x1b[Aa\x1b[Cw')
+    terminal.wait_for('+0.3 m/s, +0.0 rad/s')
+    ros.spin_until(lambda: references and references[-1].twist.linear.x > 0.29)
+    terminal.press(' ')
+    terminal.wait_for('at rest in')
+    await_stop(ros, 'at_rest')
+    terminal.press('xq')
+    assert terminal.status() == 0, terminal.output
+    assert termios.tcgetattr(terminal.inside) == before
+
+
+def test_a_terminated_teleop_leaves_the_terminal_as_it_was(terminal: Terminal) -> None:
+    before = termios.tcgetattr(terminal.inside)
+    terminal.wait_for('+0.0 m/s')
+    terminal.process.send_signal(signal.SIGTERM)
+    assert terminal.status() == 0, terminal.output
+    assert termios.tcgetattr(terminal.inside) == before
+
+
+def test_keys_need_a_terminal(suite: Processes) -> None:
+    process = subprocess.run([sys.executable, *CLIENT, 'teleop'], env=suite.environment,
+                             stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                             timeout=90, check=False)
+    assert process.returncode == 1
+    assert 'terminal' in process.stderr

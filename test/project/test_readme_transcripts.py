@@ -1,0 +1,105 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The README's console blocks, run in their order: what they show is what happens."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from ros_processes import NodeProcess, Processes, Ros, reserved_domain
+from test_readme import as_shown, transcripts
+
+from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
+from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
+from dmp_cpg_ros.nodes.interfaces import interface
+from dmp_cpg_ros.nodes.message_values import stamp_ns
+from dmp_cpg_ros.nodes.middleware import prepare_middleware
+
+BIN = Path(sys.prefix) / 'bin'
+pytestmark = pytest.mark.skipif(
+    not (BIN / 'robot_client').exists(), reason='the commands are not installed')
+
+SETTLED_NS = 1_000_000_000
+"""Time on the robot's clock without a change after which it has done what it was told [ns]."""
+
+PATIENCE_S = 240.0
+"""How long a loaded machine may take [s]."""
+
+
+class Reader:
+    """A reader of the README: waits until the robot has done one thing before the next."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        self.processes, self.ros, self.folder = Processes(domain), Ros(domain), folder
+        self.background: list[NodeProcess] = []
+        self.states: dict[str, str] = {}
+        self.now_ns = self.changed_ns = 0
+        self.changes = 0
+        self.listen('/clock', lambda message: setattr(self, 'now_ns', stamp_ns(message.clock)))
+        self.listen('inhibition_state', lambda message: self.take(
+            'gait', read_inhibition_state(message).word))
+        self.listen('body_mode', lambda message: self.take('body', read_body_mode(message)))
+
+    def listen(self, name: str, take: object) -> None:
+        topic = interface(name)
+        self.ros.node.create_subscription(topic.type, topic.name, take, topic.reader_qos)
+
+    def take(self, what: str, state: str) -> None:
+        if self.states.get(what) != state:
+            self.states[what], self.changed_ns = state, self.now_ns
+            self.changes += 1
+
+    def settled(self) -> bool:
+        return (self.states.get('gait') in ('at_rest', 'walking')
+                and self.states.get('body') in ('standing', 'lying')
+                and self.now_ns > self.changed_ns + SETTLED_NS)
+
+    def type(self, command: str) -> str:
+        """Run a command; returns what it prints, of one in the background nothing."""
+        text = command.partition('#')[0].strip()
+        begun = self.changes
+        process = self.processes.start(
+            'bash', '-c', f'cd {self.folder}; PATH={BIN}:$PATH; exec {text.rstrip(" &")}')
+        if text.endswith('&'):
+            self.background.append(process)
+            self.ros.spin_until(lambda: self.changes > begun and self.settled(), PATIENCE_S,
+                                what=lambda: f'an effect of {process}')
+            return ''
+        self.ros.spin_until(lambda: not process.running, PATIENCE_S, what=lambda: str(process))
+        process.wait()
+        self.changed_ns = self.now_ns
+        self.ros.spin_until(self.settled, PATIENCE_S, what=lambda: str(self.states))
+        return process.output
+
+    def end(self) -> None:
+        for process in reversed(self.background):
+            process.interrupt()
+            process.wait(PATIENCE_S)
+        self.processes.end()
+        self.ros.end()
+
+
+@pytest.fixture
+def reader(tmp_path: Path) -> Iterator[Reader]:
+    with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
+        patch.setenv('ROS_DOMAIN_ID', str(domain))
+        prepare_middleware()
+        started = Reader(domain, tmp_path)
+        try:
+            yield started
+        finally:
+            started.end()
+
+
+def test_what_the_transcripts_show_is_what_happens(reader: Reader) -> None:
+    happened = [(command, shown, reader.type(command)) for command, shown in transcripts()]
+    assert any(shown for _, shown, _ in happened)
+    wrong = [f'$ {command}\n{printed}--- the README shows ---\n{shown}'
+             for command, shown, printed in happened if not as_shown(printed, shown)]
+    assert not wrong, '\n'.join(wrong)
