@@ -99,7 +99,7 @@ bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS
 lint: $(INSTALLED) ## ruff, mypy and the rules for package.xml
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m mypy
-	$(ACTIVATED) cd test && python -m pytest --quiet test_packaging.py -k package_xml
+	$(ACTIVATED) cd test && python -m pytest --quiet project/test_packaging.py -k package_xml
 
 install: $(INSTALLED) ## make .venv and install the package into it
 

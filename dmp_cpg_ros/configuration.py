@@ -11,7 +11,8 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -225,3 +226,15 @@ def _applies(section: str, node_name: str) -> bool:
 
 def _generality(section: str) -> tuple[bool, int]:
     return section.endswith('*'), section.count('*')
+
+
+def numbered(path: Path) -> Iterator[Path]:
+    """A path, then the same with ``_1``, ``_2``, … at its end, without an end."""
+    yield path
+    for number in count(1):
+        yield path.with_name(f'{path.name}_{number}')
+
+
+def first_free(path: Path) -> Path:
+    """The first of :func:`numbered` that does not exist."""
+    return next(name for name in numbered(path) if not name.exists())

@@ -25,8 +25,8 @@ from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metad
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC, Writer
 
+from dmp_cpg_ros.configuration import numbered
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.numbered_paths import numbered
 
 ROS_SCHEMAS = ('ros2msg', 'ros2idl', 'omgidl')
 """Encodings of definitions that readers of ROS know."""

@@ -11,8 +11,8 @@ from typing import Any
 
 import yaml
 
+from dmp_cpg_ros.configuration import first_free
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.numbered_paths import first_free
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
 from dmp_cpg_ros.suite import node_sets
