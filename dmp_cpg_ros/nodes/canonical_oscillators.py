@@ -21,6 +21,7 @@ from dmp_cpg_ros.core.gait_choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait_network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait_transition import GaitChangeParameters
 from dmp_cpg_ros.core.inhibition import Inhibition, InhibitionParameters, initial_inhibition
+from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.phase_lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.running_network import RunningNetwork
@@ -62,7 +63,7 @@ class CanonicalOscillators(CertifiedNode):
             self.parameters_of(GaitChoiceParameters),
         )
         network = self._running_network.network
-        self._x, self._last_ns = initial_canonical_state(network, inhibition), -1
+        self._x = initial_canonical_state(network, inhibition)
         self._inhibition = initial_inhibition(inhibition)
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
@@ -114,8 +115,7 @@ class CanonicalOscillators(CertifiedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the oscillators to the stamp of the reference."""
-        dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
-        self._last_ns = stamp_ns
+        dt = self.elapsed
         self._inhibition = values['inhibition_state'] or self._inhibition
         r, running = values['reference'], self._running_network
         self._x = running.begin_tick(self._x, r, self._inhibition, dt)
@@ -191,14 +191,16 @@ class CanonicalOscillators(CertifiedNode):
 
 
 def inhibition_from(message: InhibitionMessage) -> Inhibition:
-    """Inhibition that ``inhibition_state`` announces; raises DataError for numbers that are not
-    finite.
+    """Inhibition that ``inhibition_state`` announces; raises DataError for numbers that no
+    parameters allow.
     """
-    gains = np.array([message.number(f'gain_{leg}') for leg in LEGS])
+    largest_gain = range_of(InhibitionParameters, 'inhibition_gain')[1]
+    largest_gain *= range_of(InhibitionParameters, 'vote_limit')[1]
+    gains = np.array([message.number(f'gain_{leg}', 0.0, largest_gain) for leg in LEGS])
     return Inhibition(
         message.flag('requested'),
         gains,
-        message.number('region_radius'),
+        message.number('region_radius', *range_of(InhibitionParameters, 'region_radius')),
         message.word == 'at_rest',
     )
 

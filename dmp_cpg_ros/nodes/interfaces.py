@@ -72,6 +72,8 @@ class Interface:
     publishers, subscribers : tuple of str
         Kinds of nodes that write and read it; of a service: that serve and call it. The recorder
         reads every topic and is named nowhere; ``user`` stands for whoever is outside the suite.
+    other_type : str
+        What to do about publishers of the other type, for the end of a sentence.
     sometimes : tuple of str
         Of both: those that write or read it with some parameters only.
     latched : bool
@@ -88,6 +90,7 @@ class Interface:
     latched: bool = False
     service: bool = False
     sometimes: tuple[str, ...] = ()
+    other_type: str = ''
 
     @property
     def publisher_qos(self) -> QoSProfile:
@@ -123,7 +126,8 @@ _REFERENCE, _CANONICAL, _LEG, _INHIBITION, _POSTURE, _ROBOT, _RECORDER = SUITE
 TOPICS: tuple[Interface, ...] = (
     Interface('cmd_vel', Twist,
               'commanded speed and turn rate (TwistStamped with stamped_cmd_vel)',
-              ('user',), (_REFERENCE, _INHIBITION)),
+              ('user',), (_REFERENCE, _INHIBITION),
+              other_type='; with stamped_cmd_vel:=true it reads TwistStamped'),
     Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z',
               (_REFERENCE,), (_CANONICAL, _LEG, _INHIBITION, _POSTURE)),
     Interface('canonical_state', JointState, 'oscillators: position = x, velocity = its rate',
@@ -232,5 +236,7 @@ def partners(topic: Interface, *, readers: bool) -> tuple[str, ...]:
     return tuple(kind for kind in kinds if kind in SUITE and kind not in topic.sometimes)
 
 
-STAMPED_CMD_VEL = replace(INTERFACES['cmd_vel'], type=TwistStamped)
+STAMPED_CMD_VEL = replace(
+    INTERFACES['cmd_vel'], type=TwistStamped,
+    other_type='; with stamped_cmd_vel:=false it reads Twist')
 """``cmd_vel`` with parameter ``stamped_cmd_vel:=true``."""
