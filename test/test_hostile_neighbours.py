@@ -16,17 +16,21 @@ import pytest
 pytest.importorskip('rclpy')
 
 import ros_processes
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from geometry_msgs.msg import WrenchStamped
+from geometry_msgs.msg import Twist, WrenchStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
+from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
-from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameter_events
 from ros_processes import NodeProcess, Processes, Ros
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import SetBool, Trigger
 from test_executables import NAMES, NODES
 
 from dmp_cpg_ros.core.errors import DataError
@@ -334,3 +338,55 @@ def test_a_leg_tells_the_gait_that_it_follows(ros: Ros) -> None:
     assert node.get_parameter('gait').value == 'trot'
     node.close()
     node.destroy_node()
+
+
+def test_the_suite_walks_on_among_garbage(processes: Processes, ros: Ros) -> None:
+    """All nodes in real time, and garbage on every topic ten times a second."""
+    kinds = [name for name in CONTROLLERS if name != 'leg_transformation']
+    gated = {'mujoco_robot': {'gated': True}}
+    nodes = [processes.node(kind, **gated.get(kind, {})) for kind in kinds]
+    nodes += [processes.node('leg_transformation', leg=leg) for leg in LEGS]
+    for node in nodes:
+        node.wait_for_output('active')
+    places: list[Any] = ros.collect(Odometry, 'odom', interface('odom').reader_qos)
+    reports = ros.collect(DiagnosticArray, '/diagnostics', 1000)
+    topics = {topic.name: topic for kind in kinds for topic in read_by(kind)
+              if kind not in topic.sometimes and topic.name != '/clock'}
+    publishers = {name: ros.node.create_publisher(topic.type, name, topic.publisher_qos)
+                  for name, topic in topics.items()}
+    for node in (*kinds, *(f'leg_transformation_{leg}' for leg in LEGS)):
+        ros.spin_until(
+            lambda node=node: ros.call(Trigger, f'{node}/ready', Trigger.Request()).success)
+    gate = interface('mujoco_robot/advance_until')
+    opener = ros.node.create_publisher(gate.type, gate.name, gate.publisher_qos)
+    ros.spin_until(lambda: opener.get_subscription_count() > 0)
+    opener.publish(Clock(clock=Time(sec=10_000)))
+    ros.spin_until(lambda: bool(places))
+    assert ros.call(SetBool, 'inhibit', SetBool.Request(data=False)).success
+    command, rounds = Twist(), 0
+    command.linear.x = 0.4
+
+    def walked() -> bool:
+        nonlocal rounds
+        if len(places) // 25 > rounds:
+            rounds = len(places) // 25
+            for publisher in publishers.values():
+                publisher.publish(GARBAGE[rounds % 2])
+            publishers['cmd_vel'].publish(command)
+        assert all(node.running for node in nodes), nodes
+        return bool(places[-1].pose.pose.position.x > 0.5)
+
+    ros.spin_until(walked, deadline_s=4 * ros_processes.DEADLINE_S)
+    assert places[-1].pose.pose.position.z > 0.2
+    trot = Parameter('gait', value='trot').to_parameter_msg()
+    answer = ros.call(SetParameters, 'canonical_oscillators/set_parameters',
+                      SetParameters.Request(parameters=[trot]))
+    assert answer.results[0].successful, answer.results[0].reason
+    for node in ('posture_control', 'leg_transformation_rr'):
+        ros.spin_until(lambda node=node: walked() and ros.call(
+            GetParameters, f'{node}/get_parameters', GetParameters.Request(names=['gait'])
+        ).values[0].string_value == 'trot')
+    counted = {entry.key for report in reports for entry in report.status[0].values}
+    assert {f'rejected.{name}' for name in publishers} <= counted
+    for node in nodes:
+        ended(node)

@@ -213,8 +213,9 @@ class ManagedNode(ParameterizedNode):
                 self.health.status(self.state_label, values, periodic=periodic))
 
     def state_changed(self) -> None:
-        """Say and report a new state."""
-        self.get_logger().info(self.state_label)
+        """Report a new state, and say when the node works."""
+        if self.active:
+            self.get_logger().info('active')
         self.report()
 
     def warn(self, key: str, message: str, *, error: bool = False) -> None:

@@ -214,11 +214,10 @@ def open_viewer(robot: MujocoRobot) -> Any | None:
         _log.warning('no window: there is no screen (DISPLAY and WAYLAND_DISPLAY are unset)')
         return None
     try:
-        import glfw
         import mujoco.viewer as viewer
 
         # MuJoCo opens its window in a thread whose failure it would wait for without end.
-        if not glfw.init():
+        if not viewer.glfw.init():
             raise RobotError(f'the screen {os.environ.get("DISPLAY", "")!r} cannot be opened')
         window = viewer.launch_passive(
             robot.model, robot.data, show_left_ui=False, show_right_ui=False)
