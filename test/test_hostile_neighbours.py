@@ -28,8 +28,10 @@ from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameter_events
+from rclpy.serialization import serialize_message
 from ros_processes import NodeProcess, Processes, Ros
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool, Trigger
 from test_executables import NAMES, NODES
 
@@ -44,6 +46,8 @@ from dmp_cpg_ros.nodes.interfaces import Interface, interface, published_by, rea
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.message_values import set_stamp
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
+from dmp_cpg_ros.nodes.robot_state_messages import read_imu
+from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
 
 processes, ros, ros_domain = (
     ros_processes.processes,
@@ -255,6 +259,16 @@ def test_an_inhibition_that_no_parameters_allow_is_refused(key: str, value: str)
     values[key] = value
     with pytest.raises(DataError, match=key):
         inhibition_from(read_inhibition_state(message()))
+
+
+def test_a_turn_rate_that_cannot_be_is_none() -> None:
+    """Its square would overflow in whatever filters it."""
+    message = Imu()
+    message.angular_velocity.x, message.linear_acceleration.z = 1e160, 9.81
+    for read in (message, serialized_reader(Imu)(serialize_message(message))):
+        rate, force = read_imu(read)
+        assert np.isnan(rate).tolist() == [True, False, False]
+        assert force.tolist() == [0.0, 0.0, 9.81]
 
 
 def test_a_push_that_no_simulation_bears_is_refused() -> None:
