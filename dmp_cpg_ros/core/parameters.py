@@ -86,6 +86,13 @@ class Parameters:
         return cls(**values)
 
 
+def range_of(cls: type[Parameters], name: str) -> tuple[float, float]:
+    """Smallest and largest value that a parameter may have; infinite where there is no bound."""
+    metadata = cls.__dataclass_fields__[name].metadata
+    low, high = metadata['minimum'], metadata['maximum']
+    return -math.inf if low is None else low, math.inf if high is None else high
+
+
 def _checked(field: dataclasses.Field[Any], value: Any) -> Any:
     """Return the value converted to the type of its default, or raise ParameterError."""
     default = field.default

@@ -18,7 +18,7 @@ from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.nodes.bag_writing import STORAGES, BagWriter
+from dmp_cpg_ros.nodes.bag_writing import STORAGES, BagWriter, RecordingError
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.interfaces import RECORDED, STAMPED_CMD_VEL, Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
@@ -58,6 +58,7 @@ class BagRecorder(ManagedNode):
 
     KIND = 'bag_recorder'
     PARAMETER_SETS = (RecorderParameters,)
+    ENDS_WITH = (RecordingError,)
 
     def configure(self) -> None:
         """Open the bag and subscribe."""

@@ -28,6 +28,7 @@ from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running_network import RunningNetwork
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.loop import initial_canonical_state
+from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
@@ -66,7 +67,7 @@ class CanonicalOscillators(CertifiedNode):
             self.parameters_of(GaitChoiceParameters),
         )
         network = self._running_network.network
-        self._x, self._last_ns = initial_canonical_state(network, inhibition), -1
+        self._x = initial_canonical_state(network, inhibition)
         self._inhibition = initial_inhibition(inhibition)
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
@@ -118,8 +119,7 @@ class CanonicalOscillators(CertifiedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the oscillators to the stamp of the reference."""
-        dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
-        self._last_ns = stamp_ns
+        dt = self.elapsed
         self._inhibition = values['inhibition_state'] or self._inhibition
         r, running = values['reference'], self._running_network
         self._x = running.begin_tick(self._x, r, self._inhibition, dt)
@@ -195,14 +195,16 @@ class CanonicalOscillators(CertifiedNode):
 
 
 def inhibition_from(message: InhibitionMessage) -> Inhibition:
-    """Inhibition that ``inhibition_state`` announces; raises DataError for numbers that are not
-    finite.
+    """Inhibition that ``inhibition_state`` announces; raises DataError for numbers that no
+    parameters allow.
     """
-    gains = np.array([message.number(f'gain_{leg}') for leg in LEGS])
+    largest_gain = range_of(InhibitionParameters, 'inhibition_gain')[1]
+    largest_gain *= range_of(InhibitionParameters, 'vote_limit')[1]
+    gains = np.array([message.number(f'gain_{leg}', 0.0, largest_gain) for leg in LEGS])
     return Inhibition(
         message.flag('requested'),
         gains,
-        message.number('region_radius'),
+        message.number('region_radius', *range_of(InhibitionParameters, 'region_radius')),
         message.word == 'at_rest',
     )
 

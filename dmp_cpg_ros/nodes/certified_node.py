@@ -9,7 +9,7 @@ refuses a change that would lose it; the others follow what the owner has accept
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, cast
 
 from rclpy.parameter import Parameter
@@ -24,7 +24,7 @@ from dmp_cpg_ros.core.certificates.gate import (
     Verdict,
     shown,
 )
-from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
 from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
@@ -46,7 +46,6 @@ from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.parameter_follower import ParameterFollower
 from dmp_cpg_ros.nodes.parameterized_node import P, Sets
-from dmp_cpg_ros.nodes.ros_parameters import ros_value
 from dmp_cpg_ros.nodes.tick_inputs import drain
 
 PROBLEM = 'certificate'
@@ -65,7 +64,6 @@ class CertifiedNode(ManagedNode):
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node; it follows nobody before it is configured."""
         self._follower: ParameterFollower | None = None
-        self._following = False
         self._judged: Verdict | None = None
         self._held: Certificate | None = None
         self._held_in: dict[str, Certificate] = {}
@@ -101,7 +99,7 @@ class CertifiedNode(ManagedNode):
         self.gaits, self._scale = gait_reader(self), body_scale(description_of(self))
         self._held = None
         others = {node: names for node, names in CHANGEABLE.items() if node != self.KIND}
-        self._follower = ParameterFollower(self, others, self._follow)
+        self._follower = ParameterFollower(self, others, self.follow)
 
     def new_networks(self) -> GaitNetworks:
         """Networks of all gaits with the parameters in effect, without reading any file."""
@@ -169,22 +167,17 @@ class CertifiedNode(ManagedNode):
     # Own changes -------------------------------------------------------------------------------
 
     def check_parameters(self, sets: Sets) -> None:
-        """Refuse what other nodes own, and what would lose the certificate."""
+        """Refuse what would lose the certificate, or what nobody can walk with."""
         self._judged = None
         before, after = self._table.values(self._accepted), self._table.values(sets)
         changed = {name: value for name, value in after.items() if value != before[name]}
-        if self._following or not changed:
+        if not changed or not self.configured or UNCERTIFIED.issuperset(changed):
             return
-        for name, value in changed.items():
-            owner = OWNER.get(name, self.KIND)
-            if owner != self.KIND:
-                raise ParameterError(
-                    f"'{name}' belongs to {owner}, which the other nodes follow; set it there: "
-                    f'ros2 param set /{owner} {name} {shown(value)}')
-        if not self.configured or UNCERTIFIED.issuperset(changed):
+        running = self._running(sets)
+        if self._following:
             return
         verdict = self._changes.judge(
-            self._running(self._accepted), self.certificate, self._running(sets))
+            self._running(self._accepted), self.certificate, running)
         if not verdict.accepted and not _allowed(sets):
             asked = ', '.join(f'{name} = {shown(value)}' for name, value in changed.items())
             raise ParameterError(
@@ -214,24 +207,6 @@ class CertifiedNode(ManagedNode):
 
     def others_changed(self) -> None:
         """Note that other nodes accepted changes, which are in the accepted parameters."""
-
-    def _follow(self, values: Mapping[str, Any]) -> None:
-        """Take over what an owner has accepted."""
-        accepted = self._table.values(self._accepted)
-        news = {name: value for name, value in values.items()
-                if name in accepted and value != ros_value(accepted[name])}
-        if not news:
-            return
-        self._following = True
-        try:
-            result = self.set_parameters_atomically(
-                [Parameter(name, value=value) for name, value in news.items()])
-        except DmpCpgError as error:
-            raise DataError(f'cannot follow {news}: {error}') from error
-        finally:
-            self._following = False
-        if not result.successful:
-            self.get_logger().error(f'cannot follow {news}: {result.reason}')
 
 
 def _allowed(sets: Sets) -> bool:

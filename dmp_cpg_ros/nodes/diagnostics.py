@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+import time
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -15,12 +16,19 @@ from dmp_cpg_ros.nodes.message_values import set_stamp, text
 PERIOD_NS = 1_000_000_000
 """Time between reports on the robot's clock [ns]."""
 
-LOG_EVERY = 100
-"""Of repeated problems the first and then every so many are logged."""
+LOG_EVERY_S = 5.0
+"""Time after which a topic's next dropped message is logged again [s]."""
 
 
 class NodeHealth:
     """Ticks, rejected messages and problems of one node.
+
+    Parameters
+    ----------
+    name : str
+        Name of the node.
+    clock : callable () → float
+        Steady time [s]: what is dropped may come while the robot's clock stands still.
 
     Attributes
     ----------
@@ -29,16 +37,17 @@ class NodeHealth:
     stamp_ns : int
         Stamp of the last tick [ns].
     rejected : dict of str to int
-        Messages that were dropped, per topic.
+        Messages that were dropped, per topic; requests, per service.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, clock: Callable[[], float] = time.monotonic) -> None:
         """Start healthy; nodes report at different moments, so that no tick bears all reports."""
-        self.name = name
+        self.name, self._clock = name, clock
         self.ticks = 0
         self.stamp_ns = 0
         self.rejected: dict[str, int] = {}
-        self._recent: dict[str, str] = {}
+        self._recent: dict[str, tuple[bytes, str]] = {}
+        self._logged: dict[str, float] = {}
         self._problems: dict[str, tuple[bytes, str]] = {}
         self._offset_ns = zlib.crc32(name.encode()) % PERIOD_NS
         self._period = -1
@@ -51,18 +60,26 @@ class NodeHealth:
         self._period = period
         return True
 
-    def reject(self, topic: str, problem: str) -> bool:
-        """Count a dropped message; returns whether to log it: the first and every hundredth."""
-        count = self.rejected[topic] = self.rejected.get(topic, 0) + 1
-        self._recent[topic] = problem
-        return count % LOG_EVERY == 1
+    def reject(self, topic: str, problem: str, *, error: bool = False) -> bool:
+        """Count a dropped message; returns whether to log it: not again within ``LOG_EVERY_S``."""
+        self.rejected[topic] = self.rejected.get(topic, 0) + 1
+        self._recent[topic] = (_level(error), f'{topic}: {problem}')
+        now, logged = self._clock(), self._logged.get(topic)
+        if logged is not None and now < logged + LOG_EVERY_S:
+            return False
+        self._logged[topic] = now
+        return True
 
     def set_problem(self, key: str, message: str, *, error: bool = False) -> bool:
         """Raise a warning (or error) that stays until it is cleared; returns whether it is new."""
-        problem = (DiagnosticStatus.ERROR if error else DiagnosticStatus.WARN, message)
+        problem = (_level(error), message)
         new = self._problems.get(key) != problem
         self._problems[key] = problem
         return new
+
+    def has_problem(self, key: str) -> bool:
+        """Whether a warning is raised."""
+        return key in self._problems
 
     def clear_problem(self, key: str) -> bool:
         """Withdraw a warning; returns whether there was one."""
@@ -83,7 +100,7 @@ class NodeHealth:
         """
         problems = dict(self._problems)
         for topic, problem in self._recent.items():
-            problems.setdefault(topic, (DiagnosticStatus.WARN, f'{topic}: {problem}'))
+            problems.setdefault(topic, problem)
         if periodic:
             self._recent = {}
         entries: dict[str, Any] = {
@@ -98,3 +115,7 @@ class NodeHealth:
         message = DiagnosticArray(status=[status])
         set_stamp(message.header.stamp, self.stamp_ns)
         return message
+
+
+def _level(error: bool) -> bytes:
+    return bytes(DiagnosticStatus.ERROR if error else DiagnosticStatus.WARN)

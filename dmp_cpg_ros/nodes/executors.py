@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterable, Sequence
@@ -19,6 +21,7 @@ from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedE
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.logging import get_logger
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import get_default_context, remove_ros_args
 
@@ -100,10 +103,6 @@ def spin(nodes: Node | Sequence[Node], kind: str = 'events', until: Future | Non
                 raise RuntimeError("the executor returned at once; try parameter 'executor'")
     except ExternalShutdownException:
         pass
-    except Exception:
-        # A signal that ends the context while a call is under way makes that call fail.
-        if context.ok():
-            raise
     finally:
         for node in nodes:
             executor.remove_node(node)
@@ -152,39 +151,29 @@ def run_nodes(program: str, arguments: Sequence[str],
     int
         As for :func:`run_node`.
     """
-    # rclpy's own handler ends the context; Python's would raise KeyboardInterrupt in a callback.
-    signal.signal(signal.SIGINT, _ignore)
     nodes: list[ManagedNode] = []
-    status = _status(program, lambda: _run(program, arguments, make, nodes))
-    rclpy.try_shutdown()
-    # From here on a second Ctrl-C must not break into what is being completed: a recording.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    until = _first_signal()
+    status = _status(program, lambda: _run(program, arguments, make, nodes, until))
     for node in nodes:
         status = max(status, _status(program, node.close), _status(program, node.destroy_node))
+    rclpy.try_shutdown()
     return status
 
 
 def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[ManagedNode]],
-         nodes: list[ManagedNode]) -> None:
+         nodes: list[ManagedNode], until: Future) -> None:
     unknown = remove_ros_args([program, *arguments])[1:]
     if unknown:
         raise ParameterError(
             f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
     prepare_middleware()
-    rclpy.init(args=[program, *arguments])
-    try:
-        nodes.extend(make())
-        for node in nodes:
-            node.start()
-        parameters = nodes[0].parameters_of(NodeParameters)
-        schedule(parameters.scheduling)
-        spin(nodes, parameters.executor)
-    except DmpCpgError:
-        raise
-    except Exception:
-        if rclpy.ok():
-            raise
+    rclpy.init(args=[program, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+    nodes.extend(make())
+    for node in nodes:
+        node.start()
+    parameters = nodes[0].parameters_of(NodeParameters)
+    schedule(parameters.scheduling)
+    spin(nodes, parameters.executor, until)
 
 
 def _status(program: str, body: Callable[[], object]) -> int:
@@ -209,5 +198,28 @@ def _before_ros_args(arguments: list[str]) -> list[str]:
     return arguments[:arguments.index('--ros-args')] if '--ros-args' in arguments else arguments
 
 
+def _first_signal() -> Future:
+    """Return a future that SIGINT or SIGTERM completes; nothing else comes of them.
+
+    rclpy's handler would end the context under callbacks that still run, and Python's would raise
+    in one of them; a second Ctrl-C must not break into what is being completed: a recording.
+    """
+    until = Future()
+    readable, writable = os.pipe()
+    os.set_blocking(writable, False)
+    # Python runs handlers between two of its own instructions, of which a waiting executor
+    # executes none; the byte is written at once.
+    signal.set_wakeup_fd(writable, warn_on_full_buffer=False)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _ignore)
+
+    def wait() -> None:
+        os.read(readable, 1)
+        until.set_result(None)
+
+    threading.Thread(target=wait, daemon=True).start()
+    return until
+
+
 def _ignore(signum: int, frame: FrameType | None) -> None:
-    """Leave the interrupt to rclpy's handler."""
+    """Do nothing: the signal has written its byte."""

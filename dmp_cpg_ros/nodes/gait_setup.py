@@ -10,6 +10,7 @@ from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.certificates.certify import Certificate
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.suite_parameters import GaitParameters, RobotFileParameters
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
@@ -38,6 +39,12 @@ def gait_reader(node: ManagedNode) -> GaitReader:
 def gait_name(node: ManagedNode) -> str:
     """Name of the gait that a node's parameters choose."""
     return node.parameters_of(GaitParameters).gait
+
+
+def follow_gait(node: ManagedNode, gait: GaitInForce) -> None:
+    """Let a node's parameter ``gait`` name the gait that its messages say, once it has changed."""
+    if gait.name != gait_name(node) and not isinstance(gait, BlendedGait):
+        node.follow({'gait': gait.name})
 
 
 def certificate_words(certificate: Certificate) -> str:

@@ -8,12 +8,13 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.nodes.guarded_node import GuardedNode
 
 
-class HookedLifecycleNode(LifecycleNode):  # type: ignore[misc]
+class HookedLifecycleNode(GuardedNode):
     """A lifecycle node with the hooks ``configure``, ``activate``, ``deactivate``, ``cleanup``.
 
     ``configure`` and ``activate`` refuse by raising a

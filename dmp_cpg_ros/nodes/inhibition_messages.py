@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from dmp_cpg_ros.core.errors import DataError
@@ -68,14 +67,14 @@ class InhibitionMessage:
     word: str
     values: dict[str, str]
 
-    def number(self, key: str) -> float:
-        """Value of a key as a float; raises DataError when it is absent or not a finite number."""
+    def number(self, key: str, low: float, high: float) -> float:
+        """Value of a key as a float; raises DataError unless it is a number in a closed range."""
         try:
             value = float(self.values[key])
         except (KeyError, ValueError):
             raise DataError(f"'{key}' must be a number, not {self.values.get(key)!r}") from None
-        if not np.isfinite(value):
-            raise DataError(f"'{key}' = {value} must be finite")
+        if not low <= value <= high:
+            raise DataError(f"'{key}' = {value} must be from {low:g} to {high:g}")
         return value
 
     def flag(self, key: str) -> bool:

@@ -73,6 +73,8 @@ class Interface:
         Kinds of nodes that write and read it; of a service: that serve and call it. The recorder
         reads what is ``recorded`` and is named nowhere; ``user`` stands for whoever is outside the
         suite.
+    other_type : str
+        What to do about publishers of the other type, for the end of a sentence.
     sometimes : tuple of str
         Of both: those that write or read it with some parameters only.
     latched : bool
@@ -92,6 +94,7 @@ class Interface:
     service: bool = False
     sometimes: tuple[str, ...] = ()
     recorded: bool = True
+    other_type: str = ''
 
     @property
     def publisher_qos(self) -> QoSProfile:
@@ -127,7 +130,8 @@ _REFERENCE, _CANONICAL, _LEG, _INHIBITION, _POSTURE, _ROBOT, _RECORDER = SUITE
 TOPICS: tuple[Interface, ...] = (
     Interface('cmd_vel', Twist,
               'commanded speed and turn rate (TwistStamped with stamped_cmd_vel)',
-              ('user',), (_REFERENCE, _INHIBITION)),
+              ('user',), (_REFERENCE, _INHIBITION),
+              other_type='; with stamped_cmd_vel:=true it reads TwistStamped'),
     Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z',
               (_REFERENCE,), (_CANONICAL, _LEG, _INHIBITION, _POSTURE)),
     Interface('canonical_state', JointState, 'oscillators: position = x, velocity = its rate',
@@ -244,5 +248,7 @@ def partners(topic: Interface, *, readers: bool) -> tuple[str, ...]:
     return tuple(kind for kind in kinds if kind in SUITE and kind not in topic.sometimes)
 
 
-STAMPED_CMD_VEL = replace(INTERFACES['cmd_vel'], type=TwistStamped)
+STAMPED_CMD_VEL = replace(
+    INTERFACES['cmd_vel'], type=TwistStamped,
+    other_type='; with stamped_cmd_vel:=false it reads Twist')
 """``cmd_vel`` with parameter ``stamped_cmd_vel:=true``."""

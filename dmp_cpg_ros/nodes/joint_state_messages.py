@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.message_values import Array, checked
+from dmp_cpg_ros.nodes.message_values import Array, checked, sensed
 from dmp_cpg_ros.nodes.serialized_messages import SerializedJointState
 from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraft
 
@@ -68,7 +68,7 @@ class JointStateReader:
     fields : sequence of str
         Which of ``position``, ``velocity``, ``effort`` are needed.
     strict : bool
-        Whether numbers that are not finite are refused; else the caller judges them.
+        Whether numbers that cannot be are refused; else they are NaN, and the caller judges them.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class JointStateReader:
                 raise DataError(f'{field} has {values.shape[0]} entries for {size} names')
             if index is not None:
                 values = values[index]
-            arrays.append(checked(values, field) if self._strict else values)
+            arrays.append(checked(values, field) if self._strict else sensed(values))
         return arrays
 
 

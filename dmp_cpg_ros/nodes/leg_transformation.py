@@ -23,7 +23,7 @@ from dmp_cpg_ros.nodes.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
+from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, gait_reader
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import Array, frame_of, header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
@@ -35,6 +35,7 @@ class LegTransformation(ManagedNode):
 
     KIND = 'leg_transformation'
     PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    CHANGEABLE = ('gait',)
 
     @classmethod
     def default_name(cls, arguments: Sequence[str]) -> str:
@@ -59,7 +60,7 @@ class LegTransformation(ManagedNode):
         )
         self._motion_state: MotionState | None = None
         self._body = BodyCommand()
-        self._state, self._last_ns = self._primitive.initial_state(), -1
+        self._state = self._primitive.initial_state()
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
         inputs = ['canonical_state', 'reference', 'posture_feedback']
         canonical, feedback = CanonicalStateReader(), PostureFeedbackReader()
@@ -98,8 +99,7 @@ class LegTransformation(ManagedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the leg to the stamp of the canonical state."""
-        dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
-        self._last_ns = stamp_ns
+        dt = self.elapsed
         feedback, joints = values['posture_feedback'], self._joints
         if feedback.mode != self._body.text:
             self._body = BodyCommand.from_text(feedback.mode)
@@ -122,6 +122,7 @@ class LegTransformation(ManagedNode):
         """Advance the gait's primitive; returns its goals."""
         self._motion_state = None
         x, x_dot, self._primitive.gait = values['canonical_state']
+        follow_gait(self, self._primitive.gait)
         feedback = values['posture_feedback']
         self._state, goal, goal_velocity = self._primitive.step(
             self._state,

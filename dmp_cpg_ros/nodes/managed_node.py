@@ -1,8 +1,9 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The base of all nodes: guarded callbacks, ticks, readiness, diagnostics.
+"""The base of all nodes: topics, ticks, readiness, diagnostics.
 
-Lifecycle and parameters are those of :mod:`~dmp_cpg_ros.nodes.hooked_lifecycle` and
+Guarded callbacks, lifecycle and parameters are those of
+:mod:`~dmp_cpg_ros.nodes.guarded_node`, :mod:`~dmp_cpg_ros.nodes.hooked_lifecycle` and
 :mod:`~dmp_cpg_ros.nodes.parameterized_node`. A node names its kind and its parameter sets and
 overrides the hooks that it needs: ``configure``, ``activate``, ``deactivate``, ``cleanup``,
 ``on_tick``, ``on_parameters``, ``check_parameters``, ``diagnostic_values``, ``readers``.
@@ -18,8 +19,6 @@ from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
-from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.diagnostics import NodeHealth
 from dmp_cpg_ros.nodes.interfaces import Interface, interface, partners
 from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, SuitePublisher
 from dmp_cpg_ros.nodes.parameterized_node import ParameterizedNode
@@ -27,6 +26,9 @@ from dmp_cpg_ros.nodes.readiness import missing_connections
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
 from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
 from dmp_cpg_ros.nodes.tick_inputs import TickInputs, drain
+
+LONGEST_GAP_S = 1.0
+"""Time between two ticks that is made up at most [s]: a false stamp may claim any."""
 
 
 class ManagedNode(ParameterizedNode):
@@ -41,18 +43,18 @@ class ManagedNode(ParameterizedNode):
 
     Attributes
     ----------
-    health : NodeHealth
-        Ticks, stamp and problems.
+    elapsed : float
+        Time since the tick before, 0 at the first one [s].
     local : LocalDelivery or None
         How it reaches nodes of the same process; None where it is alone.
     """
 
     local: LocalDelivery | None = None
+    elapsed = 0.0
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
         super().__init__(name, **options)
-        self.health = NodeHealth(self.get_name())
         self._entities: list[Publisher | Subscription | Service] = []
         self._commands: list[Subscription] = []
         self._commands_taken: dict[str, int] = {}
@@ -92,8 +94,10 @@ class ManagedNode(ParameterizedNode):
                qos: QoSProfile | None = None) -> Subscription | None:
         """Create a subscription whose callback runs while the node is active.
 
-        A :class:`~dmp_cpg_ros.core.errors.DataError` that the callback raises drops the message:
-        it is counted, logged now and then, and shown on ``/diagnostics``.
+        Messages that cannot be read, or that the callback refuses by raising
+        :class:`~dmp_cpg_ros.core.errors.DataError`, are dropped and counted
+        (:class:`~dmp_cpg_ros.nodes.guarded_node.GuardedNode`). So the bytes are read here: what
+        the middleware cannot read it would drop without a word.
 
         Parameters
         ----------
@@ -116,19 +120,22 @@ class ManagedNode(ParameterizedNode):
             None when all publishers are in this process.
         """
         topic = topic if isinstance(topic, Interface) else interface(topic)
-        receive = self._guarded(topic, callback)
         if self.local is not None and self.local.kinds.issuperset(topic.publishers):
+            receive = self.guarded(topic.name, self._while_active(topic, callback))
             self.local.attach(topic.name, receive)
             self._local_readers.append(receive)
             return None
-        reader = None if raw or command else serialized_reader(topic.type)
-        if reader is not None:
-            # Cheaper than rclpy's message objects; see serialized_messages.
-            read, raw = reader, True
-            receive = self._guarded(topic, lambda data: callback(read(data)))
+        take = callback
+        if not raw:
+            read = serialized_reader(topic.type, as_message=command)
+
+            def take(data: bytes) -> None:
+                callback(read(data))
+
+        receive = self._while_active(topic, take)
         subscription = self.create_subscription(
             topic.type, topic.name, self._counted(topic.name, receive) if command else receive,
-            qos or topic.reader_qos, raw=raw)
+            qos or topic.reader_qos, raw=True)
         self._entities.append(subscription)
         self._inputs.append((topic, subscription))
         if command:
@@ -168,6 +175,7 @@ class ManagedNode(ParameterizedNode):
 
     def match(self, inputs: Sequence[str], trigger: str, **options: Any) -> TickInputs:
         """Make a :class:`~dmp_cpg_ros.nodes.tick_inputs.TickInputs` that runs :meth:`on_tick`."""
+        self._last_ns = -1
         return TickInputs(self._run_tick, inputs, trigger, **options)
 
     def begin_tick(self, stamp_ns: int) -> None:
@@ -180,11 +188,17 @@ class ManagedNode(ParameterizedNode):
         self.take_changed_parameters()
 
     def end_tick(self) -> None:
-        """End a tick: once a second of the robot's clock, report."""
+        """End a tick: once a second of the robot's clock, look for commands of a wrong type, and
+        report.
+        """
         if self.health.due():
+            self._watch_command_types()
             self.report(periodic=True)
 
     def _run_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
+        last, self._last_ns = self._last_ns, stamp_ns
+        gap = (stamp_ns - last) * 1e-9 if 0 <= last < stamp_ns else 0.0
+        self.elapsed = min(gap, LONGEST_GAP_S)
         self.begin_tick(stamp_ns)
         self.on_tick(stamp_ns, values)
         self.end_tick()
@@ -199,7 +213,9 @@ class ManagedNode(ParameterizedNode):
                 self.health.status(self.state_label, values, periodic=periodic))
 
     def state_changed(self) -> None:
-        """Report a new state."""
+        """Report a new state, and say when the node works."""
+        if self.active:
+            self.get_logger().info('active')
         self.report()
 
     def warn(self, key: str, message: str, *, error: bool = False) -> None:
@@ -219,37 +235,38 @@ class ManagedNode(ParameterizedNode):
 
     # Inside ------------------------------------------------------------------------------------
 
-    def _guarded(self, topic: Interface, callback: Callable[[Any], None],
-                 ) -> Callable[[Any], None]:
-        name, latched = topic.name, topic.latched
+    def _watch_command_types(self) -> None:
+        """Warn of publishers of commands whose type no reader can match: DDS says nothing."""
+        for topic, subscription in self._inputs:
+            if subscription not in self._commands:
+                continue
+            name = subscription.topic_name
+            types = {end.topic_type for end in self.get_publishers_info_by_topic(name)}
+            wrong = ', '.join(sorted(types - {topic.type_name}))
+            if wrong:
+                self.warn(f'type of {name}', f'{name} is published as {wrong}, and this node '
+                          f'reads {topic.type_name}{topic.other_type}')
+            else:
+                self.clear(f'type of {name}')
+
+    def _while_active(self, topic: Interface, callback: Callable[[Any], None],
+                      ) -> Callable[[Any], None]:
+        latched = topic.latched
 
         def receive(message: Any) -> None:
-            if not self.active and not latched:
-                return
-            try:
+            if self.active or latched:
                 callback(message)
-            except DataError as error:
-                self._reject(name, error)
-            except Exception:
-                # After Ctrl-C nothing can be published any more; that is no fault.
-                if self.context.ok():
-                    raise
 
         return receive
-
-    def _reject(self, topic: str, error: DataError) -> None:
-        if self.health.reject(topic, str(error)):
-            count = self.health.rejected[topic]
-            self.get_logger().warning(
-                f'{topic}: message dropped: {error} ({count} dropped so far)')
-            self.report()
 
     def _counted(self, topic: str, callback: Callable[[Any], None]) -> Callable[[Any], None]:
         self._commands_taken.setdefault(topic, 0)
 
         def receive(message: Any) -> None:
-            callback(message)
-            self._commands_taken[topic] += 1
+            try:
+                callback(message)
+            finally:
+                self._commands_taken[topic] += 1
 
         return receive
 

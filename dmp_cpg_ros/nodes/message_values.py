@@ -80,6 +80,13 @@ def checked(values: Array, what: str) -> Array:
     return values
 
 
+def sensed(values: Array) -> Array:
+    """Return a sensor's numbers, NaN in place of those that :func:`checked` would refuse."""
+    if values.dot(values) <= _LARGEST_SQUARED:
+        return values
+    return np.where(np.abs(values) <= LARGEST, values, np.nan)
+
+
 def checked_numbers(values: tuple[float, ...], what: str) -> tuple[float, ...]:
     """Return numbers, or raise DataError when one is not finite or beyond ``LARGEST``."""
     for value in values:

@@ -47,6 +47,9 @@ from dmp_cpg_ros.robot.refuge import Refuge
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.target_guard import TargetGuard
 
+INCIDENT_NS = 1_000_000_000
+"""Time that all legs must have been heard for until their silence counts as over [ns]."""
+
 READY_PERIOD_S = 0.05
 """How often a lock-step robot without a gate asks whether its partners are there [s]."""
 
@@ -84,8 +87,7 @@ class MujocoRobotNode(ManagedNode):
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._tick_ns = self.parameters_of(TickParameters).tick_ns
         self._robot = self._make_robot()
-        refuge = Refuge(self._robot.description)
-        self._guard = TargetGuard(refuge, round(self._options.target_timeout * 1e9))
+        self._guard = self._new_guard()
         self._body_mode = 'standing' if self._options.start_pose == 'standing' else 'lying'
         self._timing, self._writer, self._reader = (
             RobotTiming(),
@@ -94,6 +96,7 @@ class MujocoRobotNode(ManagedNode):
         )
         self._state: RobotState = self._robot.reset()
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
+        self._silent_ns = -1
         self._state_publishers = [self.publisher(name) for name in STATE_TOPICS]
         if self._state.joint_work is not None:
             self._work_publisher = self.publisher('joint_work')
@@ -107,7 +110,7 @@ class MujocoRobotNode(ManagedNode):
         if self._options.viewer and self._options.physics == 'mujoco':
             from dmp_cpg_ros.robot.camera import open_viewer
 
-            self._viewer = open_viewer(self._robot.model, self._robot.data)  # type: ignore[attr-defined]
+            self._viewer = open_viewer(self._robot)  # type: ignore[arg-type]
 
     def activate(self) -> None:
         """Begin with the first tick: at the gate, or as soon as there is somebody to tell."""
@@ -169,7 +172,8 @@ class MujocoRobotNode(ManagedNode):
         try:
             writer.fill(self._state)
         except DataError as error:
-            raise RobotError(f'the robot at {stamp * 1e-9:.3f} s: {error}') from error
+            self._start_over(stamp, f'the robot at {stamp * 1e-9:.3f} s: {error}')
+            writer.fill(self._state)
         messages = (
             writer.clock,
             writer.imu,
@@ -191,23 +195,39 @@ class MujocoRobotNode(ManagedNode):
         """Move the robot by one tick under the targets that are there."""
         now = self._state.time_ns
         targets = self._guard.targets(self._state)
-        silent = self._guard.silent(now)
-        if silent and any(self._guard.stamps):
-            self.warn(
-                'silent',
-                f'no targets from {", ".join(silent)} for {self._options.target_timeout} s: '
-                f'the robot looks after itself: {RETREATS[self._guard.retreat]}',
-                error=True,
-            )
-        elif not silent:
-            self.clear('silent')
-        self._state = self._robot.step(targets)
+        self._watch_silence(now)
+        try:
+            self._state = self._robot.step(targets)
+        except RobotError as error:
+            self._start_over(now + self._tick_ns, str(error))
         should_stand = self._body_mode in BALANCED
         if should_stand and not self._fell and getattr(self._robot, 'fallen', False):
             self._fell = True
             self.warn('fell', f'the robot fell at {self._state.time_ns * 1e-9:.3f} s', error=True)
         if self._viewer is not None and self._viewer.is_running():
             self._viewer.sync()
+
+    def _watch_silence(self, now: int) -> None:
+        """Tell once that legs are silent, until all have been heard for a while."""
+        silent = self._guard.silent(now)
+        if not silent:
+            if now - self._silent_ns > INCIDENT_NS:
+                self.clear('silent')
+        elif any(self._guard.stamps):
+            self._silent_ns = now
+            if not self.health.has_problem('silent'):
+                self.warn(
+                    'silent',
+                    f'no targets from {", ".join(silent)} for {self._options.target_timeout} s: '
+                    f'the robot looks after itself: {RETREATS[self._guard.retreat]}',
+                    error=True,
+                )
+
+    def _start_over(self, time_ns: int, why: str) -> None:
+        """Put the robot back when its simulation has diverged; time goes on."""
+        self.warn('diverged', f'{why}; the robot is back in its start pose', error=True)
+        self._state = self._robot.reset(time_ns)
+        self._guard = self._new_guard()
 
     def _on_body_mode(self, message: Any) -> None:
         """Know when lying is no fall; a fall is over when the robot stands again."""
@@ -219,7 +239,10 @@ class MujocoRobotNode(ManagedNode):
 
     def _on_targets(self, message: Any) -> None:
         leg, targets = self._reader.read(message)
-        stamp = header_ns(message)
+        stamp, now = header_ns(message), self._state.time_ns
+        if stamp > now:
+            raise DataError(f'the stamp {stamp * 1e-9:.3f} s of {leg} is ahead of the clock, '
+                            f'{now * 1e-9:.3f} s')
         self._guard.accept(leg, stamp, targets)
         self._timing.arrived(stamp)
         if (
@@ -304,6 +327,10 @@ class MujocoRobotNode(ManagedNode):
         return True
 
     # Inside --------------------------------------------------------------------------------------
+
+    def _new_guard(self) -> TargetGuard:
+        refuge = Refuge(self._robot.description)
+        return TargetGuard(refuge, round(self._options.target_timeout * 1e9))
 
     def _make_robot(self) -> Robot:
         p, file = self._options, find_config(self.parameters_of(RobotFileParameters).robot)

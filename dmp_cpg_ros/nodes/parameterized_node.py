@@ -10,10 +10,18 @@ from typing import Any, ClassVar, TypeVar, cast
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
-from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.certificates.gate import shown
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.parameters import Parameters
+from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.hooked_lifecycle import HookedLifecycleNode
-from dmp_cpg_ros.nodes.ros_parameters import NodeParameters, ParameterTable, declare, plain
+from dmp_cpg_ros.nodes.ros_parameters import (
+    NodeParameters,
+    ParameterTable,
+    declare,
+    plain,
+    ros_value,
+)
 
 P = TypeVar('P', bound=Parameters)
 Sets = Mapping[type[Parameters], Parameters]
@@ -29,7 +37,8 @@ class ParameterizedNode(HookedLifecycleNode):
     PARAMETER_SETS : tuple of Parameters classes
         Parameter sets beyond :class:`~dmp_cpg_ros.nodes.ros_parameters.NodeParameters`.
     CHANGEABLE : collection of str
-        Parameters that may be set while the node runs; all others are read-only.
+        Parameters that may change while the node runs; all others are read-only. Those that
+        another node owns are refused with its name, and change only by :meth:`follow`.
     """
 
     KIND: ClassVar[str] = ''
@@ -38,6 +47,7 @@ class ParameterizedNode(HookedLifecycleNode):
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
+        self._following = False
         super().__init__(name or self.KIND, **options)
         self._table = self.parameter_table()
         self._sets = self._accepted = declare(self, self._table)
@@ -75,10 +85,60 @@ class ParameterizedNode(HookedLifecycleNode):
             self._sets = self._accepted
             self.on_parameters()
 
+    def follow(self, values: Mapping[str, Any]) -> None:
+        """Take over what the owner of some parameters has accepted, where it is new.
+
+        Raises
+        ------
+        DataError
+            If it cannot be taken over; nothing is then changed.
+        """
+        accepted = self._table.values(self._accepted)
+        news = {name: value for name, value in values.items()
+                if name in accepted and value != ros_value(accepted[name])}
+        if not news:
+            return
+        self._following = True
+        try:
+            result = self.set_parameters_atomically(
+                [Parameter(name, value=value) for name, value in news.items()])
+        finally:
+            self._following = False
+        if not result.successful:
+            raise DataError(f'cannot follow {news}: {result.reason}')
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters; read-only ones may be set to the value that they have.
+
+        So a file that ``ros2 param dump`` wrote can be loaded by the node that it describes.
+        """
+        news = [entry for entry in parameter_list if not self._is_fixed(entry)]
+        if parameter_list and not news:
+            return SetParametersResult(successful=True)
+        return super().set_parameters_atomically(news)
+
+    def _is_fixed(self, entry: Parameter) -> bool:
+        """Whether a parameter is read-only and has this value."""
+        return (self.has_parameter(entry.name) and self.describe_parameter(entry.name).read_only
+                and self.get_parameter(entry.name).get_parameter_value()
+                == entry.get_parameter_value())
+
+    def _refuse_foreign(self, sets: Sets) -> None:
+        before, after = self._table.values(self._accepted), self._table.values(sets)
+        for name, value in after.items():
+            owner = OWNER.get(name, self.KIND)
+            if value != before[name] and owner != self.KIND:
+                raise ParameterError(
+                    f"'{name}' belongs to {owner}, which the other nodes follow; set it there: "
+                    f'ros2 param set /{owner} {name} {shown(value)}')
+
     def _check_change(self, changes: list[Parameter]) -> SetParametersResult:
         """Validate changes together with the values that were accepted last."""
         try:
-            self.check_parameters(self._changed(changes))
+            sets = self._changed(changes)
+            if not self._following:
+                self._refuse_foreign(sets)
+            self.check_parameters(sets)
         except DmpCpgError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

@@ -24,7 +24,7 @@ from dmp_cpg_ros.nodes.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
+from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, gait_reader
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
@@ -41,7 +41,7 @@ class PostureControl(ManagedNode):
     # The rate of the swings' activity is the legs' too, and the certificate's.
     CHANGEABLE = tuple(name for cls in (PostureParameters, EstimationParameters)
                        for name in cls.__dataclass_fields__
-                       if name not in LegParameters.__dataclass_fields__)
+                       if name not in LegParameters.__dataclass_fields__) + ('gait',)
 
     def configure(self) -> None:
         """Build the controller and its topics."""
@@ -52,7 +52,7 @@ class PostureControl(ManagedNode):
             description, gaits.read(''), self.parameters_of(PostureParameters), legs
         )
         self._body = BodyState(self, description, legs)
-        self._memory, self._last_ns = self._controller.initial_state(), -1
+        self._memory = self._controller.initial_state()
         self._modes = BodyControl(description, self.parameters_of(ModeParameters), legs)
         self._mode, self._told = self._modes.initial_state(), ''
         self._mode_writer, self._mode_publisher = BodyModeWriter(), self.publisher('body_mode')
@@ -92,10 +92,10 @@ class PostureControl(ManagedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Compute the feedback for the stamp of the canonical state."""
-        dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
-        self._last_ns = stamp_ns
+        dt = self.elapsed
         state = self._body.state(stamp_ns, values)
         x, x_dot, self._controller.gait = values['canonical_state']
+        follow_gait(self, self._controller.gait)
         r, modes = values['reference'], self._modes
         self._mode = modes.step(self._mode, state, x, x_dot, r, self._memory.activity)
         if modes.balances(self._mode):

@@ -33,7 +33,7 @@ class ReferenceFilter(CertifiedNode):
         self.prepare_certificate()
         self._gate = self.new_gate()
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
-        self._r, self._last_ns, self._requested = np.zeros(3), -1, False
+        self._r, self._requested = np.zeros(3), False
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
         self._ticks = self.match(
             ('joint_states',),
@@ -62,8 +62,7 @@ class ReferenceFilter(CertifiedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
-        dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
-        self._last_ns = stamp_ns
+        dt = self.elapsed
         command, self._requested = self._gate.at(stamp_ns), bool(values['inhibition_state'])
         r_ext = np.zeros(3) if self._requested else np.array(command)
         self._r = self._system.step(self._r, r_ext, dt)

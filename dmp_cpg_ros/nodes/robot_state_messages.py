@@ -16,7 +16,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
-from dmp_cpg_ros.nodes.message_values import Array, checked, set_stamp
+from dmp_cpg_ros.nodes.message_values import Array, checked, sensed, set_stamp
 from dmp_cpg_ros.nodes.serialized_messages import (
     SerializedImu,
     SerializedJointState,
@@ -156,7 +156,7 @@ class FootContactsReader:
     Parameters
     ----------
     strict : bool
-        Whether forces that are not finite are refused; else the caller judges them.
+        Whether forces that cannot be are refused; else they are NaN, and the caller judges them.
     """
 
     def __init__(self, *, strict: bool = True) -> None:
@@ -197,14 +197,16 @@ def read_odom(message: Odometry) -> BaseMotion:
 
 
 def read_imu(message: Imu | SerializedImu) -> tuple[Array, Array]:
-    """Turn rate (3,) [rad/s] and specific force (3,) [m/s^2], as they are.
+    """Turn rate (3,) [rad/s] and specific force (3,) [m/s^2].
 
-    Numbers that are not finite pass: the estimator judges them together with silent sensors.
+    Numbers that cannot be are NaN: the estimator judges them together with silent sensors.
     """
     if isinstance(message, SerializedImu):
-        return np.array(message.rate), np.array(message.force)
-    rate, force = message.angular_velocity, message.linear_acceleration
-    return np.array((rate.x, rate.y, rate.z)), np.array((force.x, force.y, force.z))
+        rate, force = message.rate, message.force
+    else:
+        of_rate, of_force = message.angular_velocity, message.linear_acceleration
+        rate, force = (of_rate.x, of_rate.y, of_rate.z), (of_force.x, of_force.y, of_force.z)
+    return sensed(np.array(rate)), sensed(np.array(force))
 
 
 class EstimatedOdometryWriter:

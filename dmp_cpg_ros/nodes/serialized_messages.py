@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 import numpy as np
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu, JointState
 
@@ -27,6 +28,9 @@ from dmp_cpg_ros.nodes.message_values import Array, checked, stamp_in_ns
 
 CDR_LITTLE_ENDIAN = b'\x00\x01'
 """First two bytes of a message that this module reads itself."""
+
+LONGEST = 100_000
+"""Bytes of a message that are read at most; the suite's own are a few thousand long."""
 
 BODY = 4
 """Where a message begins: behind the bytes that say how it is encoded."""
@@ -175,31 +179,33 @@ _READERS: dict[type, Callable[[bytes], Any]] = {
 }
 
 
-def serialized_reader(kind: type) -> Callable[[bytes], Any] | None:
+def serialized_reader(kind: type, *, as_message: bool = False) -> Callable[[bytes], Any]:
     """How to read the bytes of a kind of message.
 
     Parameters
     ----------
     kind : type
         Message class.
+    as_message : bool
+        Whether to return the message class itself whatever it is.
 
     Returns
     -------
-    callable (bytes) → message, or None
-        Returns one of this module's classes, or the message itself where it is encoded in another
-        way; raises DataError for a stamp that is no time and for bytes that are no such message.
-        None for a kind that this module does not read.
+    callable (bytes) → message
+        Returns one of this module's classes, or the message itself where this module does not read
+        its kind or its encoding; raises DataError for a stamp that is no time, for bytes that are
+        no such message, and for more than ``LONGEST`` of them.
     """
-    read = _READERS.get(kind)
-    if read is None:
-        return None
+    own = None if as_message else _READERS.get(kind)
 
     def reader(data: bytes) -> Any:
-        if data[:2] != CDR_LITTLE_ENDIAN:
-            return deserialize_message(data, kind)
+        if len(data) > LONGEST:
+            raise DataError(f'{len(data)} bytes of {kind.__name__}; at most {LONGEST} are read')
         try:
-            return read(data)
-        except (struct.error, UnicodeDecodeError, ValueError) as error:
+            if own is None or data[:2] != CDR_LITTLE_ENDIAN:
+                return deserialize_message(data, kind)
+            return own(data)
+        except (struct.error, ValueError, MemoryError, rclpy_implementation.RMWError) as error:
             raise DataError(f'{len(data)} bytes are no {kind.__name__}: {error}') from None
 
     return reader

@@ -5,10 +5,11 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +20,9 @@ from dmp_cpg_ros.robot.model_reader import find_ids, read_description
 from dmp_cpg_ros.robot.mujoco_import import has_screen, mujoco
 from dmp_cpg_ros.robot.port import RobotError
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
 Picture = NDArray[np.uint8]
 
@@ -196,8 +200,8 @@ def pose_pictures(robot_file: RobotFile | Path | str | None, base_positions_in_w
     return [picture for picture in pictures if picture is not None]
 
 
-def open_viewer(model: mujoco.MjModel, data: mujoco.MjData) -> Any | None:
-    """Open MuJoCo's window on a running simulation.
+def open_viewer(robot: MujocoRobot) -> Any | None:
+    """Open MuJoCo's window on a running simulation; its camera follows the robot.
 
     Returns
     -------
@@ -211,10 +215,20 @@ def open_viewer(model: mujoco.MjModel, data: mujoco.MjData) -> Any | None:
         return None
     try:
         import mujoco.viewer as viewer
-        return viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
+
+        # MuJoCo opens its window in a thread whose failure it would wait for without end.
+        if not viewer.glfw.init():
+            raise RobotError(f'the screen {os.environ.get("DISPLAY", "")!r} cannot be opened')
+        window = viewer.launch_passive(
+            robot.model, robot.data, show_left_ui=False, show_right_ui=False)
     except Exception as error:  # noqa: BLE001 (what a broken OpenGL raises varies)
         _log.warning('no window: %s', error)
         return None
+    with window.lock():
+        window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, robot.base
+        window.cam.azimuth, window.cam.elevation = AZIMUTH, ELEVATION
+        window.cam.distance = DISTANCE_OVER_HEIGHT * robot.description.stance_height
+    return window
 
 
 def _simplify(model: mujoco.MjModel) -> None:

@@ -12,9 +12,14 @@ from here.
 from __future__ import annotations
 
 import ctypes
+import logging
 import os
 import sys
 
+_log = logging.getLogger(__name__)
+_ON = ('', 'enable', 'enabled', 'on', 'true', '1')
+_OFF = ('disable', 'disabled', 'off', 'false', '0')
+_BACKENDS = ('glfw', 'egl', 'osmesa', 'glx', 'cgl', 'wgl')
 _LIBRARY = {'egl': 'libEGL.so.1', 'osmesa': 'libOSMesa.so.8'}
 
 
@@ -28,7 +33,11 @@ def usable_backend(wanted: str, has_screen: bool) -> str:
     has_screen : bool
         Whether there is a display to open windows on.
     """
-    backend = wanted.strip().lower() or ('' if has_screen else 'egl')
+    backend = wanted.strip().lower()
+    if backend not in _ON + _OFF + _BACKENDS:
+        _log.warning("MUJOCO_GL = '%s' is not known; valid are egl, osmesa, glfw, disable", wanted)
+        wanted = backend = ''
+    backend = backend or ('' if has_screen else 'egl')
     if backend not in _LIBRARY or not sys.platform.startswith('linux'):
         return wanted
     try:
@@ -45,7 +54,7 @@ def has_screen() -> bool:
 
 
 _backend = usable_backend(os.environ.get('MUJOCO_GL', ''), has_screen())
-if _backend:
+if _backend or 'MUJOCO_GL' in os.environ:
     os.environ['MUJOCO_GL'] = _backend
 
 import mujoco  # noqa: E402  (the backend must be chosen before)

@@ -68,6 +68,13 @@ class MujocoRobot:
     start_pose : str
         ``standing``, ``lying`` (on the belly) or ``fallen`` (somehow, by the seed).
 
+    Attributes
+    ----------
+    model : mujoco.MjModel
+    data : mujoco.MjData
+    base : int
+        Its base among the model's bodies.
+
     Raises
     ------
     MissingFileError, ParameterError
@@ -92,6 +99,7 @@ class MujocoRobot:
         # A silent restart of the simulation on bad numbers would look like a jump of the robot.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self._ids = find_ids(model, robot_file)
+        self.base = int(self._ids.base)
         self._qpos = as_slice(model.jnt_qposadr[self._ids.joints])
         self._dof = as_slice(model.jnt_dofadr[self._ids.joints])
         self._step_s, self._gravity = model.opt.timestep, model.opt.gravity.copy()
@@ -120,19 +128,25 @@ class MujocoRobot:
         self._pushes = PushQueue()
         self.reset()
 
-    def reset(self) -> RobotState:
-        """Be in the start pose at time 0.
+    def reset(self, time_ns: int = 0) -> RobotState:
+        """Be in the start pose at a time, whole ticks from 0 [ns].
 
         A standing robot is in its home pose, held by the torques that standing takes; the other
-        poses come to rest before time 0.
+        poses come to rest before that time.
         """
-        return self._reset_standing() if self._start is None else self._reset_down(self._start)
+        self._push, self._pushes = (np.zeros(3), 0), PushQueue()
+        if self._start is None:
+            self._reset_standing()
+        else:
+            self._reset_down(self._start)
+        self._tick, self.data.time = time_ns // self.tick_ns, time_ns * 1e-9
+        return self._state()
 
-    def _reset_down(self, start: StartPose) -> RobotState:
+    def _reset_down(self, start: StartPose) -> None:
         data, b = self.data, self._base_qpos
         mujoco.mj_resetData(self.model, data)
         self._drive.reset()
-        self._push, self._work = (np.zeros(3), 0), np.zeros(12)
+        self._work = np.zeros(12)
         data.qpos[b:b + 3] = start.base_position
         data.qpos[b + 3:b + 7] = start.base_quaternion
         data.qpos[self._qpos] = held = start.joint_position
@@ -141,14 +155,12 @@ class MujocoRobot:
             state = self.step(JointTargets(held, np.zeros(12), np.zeros(12)))
             held = state.joint_position if start.limp else held
         self._drive.reset()
-        self._tick, data.time, self._work = 0, 0.0, np.zeros(12)
-        return self._state()
+        self._work = np.zeros(12)
 
-    def _reset_standing(self) -> RobotState:
+    def _reset_standing(self) -> None:
         data, model = self.data, self.model
         mujoco.mj_resetData(model, data)
         self._drive.reset()
-        self._tick, self._push, self._pushes = 0, (np.zeros(3), 0), PushQueue()
         if self._sensors is not None:
             self._sensors.reset()
         spread = np.random.default_rng(self._seed).uniform(-1.0, 1.0, 12) * self._spread
@@ -167,7 +179,6 @@ class MujocoRobot:
         # As held at rest: the first instant of the contacts is nothing that a sensor would show.
         R_world_base = data.xmat[self._ids.base].reshape(3, 3)
         self._specific_force = -self._gravity @ R_world_base
-        return self._state()
 
     def step(self, targets: JointTargets) -> RobotState:
         """Advance by one control tick.

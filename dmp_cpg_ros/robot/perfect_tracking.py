@@ -59,9 +59,9 @@ class PerfectTrackingRobot:
                       else lying_posture(description))
         self.reset()
 
-    def reset(self) -> RobotState:
-        """Be in the start pose at time 0."""
-        self._tick = 0
+    def reset(self, time_ns: int = 0) -> RobotState:
+        """Be in the start pose at a time, whole ticks from 0 [ns]."""
+        self._tick = time_ns // self.tick_ns
         self._place, self._yaw = np.zeros(2), 0.0
         self._velocity_in_world, self._yaw_rate = np.zeros(3), 0.0
         self._feet, self._height, self._standing = self._feet_in_base(self._home)

@@ -34,8 +34,8 @@ class Robot(Protocol):
     def tick_ns(self) -> int:
         """Length of a control tick [ns]."""
 
-    def reset(self) -> RobotState:
-        """Stand in the home pose at time 0 and return that state."""
+    def reset(self, time_ns: int = 0) -> RobotState:
+        """Stand in the home pose at a time, whole ticks from 0 [ns], and return that state."""
 
     def step(self, targets: JointTargets) -> RobotState:
         """Advance by one tick under targets (12,) and return the state at its end.

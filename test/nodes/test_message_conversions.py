@@ -278,7 +278,7 @@ def test_inhibition_state(time_ns: int, number: float, flag: bool) -> None:
     message = wire(writer.fill(time_ns, 'at_rest', {'gain': number, 'requested': flag}))
     read = read_inhibition_state(message)
     assert (read.word, header_ns(message)) == ('at_rest', time_ns)
-    assert bits(read.number('gain')) == bits(number)
+    assert bits(read.number('gain', -math.inf, math.inf)) == bits(number)
     assert read.flag('requested') is flag
 
 
@@ -287,7 +287,7 @@ def test_inhibition_values_that_cannot_be_used_are_named() -> None:
     read = read_inhibition_state(writer.fill(0, 'free', {'gain': math.nan, 'word': 'x'}))
     for key in ('gain', 'word', 'absent'):
         with pytest.raises(DataError, match=key):
-            read.number(key)
+            read.number(key, 0.0, 1.0)
         with pytest.raises(DataError, match=key):
             read.flag(key)
     writer.message.status[0].name = 'other'

@@ -23,7 +23,13 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TwistStamped
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter as ParameterMessage
-from rcl_interfaces.srv import DescribeParameters, SetParametersAtomically
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSCompatibility, ReliabilityPolicy, qos_check_compatible
@@ -38,7 +44,7 @@ from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.nodes import middleware
 from dmp_cpg_ros.nodes.conversions import ReferenceWriter, read_twist
-from dmp_cpg_ros.nodes.diagnostics import LOG_EVERY, NodeHealth
+from dmp_cpg_ros.nodes.diagnostics import LOG_EVERY_S, NodeHealth
 from dmp_cpg_ros.nodes.executors import make_executor, spin
 from dmp_cpg_ros.nodes.help_text import help_text
 from dmp_cpg_ros.nodes.interfaces import (
@@ -155,13 +161,17 @@ class Robot:
 
     def tick(self) -> TwistStamped:
         """Publish a tick and return the reference that it leads to."""
+        self.publish_tick()
+        stamps = [self.k * TICK]
+        self.ros.spin_until(lambda: [header_ns(m) for m in self.references[-1:]] == stamps)
+        return self.references[-1]
+
+    def publish_tick(self) -> None:
+        """Publish the next tick."""
         self.k += 1
         message = JointState(name=list(JOINT_NAMES), position=[0.0] * 12, velocity=[0.0] * 12)
         set_stamp(message.header.stamp, self.k * TICK)
         self.joints.publish(message)
-        stamps = [self.k * TICK]
-        self.ros.spin_until(lambda: [header_ns(m) for m in self.references[-1:]] == stamps)
-        return self.references[-1]
 
     def send(self, v_x: float) -> None:
         """Send a command; it is in the reader's queue when this returns."""
@@ -420,9 +430,15 @@ def test_diagnostics_come_once_in_a_second_of_the_robots_clock() -> None:
 
 
 def test_of_many_bad_messages_few_are_logged() -> None:
-    health = NodeHealth('node')
-    logged = [k for k in range(1000) if health.reject('imu', 'NaN')]
-    assert logged == list(range(0, 1000, LOG_EVERY))
+    now = 0.0
+    health = NodeHealth('node', clock=lambda: now)
+    logged = []
+    for k in range(1000):
+        now = k * 0.05 * LOG_EVERY_S
+        if health.reject('imu', 'NaN'):
+            logged.append(k)
+    assert logged == list(range(0, 1000, 20))
+    assert health.rejected == {'imu': 1000}
 
 
 def test_problems_stay_until_they_are_cleared() -> None:
@@ -437,12 +453,65 @@ def test_problems_stay_until_they_are_cleared() -> None:
     assert (status.level, status.message) == (DiagnosticStatus.OK, 'active')
 
 
-def test_an_unexpected_error_is_not_hidden(ros: Ros, started: Relay) -> None:
-    robot = Robot(ros)
-    started.on_command = None  # type: ignore[assignment]
-    started.on_tick = None  # type: ignore[assignment]
-    with pytest.raises(TypeError):
+def test_an_unexpected_error_is_told_with_its_traceback_and_ends_nothing(
+        ros: Ros, started: Relay, capfd: pytest.CaptureFixture[str]) -> None:
+    robot, on_tick = Robot(ros), started.on_tick
+    started.on_tick = None  # type: ignore[assignment, method-assign]
+    for k in (1, 2, 3):
+        robot.publish_tick()
+        ros.spin_until(lambda k=k: started.health.rejected.get('joint_states') == k)
+    ros.spin_until(lambda: bool(robot.reports) and robot.status()[0] == DiagnosticStatus.ERROR)
+    _, text, values = robot.status()
+    assert 'joint_states: TypeError' in text
+    assert values['rejected.joint_states'] == '1'
+    assert capfd.readouterr().err.count('Traceback') == 1
+    started.on_tick = on_tick  # type: ignore[method-assign]
+    robot.tick()
+
+
+def test_a_request_that_fails_is_answered(ros: Ros, started: Relay) -> None:
+    def fail() -> list[str]:
+        raise KeyError('a bug')
+
+    started.missing = fail  # type: ignore[method-assign]
+    answer = ros.call(Trigger, 'relay/ready', Trigger.Request())
+    assert not answer.success
+    assert 'a bug' in answer.message
+    assert started.health.rejected['~/ready'] >= 1
+
+
+def test_commands_of_a_wrong_type_are_told(
+        ros: Ros, ros_domain: int, started: Relay) -> None:
+    """What nobody receives: only the graph knows it."""
+    robot, stranger = Robot(ros), Ros(ros_domain)
+    stranger.node.create_publisher(TwistStamped, 'cmd_vel', 10)
+
+    def problem() -> str:
+        robot.k += 300  # another second of the robot's clock
         robot.tick()
+        return robot.status()[1] if robot.reports else ''
+
+    ros.spin_until(lambda: 'stamped_cmd_vel:=true' in problem())
+    assert robot.status()[0] == DiagnosticStatus.WARN
+    stranger.end()
+    ros.spin_until(lambda: problem() == 'active')
+
+
+def test_a_node_takes_back_the_parameters_that_it_tells(ros: Ros, started: Relay) -> None:
+    """What ``ros2 param dump`` and ``load`` do, for read-only parameters too."""
+    names = ros.call(ListParameters, 'relay/list_parameters', ListParameters.Request())
+    names = names.result.names
+    values = ros.call(GetParameters, 'relay/get_parameters', GetParameters.Request(names=names))
+    entries = [ParameterMessage(name=name, value=value)
+               for name, value in zip(names, values.values, strict=True)]
+    answer = ros.call(SetParameters, 'relay/set_parameters',
+                      SetParameters.Request(parameters=entries))
+    assert [result.reason for result in answer.results if not result.successful] == []
+    executor = next(entry for entry in entries if entry.name == 'executor')
+    executor.value.string_value = 'single' if executor.value.string_value == 'events' else 'events'
+    answer = ros.call(SetParameters, 'relay/set_parameters',
+                      SetParameters.Request(parameters=[executor]))
+    assert not answer.results[0].successful
 
 
 # Readiness -------------------------------------------------------------------------------------

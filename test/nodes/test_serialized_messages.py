@@ -8,7 +8,8 @@ from array import array
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import TwistStamped
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TwistStamped, WrenchStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
@@ -109,5 +110,24 @@ def test_another_encoding_is_left_to_rclpy():
     assert got.header.stamp.sec == 7
 
 
-def test_other_kinds_are_not_read_here():
-    assert serialized_reader(str) is None
+def test_kinds_that_this_module_does_not_read_are_left_to_rclpy():
+    message = WrenchStamped()
+    message.wrench.force.x = 2.0
+    assert serialized_reader(WrenchStamped)(serialize_message(message)) == message
+    twist = TwistStamped()
+    assert serialized_reader(TwistStamped, as_message=True)(serialize_message(twist)) == twist
+
+
+@pytest.mark.parametrize('kind', [JointState, TwistStamped, Imu, WrenchStamped, DiagnosticArray])
+@pytest.mark.parametrize('encoding', ['0001', '0000', '0003', 'ffff'])
+def test_what_is_cut_short_is_refused_in_every_encoding(kind, encoding):
+    read = serialized_reader(kind)
+    for data in (bytes.fromhex(encoding), bytes.fromhex(encoding) + 3 * b'\xff'):
+        with pytest.raises(DataError, match=f'{len(data)} bytes are no {kind.__name__}'):
+            read(data)
+
+
+def test_a_message_that_is_too_long_is_not_kept():
+    message = joint_state('', [f'{k:09}' for k in range(20_000)], [], [], [])
+    with pytest.raises(DataError, match='at most'):
+        serialized_reader(JointState)(serialize_message(message))

@@ -7,6 +7,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ import pytest
 from dmp_cpg_ros.robot.camera import Camera, open_viewer, pose_pictures
 from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.model_reader import load_description
-from dmp_cpg_ros.robot.mujoco_import import usable_backend
+from dmp_cpg_ros.robot.mujoco_import import mujoco, usable_backend
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
 HOME = home_joint_position(load_description())
@@ -100,6 +101,42 @@ def test_with_a_screen_nothing_is_chosen():
 def test_without_a_screen_there_is_no_window(monkeypatch, caplog):
     monkeypatch.delenv('DISPLAY', raising=False)
     monkeypatch.delenv('WAYLAND_DISPLAY', raising=False)
-    robot = MujocoRobot()
-    assert open_viewer(robot.model, robot.data) is None
+    assert open_viewer(MujocoRobot()) is None
     assert 'no screen' in caplog.text
+
+
+def test_a_screen_that_cannot_be_opened_is_one_line_and_no_window():
+    """In a process of its own, whose end shows that nothing waits for the window."""
+    code = ('from dmp_cpg_ros.robot.camera import open_viewer\n'
+            'from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot\n'
+            'assert open_viewer(MujocoRobot()) is None')
+    screen = {key: value for key, value in os.environ.items() if key != 'WAYLAND_DISPLAY'}
+    done = subprocess.run([sys.executable, '-c', code], env={**screen, 'DISPLAY': ':4242'},
+                          capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "no window: the screen ':4242' cannot be opened" in done.stderr
+
+
+def test_the_window_looks_at_the_robot_wherever_it_goes(monkeypatch):
+    window = mock.MagicMock()
+    viewer = mock.MagicMock(launch_passive=mock.Mock(return_value=window))
+    monkeypatch.setenv('DISPLAY', ':0')
+    monkeypatch.setitem(sys.modules, 'mujoco.viewer', viewer)
+    monkeypatch.setattr(mujoco, 'viewer', viewer, raising=False)
+    robot = MujocoRobot()
+    assert open_viewer(robot) is window
+    assert window.cam.type == mujoco.mjtCamera.mjCAMERA_TRACKING
+    assert robot.model.body(window.cam.trackbodyid).jntnum == 1
+    assert robot.model.jnt_type[robot.model.body(window.cam.trackbodyid).jntadr[0]] == (
+        mujoco.mjtJoint.mjJNT_FREE)
+
+
+def test_an_unknown_backend_is_named_and_replaced():
+    done = subprocess.run(
+        [sys.executable, '-c', 'from dmp_cpg_ros.robot.mujoco_import import mujoco; '
+         'assert mujoco.MjModel'],
+        env={**os.environ, 'MUJOCO_GL': 'nonsense'}, capture_output=True, text=True, timeout=60,
+        check=False)
+    assert done.returncode == 0, done.stderr
+    assert "MUJOCO_GL = 'nonsense' is not known; valid are egl" in done.stderr
+    assert done.stderr.count('\n') == 1

@@ -27,6 +27,13 @@ FRAMES = ('base_footprint', 'odom')
 LARGEST_IMPULSE = 1000.0
 """Largest component of an impulse [N s]."""
 
+LARGEST_FORCE = 15_000.0
+"""Largest component of a force [N]: a hundred times a robot's weight, which a simulation bears."""
+
+LARGEST_MEAN_FORCE = LARGEST_FORCE / 1.5
+"""Largest component of an impulse over its duration [N], which whole ticks round by half at most.
+"""
+
 LONGEST_S = 10.0
 """Longest push [s]."""
 
@@ -55,6 +62,9 @@ class PushForce:
             raise DataError(f"push in frame '{self.frame}'; valid are {', '.join(FRAMES)}")
         if len(self.force) != 3 or not all(isfinite(value) for value in self.force):
             raise DataError(f'push: the force {self.force} must be three finite numbers [N]')
+        if max(map(abs, self.force)) > LARGEST_FORCE:
+            raise DataError(
+                f'push: the force {self.force} must be at most {LARGEST_FORCE:g} N on each axis')
 
     def in_world(self, base_quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
         """Force in the world, ndarray (3,) [N], for a base orientation x, y, z, w."""
@@ -146,6 +156,9 @@ def read_push(value: Any, where: str) -> tuple[Push, str]:
     if not 0.0 < duration <= LONGEST_S:
         raise DataError(f'{where}: the duration {duration} s of the push must be positive and at '
                         f'most {LONGEST_S:g} s')
+    if max(abs(x), abs(y), abs(z)) > LARGEST_MEAN_FORCE * duration:
+        raise DataError(f'{where}: the impulse {[x, y, z]} over {duration:g} s must be at most '
+                        f'{LARGEST_MEAN_FORCE * duration:g} N s: {LARGEST_MEAN_FORCE:g} N')
     frame = value.get('frame', FRAMES[0])
     if frame not in FRAMES:
         raise DataError(f"{where}: push in frame '{frame}'; valid are {', '.join(FRAMES)}")

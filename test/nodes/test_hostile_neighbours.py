@@ -1,0 +1,406 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What strangers in a ROS network, the user's Ctrl-C among them, must not do to a node."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import signal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+import ros_processes
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Twist, WrenchStamped
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterEvent, ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_parameter_events
+from rclpy.serialization import serialize_message
+from ros_processes import NodeProcess, Processes, Ros
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu
+from std_srvs.srv import SetBool, Trigger
+from test_executables import NAMES, NODES
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.scenario.push import LARGEST_FORCE
+from dmp_cpg_ros.nodes.canonical_oscillators import inhibition_from
+from dmp_cpg_ros.nodes.conversions import read_push_force
+from dmp_cpg_ros.nodes.gait_setup import follow_gait, gaits_of
+from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
+from dmp_cpg_ros.nodes.interfaces import Interface, interface, published_by, read_by
+from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
+from dmp_cpg_ros.nodes.message_values import set_stamp
+from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
+from dmp_cpg_ros.nodes.robot_state_messages import read_imu
+from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
+
+processes, ros, ros_domain = (
+    ros_processes.processes,
+    ros_processes.ros,
+    ros_processes.ros_domain,
+)
+
+RCLError = rclpy_implementation.RCLError
+
+CONTROLLERS = tuple(name for name in NODES if name != 'bag_recorder')
+FOLLOWERS = ('reference_filter', 'canonical_oscillators', 'inhibition')
+GARBAGE = (
+    b'\x00\x00\x00\x00\x01\x02\x03',  # big-endian, cut short
+    b'\x00\x01\x00\x00\x01\x02\x03',  # little-endian, cut short
+    b'\xff\x42' + random.Random(7).randbytes(200),
+    b'\x00\x01\x00\x00' + 16 * b'\xff',
+    b'\x00\x01\x00\x00' + bytes(200_000),
+)
+STAMPS_NS = (4_000_000, 0, 2_147_483_000_000_000_000, 10_000_000_000, 8_000_000)
+
+
+def started(processes: Processes, tmp_path: Path, kind: str, **parameters: Any) -> NodeProcess:
+    """Start a node; it says when it is active."""
+    if kind == 'bag_recorder':
+        parameters['output'] = str(tmp_path / 'bag')
+    return processes.node(kind, **parameters)
+
+
+def ended(process: NodeProcess) -> None:
+    """It ends as it should, and nothing went wrong before."""
+    process.interrupt()
+    assert process.wait() == 0, process
+    assert 'Traceback' not in process.output, process
+    assert 'FATAL' not in process.output, process
+
+
+def raw_publishers(ros: Ros, kind: str) -> dict[Any, Interface]:
+    """Publishers on all that a node reads with its default parameters, matched."""
+    own = {topic.name for topic in published_by(kind)}
+    publishers = {
+        ros.node.create_publisher(topic.type, topic.name, topic.publisher_qos): topic
+        for topic in read_by(kind)
+        if topic.name not in own and kind not in topic.sometimes
+    }
+    ros.spin_until(lambda: all(publisher.get_subscription_count() for publisher in publishers))
+    return publishers
+
+
+@pytest.mark.parametrize('kind', CONTROLLERS)
+def test_bytes_that_are_no_message_are_dropped_and_told(
+    processes: Processes, ros: Ros, tmp_path: Path, kind: str
+) -> None:
+    process = started(processes, tmp_path, kind)
+    process.wait_for_output('active')
+    reports = ros.collect(DiagnosticArray, '/diagnostics', 100)
+    publishers = raw_publishers(ros, kind)
+    told: dict[str, str] = {}
+
+    def all_told() -> bool:
+        for data in GARBAGE:
+            for publisher in publishers:
+                with contextlib.suppress(RCLError):  # what does not fit into a type of fixed size
+                    publisher.publish(data)
+        for report in reports:
+            status = report.status[0]
+            if status.level == DiagnosticStatus.WARN:
+                told.update({entry.key: entry.value for entry in status.values})
+        return all(f'rejected.{topic.name}' in told for topic in publishers.values())
+
+    ros.spin_until(all_told, what=lambda: f'{told}; {process}')
+    for topic in publishers.values():
+        assert int(told[f'rejected.{topic.name}']) >= 1
+    state = ros.call(GetState, f'{kind}/get_state', GetState.Request())
+    assert state.current_state.label == 'active'
+    ended(process)
+
+
+@pytest.mark.parametrize('kind', CONTROLLERS)
+def test_false_stamps_do_not_end_a_node(
+    processes: Processes, ros: Ros, tmp_path: Path, kind: str
+) -> None:
+    """Stamps of zero, of the far future, and back, on messages that are right otherwise."""
+    process = started(processes, tmp_path, kind)
+    process.wait_for_output('active')
+    publishers = raw_publishers(ros, kind)
+    for stamp in STAMPS_NS:
+        for publisher, topic in publishers.items():
+            publisher.publish(still(topic, stamp))
+        state = ros.call(GetState, f'{kind}/get_state', GetState.Request())
+        assert state.current_state.label == 'active', process
+    ended(process)
+
+
+def still(topic: Interface, stamp_ns: int) -> Any:
+    """Message of a robot that stands, with a stamp."""
+    message = topic.type()
+    if topic.name in NAMES:
+        message.name = list(NAMES[topic.name])
+        for field in ('position', 'velocity', 'effort'):
+            setattr(message, field, [0.0] * len(message.name))
+    if hasattr(message, 'header'):
+        set_stamp(message.header.stamp, stamp_ns)
+    return message
+
+
+@pytest.mark.parametrize('kind', FOLLOWERS)
+def test_false_news_of_parameters_are_refused(
+    processes: Processes, ros: Ros, tmp_path: Path, kind: str
+) -> None:
+    process = started(processes, tmp_path, kind)
+    process.wait_for_output('active')
+    publisher = ros.node.create_publisher(
+        ParameterEvent, '/parameter_events', qos_profile_parameter_events)
+    reports = ros.collect(DiagnosticArray, '/diagnostics', 100)
+    ros.spin_until(lambda: publisher.get_subscription_count() > 0)
+    owner, name = ('inhibition', 'region_radius') if kind == 'canonical_oscillators' else (
+        'canonical_oscillators', 'gait')
+    value = ParameterValue(type=4, string_value='gallop') if name == 'gait' else ParameterValue(
+        type=3, double_value=1e300)
+    for false in (ParameterValue(type=77), value):
+        publisher.publish(ParameterEvent(
+            node=f'/{owner}', changed_parameters=[ParameterMessage(name=name, value=false)]))
+    publisher.publish(GARBAGE[0])
+    counts: set[str] = set()
+
+    def told() -> bool:
+        counts.update(entry.value for report in reports for entry in report.status[0].values
+                      if entry.key == 'rejected./parameter_events')
+        return bool(counts)
+
+    ros.spin_until(told, what=lambda: str(process))
+    answer = ros.call(GetParameters, f'{kind}/get_parameters', GetParameters.Request(names=[name]))
+    kept = answer.values[0]
+    assert kept.string_value == 'amble' if name == 'gait' else 0.0 < kept.double_value < 2.0
+    ended(process)
+
+
+@pytest.mark.parametrize('kind', NODES)
+def test_transitions_that_are_not_possible_are_refused(
+    processes: Processes, ros: Ros, tmp_path: Path, kind: str
+) -> None:
+    """Every number, in every state; then the legal sequence still works."""
+    process = started(processes, tmp_path, kind, autostart=False)
+    change = ros.node.create_client(ChangeState, f'{kind}/change_state')
+    ros.spin_until(change.service_is_ready)
+    sequence = [
+        Transition.TRANSITION_CONFIGURE,
+        Transition.TRANSITION_ACTIVATE,
+        Transition.TRANSITION_DEACTIVATE,
+        Transition.TRANSITION_ACTIVATE,
+        Transition.TRANSITION_ACTIVE_SHUTDOWN,
+        None,
+    ]
+    for following in sequence:
+        state = ros.call(GetState, f'{kind}/get_state', GetState.Request()).current_state.id
+        possible = ros.call(GetAvailableTransitions, f'{kind}/get_available_transitions',
+                            GetAvailableTransitions.Request())
+        legal = {entry.transition.id for entry in possible.available_transitions}
+        for number in sorted(set(range(256)) - legal):
+            future = change.call_async(ChangeState.Request(transition=Transition(id=number)))
+            ros.spin_until(future.done, what=lambda: str(process))
+            assert not future.result().success, number
+        now = ros.call(GetState, f'{kind}/get_state', GetState.Request()).current_state.id
+        assert now == state
+        if following is not None:
+            request = ChangeState.Request(transition=Transition(id=following))
+            assert ros.call(ChangeState, f'{kind}/change_state', request).success, process
+    ended(process)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('kind', NODES)
+def test_an_interrupt_ends_a_lone_node_without_complaint(
+    processes: Processes, ros: Ros, tmp_path: Path, kind: str, number: int
+) -> None:
+    """When its node is in the graph, when it is active, and while it publishes."""
+    outputs = [topic for topic in published_by(kind) if topic.name in ('/diagnostics', '/clock')]
+    for moment in range(4):
+        process = started(processes, tmp_path / str(moment), kind)
+        if moment == 0:
+            ros.spin_until(lambda: kind in ros.node.get_node_names())
+        elif moment == 1:
+            process.wait_for_output('active')
+        else:
+            process.wait_for_output('active')
+            seen = [ros.collect(topic.type, topic.name, 100) for topic in outputs]
+            if kind == 'mujoco_robot':
+                ros.spin_until(lambda seen=seen: all(seen))
+        process.signal(number)
+        assert process.wait() == 0, process
+        ros.spin_until(lambda: kind not in ros.node.get_node_names())
+        assert 'Traceback' not in process.output, process
+        assert 'FATAL' not in process.output, process
+
+
+@pytest.mark.parametrize(('key', 'value'), [
+    ('gain_fl', '-1e6'), ('gain_fl', '1e300'), ('gain_rr', 'nan'),
+    ('region_radius', '1e300'), ('region_radius', '-1.0'),
+])
+def test_an_inhibition_that_no_parameters_allow_is_refused(key: str, value: str) -> None:
+    values = {'requested': 'true', 'region_radius': '0.3',
+              **{f'gain_{leg}': '400.0' for leg in ('fl', 'fr', 'rl', 'rr')}}
+
+    def message() -> DiagnosticArray:
+        return DiagnosticArray(status=[DiagnosticStatus(name='inhibition', values=[
+            KeyValue(key=name, value=text) for name, text in values.items()])])
+
+    assert inhibition_from(read_inhibition_state(message())).gains.tolist() == [400.0] * 4
+    values[key] = value
+    with pytest.raises(DataError, match=key):
+        inhibition_from(read_inhibition_state(message()))
+
+
+def test_a_turn_rate_that_cannot_be_is_none() -> None:
+    """Its square would overflow in whatever filters it."""
+    message = Imu()
+    message.angular_velocity.x, message.linear_acceleration.z = 1e160, 9.81
+    for read in (message, serialized_reader(Imu)(serialize_message(message))):
+        rate, force = read_imu(read)
+        assert np.isnan(rate).tolist() == [True, False, False]
+        assert force.tolist() == [0.0, 0.0, 9.81]
+
+
+def test_a_push_that_no_simulation_bears_is_refused() -> None:
+    message = WrenchStamped()
+    message.wrench.force.y = -LARGEST_FORCE
+    assert read_push_force(message).force[1] == -LARGEST_FORCE
+    message.wrench.force.y = -1.01 * LARGEST_FORCE
+    with pytest.raises(DataError, match='15000 N'):
+        read_push_force(message)
+
+
+@pytest.fixture
+def robot(ros: Ros) -> Any:
+    """A robot in this process whose gate is closed: the test makes its ticks."""
+    node = MujocoRobotNode(context=ros.context, parameter_overrides=[
+        Parameter('gated', value=True)])
+    node.start()
+    yield node
+    node.close()
+    node.destroy_node()
+
+
+def test_a_robot_whose_simulation_diverges_is_put_back(robot: MujocoRobotNode, ros: Ros) -> None:
+    home = robot._state.joint_position.copy()
+    for _ in range(3):
+        robot._step()
+    before = robot._state.time_ns
+    robot._robot.data.qvel[:] = 1e40  # type: ignore[attr-defined]
+    robot._step()
+    robot._publish_state()
+    assert robot._state.time_ns == before + robot._tick_ns
+    np.testing.assert_allclose(robot._state.joint_position, home)
+    status = robot.health.status('active', {}, periodic=False).status[0]
+    assert status.level == DiagnosticStatus.ERROR
+    assert 'unstable' in status.message
+    assert 'start pose' in status.message
+    robot._step()
+    assert robot._state.time_ns == before + 2 * robot._tick_ns
+
+
+def test_silence_that_flickers_is_told_once(
+    robot: MujocoRobotNode, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Legs that are heard now and then for two seconds, and then at every tick."""
+    home = robot._state.joint_position.reshape(len(LEGS), 3)
+    legs = {leg: JointTargets(angles, np.zeros(3), np.zeros(3))
+            for leg, angles in zip(LEGS, home, strict=True)}
+    every = round(2 * robot._options.target_timeout * 1e9) // robot._tick_ns
+
+    def hear() -> None:
+        for leg, targets in legs.items():
+            robot._guard.accept(leg, robot._state.time_ns, targets)
+
+    for k in range(1, 501):
+        if k % every == 0:
+            hear()
+        robot._step()
+    assert capfd.readouterr().err.count('no targets from') == 1
+    for _ in range(300):
+        hear()
+        robot._step()
+    assert not robot.health.has_problem('silent')
+
+
+def test_targets_from_the_future_do_not_hold_the_robot(robot: MujocoRobotNode) -> None:
+    message = still(interface('joint_targets'), 1_000_000_000_000)
+    with pytest.raises(DataError, match='ahead of the clock'):
+        robot._on_targets(message)
+    assert robot._guard.stamps == [None] * 4
+
+
+def test_a_leg_tells_the_gait_that_it_follows(ros: Ros) -> None:
+    """The parameter is what is in force, and who asks for another one is sent to its owner."""
+    node = LegTransformation('leg', context=ros.context)
+    node.start()
+    follow_gait(node, gaits_of(node)['trot'].scaled(1.25))
+    assert node.get_parameter('gait').value == 'trot'
+    result = node.set_parameters([Parameter('gait', value='amble')])[0]
+    assert not result.successful
+    assert 'belongs to canonical_oscillators' in result.reason
+    assert node.get_parameter('gait').value == 'trot'
+    node.close()
+    node.destroy_node()
+
+
+def test_the_suite_walks_on_among_garbage(processes: Processes, ros: Ros) -> None:
+    """All nodes in real time, and garbage on every topic ten times a second."""
+    kinds = [name for name in CONTROLLERS if name != 'leg_transformation']
+    gated = {'mujoco_robot': {'gated': True}}
+    nodes = [processes.node(kind, **gated.get(kind, {})) for kind in kinds]
+    nodes += [processes.node('leg_transformation', leg=leg) for leg in LEGS]
+    for node in nodes:
+        node.wait_for_output('active')
+    places: list[Any] = ros.collect(Odometry, 'odom', interface('odom').reader_qos)
+    reports = ros.collect(DiagnosticArray, '/diagnostics', 1000)
+    topics = {topic.name: topic for kind in kinds for topic in read_by(kind)
+              if kind not in topic.sometimes and topic.name != '/clock'}
+    publishers = {name: ros.node.create_publisher(topic.type, name, topic.publisher_qos)
+                  for name, topic in topics.items()}
+    for node in (*kinds, *(f'leg_transformation_{leg}' for leg in LEGS)):
+        ros.spin_until(
+            lambda node=node: ros.call(Trigger, f'{node}/ready', Trigger.Request()).success)
+    gate = interface('mujoco_robot/advance_until')
+    opener = ros.node.create_publisher(gate.type, gate.name, gate.publisher_qos)
+    ros.spin_until(lambda: opener.get_subscription_count() > 0)
+    opener.publish(Clock(clock=Time(sec=10_000)))
+    ros.spin_until(lambda: bool(places))
+    assert ros.call(SetBool, 'inhibit', SetBool.Request(data=False)).success
+    command, rounds = Twist(), 0
+    command.linear.x = 0.4
+
+    def walked() -> bool:
+        nonlocal rounds
+        if len(places) // 25 > rounds:
+            rounds = len(places) // 25
+            for publisher in publishers.values():
+                publisher.publish(GARBAGE[rounds % 2])
+            publishers['cmd_vel'].publish(command)
+        assert all(node.running for node in nodes), nodes
+        return bool(places[-1].pose.pose.position.x > 0.5)
+
+    ros.spin_until(walked, deadline_s=4 * ros_processes.DEADLINE_S)
+    assert places[-1].pose.pose.position.z > 0.2
+    trot = Parameter('gait', value='trot').to_parameter_msg()
+    answer = ros.call(SetParameters, 'canonical_oscillators/set_parameters',
+                      SetParameters.Request(parameters=[trot]))
+    assert answer.results[0].successful, answer.results[0].reason
+    for node in ('posture_control', 'leg_transformation_rr'):
+        ros.spin_until(lambda node=node: walked() and ros.call(
+            GetParameters, f'{node}/get_parameters', GetParameters.Request(names=['gait'])
+        ).values[0].string_value == 'trot')
+    counted = {entry.key for report in reports for entry in report.status[0].values}
+    assert {f'rejected.{name}' for name in publishers} <= counted
+    for node in nodes:
+        ended(node)
