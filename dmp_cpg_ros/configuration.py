@@ -11,7 +11,8 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -121,18 +122,26 @@ def load_yaml(path: str | Path) -> dict[str, Any]:
     return content
 
 
+def read_value(text: str) -> Any:
+    """Read one value as a parameter file's; raises DataError when it is not YAML."""
+    try:
+        return yaml.load(text, Loader=_StrictLoader)
+    except yaml.YAMLError as error:
+        raise DataError(f"'{text}' is no value in YAML: {error}") from error
+
+
 def node_parameters(path: str | Path, node_name: str) -> dict[str, Any]:
     """Read the parameters of one node from a ROS 2 parameter file, as the node itself would.
 
-    The section ``/**`` holds for every node and the node's own section overrides it, whichever
-    comes first in the file. Parameters in groups get dotted names.
+    Of the sections that mean the node (its own, ``/**``, ``/**/name`` ...) the later one in the
+    file overrides the earlier one. Parameters in groups get dotted names.
 
     Parameters
     ----------
     path : str or Path
         Parameter file with ``ros__parameters`` under each node's name.
     node_name : str
-        For example ``leg_fl``, or with a namespace ``/robot_1/leg_fl``.
+        With a namespace where it has one: ``/robot_1/posture_control``.
 
     Returns
     -------
@@ -152,9 +161,30 @@ def node_parameters(path: str | Path, node_name: str) -> dict[str, Any]:
         raise DataError(f"'{path}' has no parameters for node '{node_name}'; it has sections for "
                         f"{', '.join(sections) or 'no node'}")
     merged: dict[str, Any] = {}
-    for name in sorted(matching, key=_generality, reverse=True):
+    for name in matching:
         merged.update(sections[name])
     return merged
+
+
+def unused_sections(path: str | Path, namespace: str, kinds: Collection[str]) -> list[str]:
+    """Sections of a parameter file that mean a kind of node, but none in a namespace.
+
+    Parameters
+    ----------
+    path : str or Path
+        Parameter file.
+    namespace : str
+        For example ``/robot1``.
+    kinds : collection of str
+        Names that nodes have or begin with.
+    """
+    found = []
+    for section in _sections(load_yaml(path), '', path):
+        name = section.rpartition('/')[2]
+        if (any(name == kind or name.startswith(f'{kind}_') for kind in kinds)
+                and not _applies(section, f'{namespace}/{name}')):
+            found.append(section)
+    return found
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -177,12 +207,18 @@ _StrictLoader.add_implicit_resolver(
 
 
 def _not_found(name: str | Path, folders: list[Path]) -> str:
+    """Say what is there instead: the files of the folder that was meant, and near names."""
     if not folders:
         return f"file '{name}' does not exist"
-    exist = sorted({path.relative_to(folder).as_posix()
-                    for folder in folders for path in folder.rglob('*.yaml')})
+    meant = Path(name).parent
+    exist = sorted({path.relative_to(folder) for folder in folders
+                    for path in folder.rglob('*.yaml')})
+    beside = [path.as_posix() for path in exist if path.parent == meant]
+    by_stem = {path.stem: path for path in exist if path.parent == meant or meant == Path('.')}
+    near = get_close_matches(Path(name).stem, by_stem, n=1)
+    guess = f'did you mean {by_stem[near[0]].with_suffix("").as_posix()}? ' if near else ''
     return (f"file '{name}' does not exist in the current folder nor in "
-            f"{', '.join(map(str, folders))}; there are {', '.join(exist) or 'no files'}")
+            f"{', '.join(map(str, folders))}; {guess}there are {', '.join(beside) or 'no files'}")
 
 
 def _sections(content: Mapping[str, Any], prefix: str,
@@ -221,7 +257,3 @@ def _applies(section: str, node_name: str) -> bool:
     pattern = ''.join(words.get(word, f'/{re.escape(word)}')
                       for word in section.strip('/').split('/'))
     return re.fullmatch(pattern, f"/{node_name.strip('/')}") is not None
-
-
-def _generality(section: str) -> tuple[bool, int]:
-    return section.endswith('*'), section.count('*')

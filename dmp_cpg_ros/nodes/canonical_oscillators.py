@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.phase_lock_watch import LOCKED, LOST, PhaseLock, PhaseLock
 from dmp_cpg_ros.core.robot_state import LEGS
 from dmp_cpg_ros.core.running_network import RunningNetwork
 from dmp_cpg_ros.core.suite_parameters import (
-    NODE_PARAMETERS,
+    CANONICAL,
     CertificateParameters,
     GaitParameters,
 )
@@ -40,6 +40,7 @@ from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.parameterized_node import Sets
 from dmp_cpg_ros.nodes.robot_state_messages import FootContactsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.suite_table import KINDS
 
 Array = NDArray[np.float64]
 
@@ -47,8 +48,8 @@ Array = NDArray[np.float64]
 class CanonicalOscillators(CertifiedNode):
     """Advances the four coupled oscillators with the robot's clock."""
 
-    KIND = 'canonical_oscillators'
-    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    KIND = CANONICAL
+    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
 
     def configure(self) -> None:
         """Build the network at its initial state and its topics."""

@@ -23,6 +23,7 @@ from rclpy.task import Future
 from rclpy.utilities import get_default_context, remove_ros_args
 
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
+from dmp_cpg_ros.nodes.claims import claim_node
 from dmp_cpg_ros.nodes.help_text import help_text
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
@@ -175,11 +176,13 @@ def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[Man
     rclpy.init(args=[program, *arguments])
     try:
         nodes.extend(make())
+        claims = [claim_node(node) for node in nodes]
         for node in nodes:
             node.start()
         parameters = nodes[0].parameters_of(NodeParameters)
         schedule(parameters.scheduling)
         spin(nodes, parameters.executor)
+        del claims
     except DmpCpgError:
         raise
     except Exception:

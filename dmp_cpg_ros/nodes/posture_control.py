@@ -15,7 +15,6 @@ from dmp_cpg_ros.core.estimation_parameters import EstimationParameters
 from dmp_cpg_ros.core.leg_primitive import LegParameters
 from dmp_cpg_ros.core.posture import PostureController, PostureParameters
 from dmp_cpg_ros.core.robot_legs import RobotLegs
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.nodes.body_mode_messages import BodyModeWriter
 from dmp_cpg_ros.nodes.body_state import BodyState
 from dmp_cpg_ros.nodes.conversions import (
@@ -28,6 +27,7 @@ from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.suite_table import KINDS, POSTURE
 
 
 class PostureControl(ManagedNode):
@@ -36,8 +36,8 @@ class PostureControl(ManagedNode):
     Decides its mode, too: stands it up, lays it down, notices a fall, brings it back.
     """
 
-    KIND = 'posture_control'
-    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    KIND = POSTURE
+    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
     # The rate of the swings' activity is the legs' too, and the certificate's.
     CHANGEABLE = tuple(name for cls in (PostureParameters, EstimationParameters)
                        for name in cls.__dataclass_fields__

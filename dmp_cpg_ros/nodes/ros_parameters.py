@@ -20,8 +20,8 @@ from rclpy.parameter import Parameter
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.nodes.interfaces import SUITE
 from dmp_cpg_ros.nodes.scheduling import BATCH, POLICIES
+from dmp_cpg_ros.suite_table import KINDS, WALKING
 
 P = TypeVar('P', bound=Parameters)
 
@@ -41,7 +41,8 @@ class NodeParameters(Parameters):
         BATCH, 'policy of the Linux scheduler; batch keeps a reader from interrupting its writer',
         choices=POLICIES)
     expected_nodes: tuple[str, ...] = parameter(
-        SUITE[:-1], 'kinds of nodes that must be connected before ~/ready says yes', choices=SUITE)
+        tuple(kind.name for kind in WALKING),
+        'kinds of nodes that must be connected before ~/ready says yes', choices=tuple(KINDS))
 
 
 @dataclass(frozen=True)
