@@ -72,7 +72,7 @@ def nodes(context: LaunchContext) -> list[Node]:
         else:
             parameters = {**shared, **own}
         described.append(Node(
-            package='dmp_cpg_ros', executable=kind.name, name=name, namespace=namespace,
+            package='dmp_cpg_ros', executable=kind.name, name=name, namespace=namespace or None,
             parameters=[str(suite.file), *([parameters] if parameters else [])],
             remappings=[rule for rule in namespace_rules(namespace) if rule[0] != '__ns'],
             output='screen', emulate_tty=True,

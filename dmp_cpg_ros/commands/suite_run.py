@@ -33,7 +33,7 @@ from dmp_cpg_ros.nodes.claims import AlreadyRunningError, already_running, claim
 from dmp_cpg_ros.nodes.executors import make_executor
 from dmp_cpg_ros.nodes.lying_down import LyingDown
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
-from dmp_cpg_ros.nodes.readiness import Intervals
+from dmp_cpg_ros.nodes.readiness import Intervals, ReadinessOfOthers
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, WALKING_NODES, instances
 
@@ -257,24 +257,14 @@ class _Watch:
 
     def until_ready(self, names: list[str]) -> None:
         """Ask every node whether it is active and connected until all say yes."""
-        begin, waiting = time.monotonic(), 'nodes to appear'
-        deadline, tell = begin + READY_WITHIN_S, Intervals(FIRST_WORD_S)
-        clients = {name: self._player.create_client(Trigger, f'{name}/ready') for name in names}
-        while clients or not self._player.connected():
+        deadline, tell = time.monotonic() + READY_WITHIN_S, Intervals(FIRST_WORD_S)
+        others = ReadinessOfOthers(self._player, names)
+        while (missing := others.missing()) or not self._player.connected():
+            waiting = '; '.join(missing) or 'topics and services of the player'
             if time.monotonic() > deadline:
                 raise SuiteError(f'not ready within {READY_WITHIN_S:g} s: {waiting}')
-            for name, client in list(clients.items()):
-                answer = self._ask(client, Trigger.Request())
-                if answer is not None and answer.success:
-                    self._player.destroy_client(clients.pop(name))
-                else:
-                    waiting = (
-                        f'{name} does not answer'
-                        if answer is None
-                        else f'{name}: {answer.message}'
-                    )
             if tell.due():
-                self._say(math.nan, f'waiting: {waiting}')
+                self._say(math.nan, f'waiting for {waiting}')
             self.until(Future(), SLICE_S)
 
     def lay_down(self, lying_down: LyingDown) -> None:

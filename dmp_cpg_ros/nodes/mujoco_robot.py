@@ -38,10 +38,10 @@ from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.interfaces import BODY_TOPICS, Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
-from dmp_cpg_ros.nodes.readiness import Intervals
+from dmp_cpg_ros.nodes.readiness import Intervals, ReadinessOfOthers
 from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
 from dmp_cpg_ros.nodes.robot_timing import RobotTiming
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters, NodeParameters
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
@@ -117,6 +117,10 @@ class MujocoRobotNode(ManagedNode):
             self._hold()
         elif self._lock_step:
             self._waiting = Intervals()
+            expected = self.parameters_of(NodeParameters).expected_nodes
+            self._others = ReadinessOfOthers(
+                self, [name for kind in expected if kind != self.KIND
+                       for name in KINDS[kind].instances])
             self._timer = self.create_timer(
                 READY_PERIOD_S,
                 self._start_when_connected,
@@ -242,12 +246,13 @@ class MujocoRobotNode(ManagedNode):
     # Lock-step -----------------------------------------------------------------------------------
 
     def _start_when_connected(self) -> None:
-        missing = self.missing()
+        # A tick that one of the others loses would be waited for for ever.
+        missing = self.missing() + self._others.missing()
         if not missing:
             self.deactivate()
             self._publish_state()
         elif self._waiting.due():
-            self.get_logger().info(f'waiting: {"; ".join(missing)}')
+            self.get_logger().info(f'waiting for {"; ".join(missing)}')
 
     def _hold(self) -> None:
         """Publish the state, or wait at the gate until it may be published."""

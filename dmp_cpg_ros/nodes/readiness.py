@@ -10,17 +10,23 @@ graph shows are matched here.
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.subscription import Subscription
+from rclpy.task import Future
+from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.nodes.interfaces import Interface, partners
 from dmp_cpg_ros.suite_table import KINDS
+
+ASK_AGAIN_S = 2.0
+"""Time after which a request without an answer is repeated [s]."""
 
 
 class Intervals:
@@ -44,6 +50,42 @@ class Intervals:
         self._length_s *= 2.0
         self._end = now + self._length_s
         return True
+
+
+class ReadinessOfOthers:
+    """Asks nodes whether they are ready, again and again until each has said so.
+
+    Parameters
+    ----------
+    node : Node
+        Who asks.
+    names : iterable of str
+        Names of nodes in its namespace.
+    """
+
+    def __init__(self, node: Node, names: Iterable[str]) -> None:
+        """Create the clients."""
+        self._node = node
+        self._clients = {name: node.create_client(Trigger, f'{name}/ready') for name in names}
+        self._asked: dict[str, tuple[float, Future]] = {}
+        self._said: dict[str, str] = {}
+
+    def missing(self) -> list[str]:
+        """Take answers and ask again, without waiting; returns who has not said yes, and why."""
+        for name, client in list(self._clients.items()):
+            asked_s, future = self._asked.get(name, (-math.inf, Future()))
+            answer = future.result() if future.done() else None
+            if answer is not None and answer.success:
+                self._node.destroy_client(self._clients.pop(name))
+                continue
+            if answer is not None:
+                self._said[name] = answer.message
+            # A response is lost where the server does not know the client yet.
+            lost = time.monotonic() > asked_s + ASK_AGAIN_S
+            if (answer is not None or lost) and client.service_is_ready():
+                client.remove_pending_request(future)
+                self._asked[name] = time.monotonic(), client.call_async(Trigger.Request())
+        return [f'{name}: {self._said.get(name, "it does not answer")}' for name in self._clients]
 
 
 def missing_connections(node: Node, kind: str,
