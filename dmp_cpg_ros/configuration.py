@@ -204,6 +204,9 @@ class _StrictLoader(yaml.SafeLoader):
 _StrictLoader.add_implicit_resolver(
     'tag:yaml.org,2002:float', re.compile(r'^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
     list('-+.0123456789'))
+# launch writes lists as tuples of Python.
+_StrictLoader.add_constructor(
+    'tag:yaml.org,2002:python/tuple', _StrictLoader.construct_sequence)
 
 
 def _not_found(name: str | Path, folders: list[Path]) -> str:
