@@ -200,13 +200,15 @@ class _StrictLoader(yaml.SafeLoader):
                 seen.add(key.value)
         return super().construct_mapping(node, deep=deep)
 
+    def construct_tuple(self, node: yaml.SequenceNode) -> list[Any]:
+        """Read what launch makes of a list that it hands to a node."""
+        return list(self.construct_sequence(node))
+
 
 _StrictLoader.add_implicit_resolver(
     'tag:yaml.org,2002:float', re.compile(r'^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
     list('-+.0123456789'))
-# launch writes lists as tuples of Python.
-_StrictLoader.add_constructor(
-    'tag:yaml.org,2002:python/tuple', _StrictLoader.construct_sequence)
+_StrictLoader.add_constructor('tag:yaml.org,2002:python/tuple', _StrictLoader.construct_tuple)
 
 
 def _not_found(name: str | Path, folders: list[Path]) -> str:

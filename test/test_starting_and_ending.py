@@ -142,7 +142,7 @@ def test_whatever_ends_walk_ends_its_nodes_and_closes_the_bag(
         processes: Processes, tmp_path: Path, number: int, composed: tuple[str, ...]) -> None:
     process = walk(processes, scenario(tmp_path, 600.0), '--lock-step', '--out',
                    str(tmp_path / 'run'), '--no-report', *composed)
-    process.wait_for_output('walking', RUN_S)
+    process.wait_for_output('  walking\n', RUN_S)
     nodes = children(process.pid)
     assert len(nodes) == (2 if composed else 10)
     process.signal(number)
