@@ -44,7 +44,6 @@ from dmp_cpg_ros.nodes.executors import make_executor, spin
 from dmp_cpg_ros.nodes.help_text import help_text
 from dmp_cpg_ros.nodes.interfaces import (
     INTERFACES,
-    SUITE,
     TOPICS,
     expected_count,
     interface,
@@ -194,12 +193,12 @@ def test_every_topic_is_lossless_and_the_latched_ones_are_latched() -> None:
 
 
 def test_every_node_has_its_place_in_the_table() -> None:
-    for kind in SUITE:
+    for kind in tuple(KINDS):
         assert {'/diagnostics'} <= {topic.name for topic in published_by(kind)}
         assert {'~/ready'} <= {service.name for service in served_by(kind)}
         assert read_by(kind)
     for entry in INTERFACES.values():
-        known = {*SUITE, 'user'}
+        known = {*tuple(KINDS), 'user'}
         assert set(entry.publishers) | set(entry.subscribers) <= known
         assert set(entry.sometimes) <= set(entry.publishers) | set(entry.subscribers)
         assert entry.type_name.split('/')[1] == ('srv' if entry.service else 'msg')
