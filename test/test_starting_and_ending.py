@@ -11,11 +11,14 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+import rclpy
 import ros_processes
 from ros_processes import NodeProcess, Processes, Ros, wait_until
 
 from dmp_cpg_ros.analysis.digests import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.commands.suite_run import alone_in_domain
+from dmp_cpg_ros.nodes.claims import AlreadyRunningError
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
@@ -96,6 +99,17 @@ def test_nodes_left_over_are_named_instead_of_measured(
     process = walk(processes, scenario(tmp_path, 0.5), '--out', str(tmp_path / 'run'))
     assert process.wait(RUN_S) == 2
     assert f'ROS domain {processes.domain} (nodes /inhibition)' in process.output
+
+
+def test_nodes_that_only_the_graph_shows_are_found(ros: Ros) -> None:
+    # As of another machine: it has claimed nothing here.
+    foreign = rclpy.node.Node('posture_control', context=ros.context, namespace='/robot1')
+    with (pytest.raises(AlreadyRunningError, match=r'nodes /robot1/posture_control'),
+          alone_in_domain('/robot1')):
+        pass
+    with alone_in_domain(''):
+        pass
+    foreign.destroy_node()
 
 
 def test_a_node_that_runs_already_is_not_started_again(processes: Processes, ros: Ros) -> None:

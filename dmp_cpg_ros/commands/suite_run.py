@@ -9,7 +9,7 @@ import os
 import signal
 import stat
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,7 +29,7 @@ from std_srvs.srv import Trigger
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario import Scenario
-from dmp_cpg_ros.nodes.claims import AlreadyRunningError, already_running, claim
+from dmp_cpg_ros.nodes.claims import AlreadyRunningError, already_running, claim, claimed
 from dmp_cpg_ros.nodes.executors import make_executor
 from dmp_cpg_ros.nodes.lying_down import LyingDown
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
@@ -129,7 +129,11 @@ def alone_in_domain(namespace: str) -> Iterator[None]:
     try:
         domain = context.get_domain_id()
         held = claim(f'{namespace}/suite', domain)
-        others = _suite_nodes(Node('lookout', context=context, namespace=namespace), namespace)
+        names = [f'{namespace}/{name}' for name in (*WALKING_NODES, RECORDER)]
+        lookout = Node('lookout', context=context, namespace=namespace)
+        # Claims tell at once of nodes on this machine; the graph, after a while, of all others.
+        others = claimed(names, domain) or _in_graph(lookout, names)
+        lookout.destroy_node()
     finally:
         context.try_shutdown()
     with held:
@@ -138,16 +142,15 @@ def alone_in_domain(namespace: str) -> Iterator[None]:
         yield
 
 
-def _suite_nodes(lookout: Node, namespace: str) -> list[str]:
-    """Full names of nodes of a suite in the graph, looked for as long as there are none."""
+def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
+    """Those of some nodes that are in the graph, looked for as long as there are none."""
     deadline = time.monotonic() + LOOK_S
     found: list[str] = []
     while not found and time.monotonic() < deadline:
         time.sleep(SLICE_S)
-        found = sorted(
-            f'{namespace}/{name}' for name, space in lookout.get_node_names_and_namespaces()
-            if name in (*WALKING_NODES, RECORDER) and space == (namespace or '/'))
-    lookout.destroy_node()
+        there = {f'{space.rstrip("/")}/{name}'
+                 for name, space in lookout.get_node_names_and_namespaces()}
+        found = [name for name in names if name in there]
     return found
 
 

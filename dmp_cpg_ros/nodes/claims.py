@@ -11,6 +11,7 @@ from __future__ import annotations
 import fcntl
 import os
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import IO
 
@@ -52,6 +53,17 @@ def claim(name: str, domain: int) -> IO[str]:
     file.write(str(os.getpid()))
     file.flush()
     return file
+
+
+def claimed(names: Iterable[str], domain: int) -> list[str]:
+    """Those of some names that other processes of this user have claimed in a domain."""
+    taken = []
+    for name in names:
+        try:
+            claim(name, domain).close()
+        except AlreadyRunningError:
+            taken.append(name)
+    return taken
 
 
 def claim_node(node: Node) -> IO[str]:
