@@ -19,26 +19,14 @@ from setuptools import find_packages, setup
 
 NAME = 'dmp_cpg_ros'
 
-EXECUTABLES = {
+EXECUTABLES = (
     # The nodes, in the order of the data flow.
-    'reference_filter': 'dmp_cpg_ros.nodes.reference_filter:main',
-    'canonical_oscillators': 'dmp_cpg_ros.nodes.canonical_oscillators:main',
-    'leg_transformation': 'dmp_cpg_ros.nodes.leg_transformation:main',
-    'inhibition': 'dmp_cpg_ros.nodes.inhibition:main',
-    'posture_control': 'dmp_cpg_ros.nodes.posture_control:main',
-    'mujoco_robot': 'dmp_cpg_ros.nodes.mujoco_robot:main',
-    'bag_recorder': 'dmp_cpg_ros.nodes.bag_recorder:main',
+    'reference_filter', 'canonical_oscillators', 'inhibition', 'posture_control',
+    'leg_transformation', 'mujoco_robot', 'bag_recorder',
     # The commands.
-    'walk': 'dmp_cpg_ros.commands.walk:main',
-    'certify': 'dmp_cpg_ros.commands.certify:main',
-    'analyze': 'dmp_cpg_ros.commands.analyze:main',
-    'learn': 'dmp_cpg_ros.commands.learn:main',
-    'inspect_robot': 'dmp_cpg_ros.commands.inspect_robot:main',
-    'robot_client': 'dmp_cpg_ros.commands.robot_client:main',
-    'study_stops': 'dmp_cpg_ros.studies.study_stops:main',
-    'benchmark_walking': 'dmp_cpg_ros.studies.benchmark_walking:main',
-    'study_recovery': 'dmp_cpg_ros.studies.study_recovery:main',
-}
+    'walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client', 'study_stops',
+    'benchmark_walking', 'study_recovery',
+)
 
 WRAPPER = """\
 #!/bin/sh
@@ -131,7 +119,7 @@ setup(
         'video': ['imageio-ffmpeg>=0.4.9'],
     },
     entry_points={
-        'console_scripts': [f'{name} = {target}' for name, target in EXECUTABLES.items()],
+        'console_scripts': [f'{name} = {NAME}.__main__:{name}' for name in EXECUTABLES],
     },
     zip_safe=False,
 )

@@ -11,7 +11,8 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from difflib import get_close_matches
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -122,18 +123,26 @@ def load_yaml(path: str | Path) -> dict[str, Any]:
     return content
 
 
+def read_value(text: str) -> Any:
+    """Read one value as a parameter file's; raises DataError when it is not YAML."""
+    try:
+        return yaml.load(text, Loader=_StrictLoader)
+    except yaml.YAMLError as error:
+        raise DataError(f"'{text}' is no value in YAML: {error}") from error
+
+
 def node_parameters(path: str | Path, node_name: str) -> dict[str, Any]:
     """Read the parameters of one node from a ROS 2 parameter file, as the node itself would.
 
-    The section ``/**`` holds for every node and the node's own section overrides it, whichever
-    comes first in the file. Parameters in groups get dotted names.
+    Of the sections that mean the node (its own, ``/**``, ``/**/name`` ...) the later one in the
+    file overrides the earlier one. Parameters in groups get dotted names.
 
     Parameters
     ----------
     path : str or Path
         Parameter file with ``ros__parameters`` under each node's name.
     node_name : str
-        For example ``leg_fl``, or with a namespace ``/robot_1/leg_fl``.
+        With a namespace where it has one: ``/robot_1/posture_control``.
 
     Returns
     -------
@@ -153,9 +162,30 @@ def node_parameters(path: str | Path, node_name: str) -> dict[str, Any]:
         raise DataError(f"'{path}' has no parameters for node '{node_name}'; it has sections for "
                         f"{', '.join(sections) or 'no node'}")
     merged: dict[str, Any] = {}
-    for name in sorted(matching, key=_generality, reverse=True):
+    for name in matching:
         merged.update(sections[name])
     return merged
+
+
+def unused_sections(path: str | Path, namespace: str, kinds: Collection[str]) -> list[str]:
+    """Sections of a parameter file that mean a kind of node, but none in a namespace.
+
+    Parameters
+    ----------
+    path : str or Path
+        Parameter file.
+    namespace : str
+        For example ``/robot1``.
+    kinds : collection of str
+        Names that nodes have or begin with.
+    """
+    found = []
+    for section in _sections(load_yaml(path), '', path):
+        name = section.rpartition('/')[2]
+        if (any(name == kind or name.startswith(f'{kind}_') for kind in kinds)
+                and not _applies(section, f'{namespace}/{name}')):
+            found.append(section)
+    return found
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -171,19 +201,30 @@ class _StrictLoader(yaml.SafeLoader):
                 seen.add(key.value)
         return super().construct_mapping(node, deep=deep)
 
+    def construct_tuple(self, node: yaml.SequenceNode) -> list[Any]:
+        """Read what launch makes of a list that it hands to a node."""
+        return list(self.construct_sequence(node))
+
 
 _StrictLoader.add_implicit_resolver(
     'tag:yaml.org,2002:float', re.compile(r'^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
     list('-+.0123456789'))
+_StrictLoader.add_constructor('tag:yaml.org,2002:python/tuple', _StrictLoader.construct_tuple)
 
 
 def _not_found(name: str | Path, folders: list[Path]) -> str:
+    """Say what is there instead: the files of the folder that was meant, and near names."""
     if not folders:
         return f"file '{name}' does not exist"
-    exist = sorted({path.relative_to(folder).as_posix()
-                    for folder in folders for path in folder.rglob('*.yaml')})
+    meant = Path(name).parent
+    exist = sorted({path.relative_to(folder) for folder in folders
+                    for path in folder.rglob('*.yaml')})
+    beside = [path.as_posix() for path in exist if path.parent == meant]
+    by_stem = {path.stem: path for path in exist if path.parent == meant or meant == Path('.')}
+    near = get_close_matches(Path(name).stem, by_stem, n=1)
+    guess = f'did you mean {by_stem[near[0]].with_suffix("").as_posix()}? ' if near else ''
     return (f"file '{name}' does not exist in the current folder nor in "
-            f"{', '.join(map(str, folders))}; there are {', '.join(exist) or 'no files'}")
+            f"{', '.join(map(str, folders))}; {guess}there are {', '.join(beside) or 'no files'}")
 
 
 def _sections(content: Mapping[str, Any], prefix: str,
@@ -222,10 +263,6 @@ def _applies(section: str, node_name: str) -> bool:
     pattern = ''.join(words.get(word, f'/{re.escape(word)}')
                       for word in section.strip('/').split('/'))
     return re.fullmatch(pattern, f"/{node_name.strip('/')}") is not None
-
-
-def _generality(section: str) -> tuple[bool, int]:
-    return section.endswith('*'), section.count('*')
 
 
 def numbered(path: Path) -> Iterator[Path]:

@@ -23,11 +23,12 @@ from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
-from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
 from dmp_cpg_ros.core.suite_parameters import (
-    NODE_PARAMETERS,
+    CANONICAL,
+    INHIBITION,
+    REFERENCE,
     GaitParameters,
     RobotFileParameters,
     RobotParameters,
@@ -36,6 +37,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     chosen_world,
 )
 from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT, WALKING
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""
@@ -108,7 +110,9 @@ def load_gait(name: str, file: str | Path = 'gaits.yaml') -> Gait:
 
 
 def load_suite(
-    file: str | Path | None = None, overrides: Mapping[str, Any] | None = None
+    file: str | Path | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    namespace: str = '',
 ) -> Suite:
     """Read a parameter file.
 
@@ -118,6 +122,8 @@ def load_suite(
         ROS 2 parameter file in the config folder or by its path; the package's own without.
     overrides : mapping, optional
         Values by parameter name that hold for every node that has the parameter.
+    namespace : str
+        Namespace of the nodes, which decides what sections mean them.
 
     Returns
     -------
@@ -135,18 +141,18 @@ def load_suite(
             raise ParameterError(
                 f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}"
             )
-    sets = {kind: node_sets(path, kind, overrides) for kind in NODE_PARAMETERS}
-    canonical, robot = sets['canonical_oscillators'], sets['mujoco_robot']
+    sets = {kind.name: node_sets(path, kind.name, overrides, namespace) for kind in WALKING}
+    canonical, robot = sets[CANONICAL], sets[ROBOT]
     parameters = SuiteParameters(
-        sets['reference_filter'][ReferenceParameters],
+        sets[REFERENCE][ReferenceParameters],
         canonical[CanonicalParameters],
-        sets['inhibition'][InhibitionParameters],
-        sets['leg_transformation'][LegParameters],
-        sets['posture_control'][PostureParameters],
-        sets['posture_control'][EstimationParameters],
-        sets['posture_control'][StateSourceParameters],
-        sets['inhibition'][VoteSourceParameters],
-        sets['posture_control'][ModeParameters],
+        sets[INHIBITION][InhibitionParameters],
+        sets[LEG][LegParameters],
+        sets[POSTURE][PostureParameters],
+        sets[POSTURE][EstimationParameters],
+        sets[POSTURE][StateSourceParameters],
+        sets[INHIBITION][VoteSourceParameters],
+        sets[POSTURE][ModeParameters],
         canonical[GaitChangeParameters],
         canonical[GaitChoiceParameters],
     )
@@ -164,21 +170,28 @@ def load_suite(
 
 
 def node_sets(
-    path: Path, kind: str, overrides: Mapping[str, Any] | None = None
+    path: Path,
+    kind: str,
+    overrides: Mapping[str, Any] | None = None,
+    namespace: str = '',
+    name: str | None = None,
 ) -> dict[type[Any], Any]:
-    """Parameter sets of one kind of node from a parameter file.
+    """Parameter sets of one node from a parameter file.
 
-    Values for other nodes under ``/**`` are left aside; names that no node has are errors. Of the
-    four legs the section of fl is read.
+    Values for other nodes under ``/**`` are left aside; names that no node has are errors.
 
     Parameters
     ----------
     path : Path
         Parameter file.
     kind : str
-        Kind of node, a key of ``NODE_PARAMETERS``.
+        Kind of node, a key of :data:`~dmp_cpg_ros.suite_table.KINDS`.
     overrides : mapping, optional
         Values by parameter name; names that this kind has not are left aside.
+    namespace : str
+        Namespace of the node.
+    name : str, optional
+        Its name, where there are several of the kind; the first of them without.
 
     Returns
     -------
@@ -189,7 +202,7 @@ def node_sets(
     DmpCpgError
         As :func:`load_suite`.
     """
-    node = f'{kind}_{LEGS[0]}' if kind == 'leg_transformation' else kind
+    node = f'{namespace.rstrip("/")}/{name or next(iter(KINDS[kind].instances))}'
     given = {**node_parameters(path, node), **(overrides or {})}
     for name in given:
         if name not in SUITE_NAMES and name not in NODE_NAMES:
@@ -198,7 +211,7 @@ def node_sets(
                 f'{", ".join(sorted(SUITE_NAMES))}'
             )
     sets: dict[type[Any], Any] = {}
-    for cls in NODE_PARAMETERS[kind]:
+    for cls in KINDS[kind].sets:
         names = {field.name for field in dataclasses.fields(cls)}
         try:
             sets[cls] = cls(**{name: value for name, value in given.items() if name in names})
@@ -209,8 +222,8 @@ def node_sets(
 
 SUITE_NAMES = frozenset(
     field.name
-    for sets in NODE_PARAMETERS.values()
-    for cls in sets
+    for kind in WALKING
+    for cls in kind.sets
     for field in dataclasses.fields(cls)
 )
 """Names of all parameters of all parts."""

@@ -1,30 +1,28 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Brings up the whole suite: the nodes in the order of the data flow, then the robot.
+"""Brings up the whole suite: the recorder, the nodes in the order of the data flow, the robot.
 
 ``ros2 launch dmp_cpg_ros suite.launch.py`` needs nothing but ROS 2; the command ``walk`` does
 more: it plays a scenario, waits until the nodes are ready, and writes a report.
 """
 
+from pathlib import Path
+
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
-from launch.conditions import IfCondition
-from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
-from launch_ros.substitutions import FindPackageShare
 
-PACKAGE = 'dmp_cpg_ros'
-LEGS = ('fl', 'fr', 'rl', 'rr')
+from dmp_cpg_ros.suite import load_suite
+from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, instances, namespace_rules
 
 
 def generate_launch_description() -> LaunchDescription:
     """Describe the arguments and the nodes."""
     return LaunchDescription([
         DeclareLaunchArgument(
-            'parameters',
-            default_value=PathJoinSubstitution(
-                [FindPackageShare(PACKAGE), 'config', 'suite.yaml']),
-            description='YAML file with the parameters of all nodes'),
+            'parameters', default_value='',
+            description="YAML file with the parameters of all nodes; if empty, the package's own"),
         DeclareLaunchArgument(
             'robot', default_value='',
             description='YAML file that names the model, its legs and its feet; '
@@ -34,31 +32,50 @@ def generate_launch_description() -> LaunchDescription:
             description='whether the robot waits for the targets of every tick; '
                         'if empty, as the parameters say'),
         DeclareLaunchArgument(
+            'namespace', default_value='',
+            description='namespace of all nodes and topics, /clock and /diagnostics included'),
+        DeclareLaunchArgument(
             'record', default_value='false', choices=['true', 'false'],
             description='whether to record all topics of the suite in a bag'),
+        DeclareLaunchArgument(
+            'bag', default_value='bag', description='folder of that bag; must not exist yet'),
         OpaqueFunction(function=nodes),
     ])
 
 
 def nodes(context: LaunchContext) -> list[Node]:
-    """Make the nodes; an argument that was left empty overrides nothing."""
-    robot = LaunchConfiguration('robot').perform(context)
-    lock_step = LaunchConfiguration('lock_step').perform(context)
-    ticking = {'lock_step': lock_step == 'true'} if lock_step else {}
-    walking = {**ticking, 'robot': robot} if robot else ticking
+    """Make the nodes; an argument that was left empty overrides nothing.
 
-    def node(executable: str, overrides: dict, name: str = '', **options: object) -> Node:
-        parameters = [LaunchConfiguration('parameters'), *([overrides] if overrides else [])]
-        return Node(package=PACKAGE, executable=executable, name=name or executable,
-                    parameters=parameters, output='screen', emulate_tty=True, **options)
+    Files are looked for here already, so that a wrong one is one error and not one of each node.
+    """
+    def given(name: str) -> str:
+        return LaunchConfiguration(name).perform(context)
 
-    return [
-        node('bag_recorder', {}, condition=IfCondition(LaunchConfiguration('record'))),
-        node('reference_filter', ticking),
-        node('canonical_oscillators', walking),
-        *(node('leg_transformation', {**walking, 'leg': leg}, f'leg_{leg}') for leg in LEGS),
-        node('inhibition', walking),
-        node('posture_control', walking),
-        # Without the robot there is nothing to walk: the others end with it.
-        node('mujoco_robot', walking, on_exit=Shutdown()),
-    ]
+    words = given('namespace').strip('/')
+    namespace = f'/{words}' if words else ''
+    robot = {'robot': given('robot')} if given('robot') else {}
+    suite = load_suite(given('parameters') or None, robot, namespace)
+    shared = {name: str(suite.robot_file) for name in robot}
+    if given('lock_step'):
+        shared['lock_step'] = given('lock_step') == 'true'
+    recording = given('record') == 'true'
+    if recording:
+        shared['expected_nodes'] = list(KINDS)
+        if Path(given('bag')).exists():
+            raise FileExistsError(f"'{given('bag')}' exists; name another folder with bag:=FOLDER")
+    described = []
+    for kind, name, own in instances():
+        if kind.name == RECORDER:
+            if not recording:
+                continue
+            parameters = {'output': given('bag')}
+        else:
+            parameters = {**shared, **own}
+        described.append(Node(
+            package='dmp_cpg_ros', executable=kind.name, name=name, namespace=namespace or None,
+            parameters=[str(suite.file), *([parameters] if parameters else [])],
+            remappings=[rule for rule in namespace_rules(namespace) if rule[0] != '__ns'],
+            output='screen', emulate_tty=True,
+            # Without the robot there is nothing to walk: the others end with it.
+            on_exit=Shutdown() if kind.name == ROBOT else None))
+    return described

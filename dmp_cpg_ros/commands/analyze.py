@@ -19,6 +19,7 @@ from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.manifest import build_manifest
 from dmp_cpg_ros.analysis.run import RunResults, write_results
+from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.commands.run_knowledge import picture_taker, run_context
 from dmp_cpg_ros.core.errors import DmpCpgError
 
@@ -105,7 +106,7 @@ def analyze_run(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     logging.basicConfig(format='%(levelname)s: %(message)s', level=logging.WARNING)
-    options = _parser().parse_args(arguments)
+    options, _ = parse_arguments(_parser(), arguments)
     try:
         results = analyze_run(
             options.bag,

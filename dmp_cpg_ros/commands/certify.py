@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.certificates.suggest import Suggestion, suggest_gains
 from dmp_cpg_ros.core.certificates.votes import VotesNeeded, votes_needed
-from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -62,10 +63,17 @@ class Certified:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(_without_ros_arguments(given))
+    options, ros = parse_arguments(_parser(), arguments, parameters=True)
     try:
-        certified = certify_file(options.file, options.gait, options.robot, options.suggest)
+        if options.file and ros.parameters_file:
+            raise ParameterError('give FILE or --params-file, not both')
+        overrides = dict(ros.parameters)
+        if options.gait is not None:
+            overrides['gait'] = options.gait
+        if options.robot is not None:
+            overrides['robot'] = str(find_config(options.robot).resolve())
+        suite = load_suite(options.file or ros.parameters_file, overrides, ros.namespace)
+        certified = certify_suite(suite, options.suggest)
     except DmpCpgError as error:
         print(f'certify: {error}', file=sys.stderr)
         return BAD_INPUT
@@ -78,36 +86,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return HOLDS if certified.certificate.holds else FAILS
 
 
-def certify_file(file: str | None = None, gait: str | None = None, robot: str | None = None,
-                 suggest: bool = False) -> Certified:
-    """Certify a parameter file.
+def certify_suite(suite: Suite, suggest: bool = False) -> Certified:
+    """Certify what a parameter file says.
 
     Parameters
     ----------
-    file : str, optional
-        ROS 2 parameter file; the package's own without.
-    gait, robot : str, optional
-        Gait and robot file to use instead of those that the file names.
+    suite : Suite
+        What it says.
     suggest : bool
         Whether to look for gains that hold.
-
-    Returns
-    -------
-    Certified
 
     Raises
     ------
     DmpCpgError
-        If a file is not there, or a name or value in it is wrong.
+        If the robot's model cannot be read.
     """
     from dmp_cpg_ros.robot.model_reader import load_description
 
-    overrides: dict[str, Any] = {}
-    if gait is not None:
-        overrides['gait'] = gait
-    if robot is not None:
-        overrides['robot'] = str(find_config(robot).resolve())
-    suite = load_suite(file, overrides)
     p = suite.parameters
     network = GaitNetwork(p.canonical, suite.gait, body_scale(load_description(suite.robot_file)))
     running = (network, p.inhibition, p.reference, p.leg, p.posture, suite.tick_ns * 1e-9)
@@ -217,18 +212,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--robot', metavar='FILE', help='robot file instead of the one that the file names')
     add('--json', action='store_true', help='print JSON instead of a table')
     add('--suggest', action='store_true', help='propose coupling and inhibition gains that hold')
-    add('--ros-args', nargs='*', help="accepted as ROS tools add it; 'certify' uses no ROS")
     return parser
-
-
-def _without_ros_arguments(arguments: list[str]) -> list[str]:
-    """Drop --ros-args up to a closing -- or the end; argparse would reject what they hold."""
-    if '--ros-args' not in arguments:
-        return arguments
-    begin = arguments.index('--ros-args')
-    rest = arguments[begin:]
-    after = rest[rest.index('--') + 1:] if '--' in rest else []
-    return [*arguments[:begin], *_without_ros_arguments(after)]
 
 
 if __name__ == '__main__':

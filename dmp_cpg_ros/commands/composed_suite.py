@@ -6,30 +6,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Sequence
+from importlib import import_module
 
-from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.executors import run_nodes
-from dmp_cpg_ros.nodes.inhibition import InhibitionNode
-from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.local_delivery import LocalDelivery
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
-from dmp_cpg_ros.nodes.posture_control import PostureControl
-from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
-from dmp_cpg_ros.nodes.suite_nodes import SUITE_NODES
-
-CLASSES: dict[str, type[ManagedNode]] = {
-    cls.KIND: cls
-    for cls in (
-        ReferenceFilter,
-        CanonicalOscillators,
-        InhibitionNode,
-        PostureControl,
-        LegTransformation,
-        MujocoRobotNode,
-    )
-}
-"""Class of every kind of node."""
+from dmp_cpg_ros.suite_table import WALKING
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -43,11 +25,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if arguments is None else arguments)
 
     def make() -> Iterator[ManagedNode]:
-        local = LocalDelivery(CLASSES)
-        for member in SUITE_NODES:
-            node = CLASSES[member.kind](member.name)
-            node.local = local
-            yield node
+        local = LocalDelivery([kind.name for kind in WALKING])
+        for kind in WALKING:
+            node_class = getattr(import_module(kind.module), kind.class_name)
+            for name in kind.instances:
+                node = node_class(name)
+                node.local = local
+                yield node
 
     return run_nodes('composed_suite', arguments, make)
 

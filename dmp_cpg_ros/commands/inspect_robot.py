@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.inspector import Inspection, inspect_model
@@ -23,7 +24,7 @@ KNEES = {-1: 'backwards', 1: 'forwards'}
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    options = _parser().parse_args(arguments)
+    options, _ = parse_arguments(_parser(), arguments)
     try:
         found = inspect_model(options.model)
         text = robot_yaml(found, None if options.output is None else options.output.parent)

@@ -13,6 +13,7 @@ from time import perf_counter
 import numpy as np
 
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
+from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.learning import discrete as learning_discrete
 from dmp_cpg_ros.core.learning import rhythmic as learning_rhythmic
@@ -43,8 +44,7 @@ examples:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(_without_ros_arguments(given))
+    options, _ = parse_arguments(_parser(), arguments)
     try:
         demonstrations = [_read(path, options) for path in options.demonstrations]
         began = perf_counter()
@@ -143,18 +143,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--stiffness', metavar='K', type=float, help='[1/s^2] (default: suits the duration)')
     add('--damping', metavar='B', type=float, help='[1/s] (default: critical)')
     add('--form', choices=FORMS, default=FORMS[0], help='reading of tau (default: scaled)')
-    add('--ros-args', nargs='*', help="accepted as ROS tools add it; 'learn' uses no ROS")
     return parser
-
-
-def _without_ros_arguments(arguments: list[str]) -> list[str]:
-    """Drop --ros-args up to a closing -- or the end; argparse would reject what they hold."""
-    if '--ros-args' not in arguments:
-        return arguments
-    begin = arguments.index('--ros-args')
-    rest = arguments[begin:]
-    after = rest[rest.index('--') + 1 :] if '--' in rest else []
-    return [*arguments[:begin], *_without_ros_arguments(after)]
 
 
 def _bases(text: str) -> int | str:

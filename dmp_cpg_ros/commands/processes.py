@@ -1,10 +1,16 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A group of child processes: started together, watched, ended together, their output kept."""
+"""A group of child processes: started together, watched, ended together, their output kept.
+
+Run as a program it is the beginning of such a child: ``PARENT MODULE [ARGUMENT ...]`` runs a
+module that is asked to end when its parent has ended, in whatever way.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import os
+import runpy
 import signal
 import subprocess
 import sys
@@ -60,13 +66,13 @@ class ProcessGroup:
 
     def start(self, name: str, module: str, arguments: Sequence[str]) -> None:
         """Run ``python -m module arguments`` in a session of its own, so that Ctrl-C reaches
-        this process only.
+        this process only; it ends with this process.
         """
         # Matrices of a few rows: threads of the algebra library would only contend for the cores.
         environment = {'OPENBLAS_NUM_THREADS': '1', **os.environ, 'PYTHONUNBUFFERED': '1'}
         with (self._logs / f'{name}.log').open('wb') as log:
             self._processes[name] = subprocess.Popen(
-                [sys.executable, '-m', module, *arguments],
+                [sys.executable, '-m', __name__, str(os.getpid()), module, *arguments],
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,
@@ -104,3 +110,21 @@ class ProcessGroup:
                 process.kill()
                 process.wait()
         return killed
+
+
+PR_SET_PDEATHSIG = 1
+"""Of Linux's ``prctl``: which signal a process gets when the thread that started it ends."""
+
+
+def end_with(parent: int) -> None:
+    """Let this process get SIGTERM when its parent ends; at once when it has ended already."""
+    if sys.platform == 'linux':
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+if __name__ == '__main__':
+    end_with(int(sys.argv[1]))
+    del sys.argv[:2]
+    runpy.run_module(sys.argv[0], run_name='__main__', alter_sys=True)

@@ -35,7 +35,7 @@ from dmp_cpg_ros.core.modes.body_requests import REQUESTS
 from dmp_cpg_ros.nodes.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.ros_parameters import plain
-from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
+from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 """Exit statuses: done, refused or nobody there, bad input, Ctrl-C."""
@@ -143,8 +143,8 @@ def parameter(client: SuiteClient, options: argparse.Namespace) -> int:
 def show_nodes(client: SuiteClient, options: argparse.Namespace) -> int:
     """List the nodes of the suite with what they wait for, and the others."""
     client.meet(['inhibition'])
-    clients = {node.name: client.node.create_client(Trigger, f'{node.name}/ready')
-               for node in (*SUITE_NODES, RECORDER)}
+    clients = {name: client.node.create_client(Trigger, f'{name}/ready')
+               for name in (*WALKING_NODES, RECORDER)}
     client.spin_until(lambda: all(each.service_is_ready() for each in clients.values()),
                       options.wait)
     for name, each in clients.items():

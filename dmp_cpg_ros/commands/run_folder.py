@@ -13,9 +13,8 @@ import yaml
 
 from dmp_cpg_ros.configuration import first_free
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
 from dmp_cpg_ros.suite import node_sets
+from dmp_cpg_ros.suite_table import RECORDER, instances
 
 
 def make_run_folder(out: Path | None) -> Path:
@@ -53,7 +52,9 @@ def make_run_folder(out: Path | None) -> Path:
         raise DataError(f'cannot make the folder of the run: {error}') from error
 
 
-def resolved_parameters(file: Path, overrides: dict[str, Any]) -> dict[str, dict[str, Any]]:
+def resolved_parameters(
+    file: Path, overrides: dict[str, Any], namespace: str = ''
+) -> dict[str, dict[str, Any]]:
     """Every parameter of every node of the suite by node name, as it will run.
 
     Parameters
@@ -62,39 +63,43 @@ def resolved_parameters(file: Path, overrides: dict[str, Any]) -> dict[str, dict
         Parameter file.
     overrides : dict
         Values by name that hold for every node that has the parameter.
+    namespace : str
+        Namespace of the nodes.
 
     Returns
     -------
     dict of node name → dict of parameter → value
     """
     resolved: dict[str, dict[str, Any]] = {}
-    for node in SUITE_NODES:
+    for kind, name, own in instances():
+        if kind.name == RECORDER:
+            continue
         values: dict[str, Any] = {}
-        for part in reversed(list(node_sets(file, node.kind, overrides).values())):
+        sets = node_sets(file, kind.name, overrides, namespace, name)
+        for part in reversed(list(sets.values())):
             values.update(
                 {
                     name: list(value) if isinstance(value, tuple) else value
                     for name, value in dataclasses.asdict(part).items()
                 }
             )
-        if node.kind == 'leg_transformation':
-            values['leg'] = node.name[-len(LEGS[0]) :]
+        values.update(own)
         values.update(
-            {name: overrides[name] for name in ('lock_step', 'executor') if name in overrides}
+            {key: overrides[key] for key in ('lock_step', 'executor') if key in overrides}
         )
-        resolved[node.name] = values
+        resolved[name] = values
     return resolved
 
 
 def write_parameters(
     folder: Path, resolved: dict[str, dict[str, Any]], recorder: dict[str, Any] | None
 ) -> Path:
-    """Write ``parameters.yaml``, the parameter file that all processes of the run read."""
+    """Write ``parameters.yaml``, which all processes of the run read, in any namespace."""
     nodes = dict(resolved)
     if recorder is not None:
-        nodes[RECORDER.name] = recorder
+        nodes[RECORDER] = recorder
     path = folder / 'parameters.yaml'
-    content = {name: {'ros__parameters': values} for name, values in nodes.items()}
+    content = {f'/**/{name}': {'ros__parameters': values} for name, values in nodes.items()}
     path.write_text(
         '# Parameters of every node of this run.\n' + yaml.safe_dump(content, sort_keys=False),
         encoding='utf-8',

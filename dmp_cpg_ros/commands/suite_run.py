@@ -4,12 +4,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
+import stat
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -17,7 +19,9 @@ from typing import Any
 import rclpy
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from rclpy.context import Context
 from rclpy.executors import Executor
+from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from std_srvs.srv import Trigger
@@ -25,11 +29,13 @@ from std_srvs.srv import Trigger
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
+from dmp_cpg_ros.nodes.claims import AlreadyRunningError, already_running, claim, claimed
 from dmp_cpg_ros.nodes.executors import make_executor
 from dmp_cpg_ros.nodes.lying_down import LyingDown
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
+from dmp_cpg_ros.nodes.readiness import Intervals, ReadinessOfOthers
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
-from dmp_cpg_ros.nodes.suite_nodes import RECORDER, SUITE_NODES
+from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, WALKING_NODES, instances
 
 READY_WITHIN_S = 120.0
 """How long nodes may take to come up and find each other [s]."""
@@ -46,6 +52,15 @@ LYING_WITHIN_S = 60.0
 SETTLED_S = 0.3
 """Time without a new message after which the recording counts as complete [s]."""
 
+LOOK_S = 1.5
+"""How long the graph is searched for nodes of another suite [s]: discovery takes its time."""
+
+FIRST_WORD_S = 3.0
+"""Waiting that is not worth a word [s]."""
+
+ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+"""Signals that end a run in order."""
+
 Say = Callable[[float, str], None]
 
 
@@ -54,7 +69,19 @@ class SuiteError(DmpCpgError):
 
 
 class InterruptedRunError(DmpCpgError):
-    """The user pressed Ctrl-C."""
+    """A signal asked for the end of the run.
+
+    Parameters
+    ----------
+    number : int
+        The signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        """Name the signal, unless it is Ctrl-C."""
+        word = '' if number == signal.SIGINT else f' by {signal.Signals(number).name}'
+        super().__init__(f'interrupted{word}')
+        self.signal = number
 
 
 @dataclass(frozen=True)
@@ -73,6 +100,8 @@ class RunPlan:
         Folder for the output of the processes.
     lock_step, composed : bool
         How to run.
+    ros_arguments : list of str
+        Remapping rules and log levels of all nodes, as after ``--ros-args``.
     """
 
     scenario: Scenario
@@ -81,6 +110,48 @@ class RunPlan:
     logs: Path
     lock_step: bool
     composed: bool
+    ros_arguments: list[str] = field(default_factory=list)
+
+
+@contextmanager
+def alone_in_domain(namespace: str) -> Iterator[None]:
+    """Hold the ROS domain for one suite in a namespace.
+
+    Raises
+    ------
+    AlreadyRunningError
+        If another has it, or nodes of one are in the graph, left over perhaps.
+    """
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    prepare_middleware()
+    context = Context()
+    rclpy.init(context=context, args=[])
+    try:
+        domain = context.get_domain_id()
+        held = claim(f'{namespace}/suite', domain)
+        names = [f'{namespace}/{name}' for name in (*WALKING_NODES, RECORDER)]
+        lookout = Node('lookout', context=context, namespace=namespace)
+        # Claims tell at once of nodes on this machine; the graph, after a while, of all others.
+        others = claimed(names, domain) or _in_graph(lookout, names)
+        lookout.destroy_node()
+    finally:
+        context.try_shutdown()
+    with held:
+        if others:
+            raise AlreadyRunningError(already_running(domain, f'nodes {", ".join(others)}'))
+        yield
+
+
+def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
+    """Those of some nodes that are in the graph, looked for as long as there are none."""
+    deadline = time.monotonic() + LOOK_S
+    found: list[str] = []
+    while not found and time.monotonic() < deadline:
+        time.sleep(SLICE_S)
+        there = {f'{space.rstrip("/")}/{name}'
+                 for name, space in lookout.get_node_names_and_namespaces()}
+        found = [name for name in names if name in there]
+    return found
 
 
 def run_suite(plan: RunPlan, say: Say) -> None:
@@ -100,13 +171,13 @@ def run_suite(plan: RunPlan, say: Say) -> None:
     PlayerError
         If the suite does not take a command.
     InterruptedRunError
-        On Ctrl-C or SIGTERM; everything is shut down cleanly all the same.
+        On Ctrl-C, SIGTERM, SIGHUP or SIGQUIT; everything is shut down cleanly all the same.
     """
     group = ProcessGroup(plan.logs)
     with _interrupt() as interrupted:
-        os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        prepare_middleware()
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(
+            args=['walk', '--ros-args', *plan.ros_arguments],
+            signal_handler_options=SignalHandlerOptions.NO)
         try:
             _start(plan, group)
             player = ScenarioPlayer(plan.scenario, plan.tick_ns, plan.lock_step, say)
@@ -114,9 +185,9 @@ def run_suite(plan: RunPlan, say: Say) -> None:
             executor.add_node(player)
             # In lock-step no time passes that nobody asks for: nothing can fall.
             lying_down = None if plan.lock_step else LyingDown(player, say)
-            watch = _Watch(executor, player, group, interrupted)
+            watch = _Watch(executor, player, group, interrupted, say)
             try:
-                watch.until_ready([node.name for node in SUITE_NODES] + [RECORDER.name])
+                watch.until_ready([*WALKING_NODES, RECORDER])
                 player.begin()
                 watch.until(player.finished, float('inf'))
                 player.finished.result()
@@ -134,13 +205,13 @@ def run_suite(plan: RunPlan, say: Say) -> None:
 
 
 def _start(plan: RunPlan, group: ProcessGroup) -> None:
-    files = ['--ros-args', '--params-file', str(plan.parameters)]
+    files = ['--ros-args', '--params-file', str(plan.parameters), *plan.ros_arguments]
     if plan.composed:
         group.start('composed_suite', 'dmp_cpg_ros.commands.composed_suite', files)
-        group.start(RECORDER.name, RECORDER.module, files)
+        group.start(RECORDER, KINDS[RECORDER].module, files)
         return
-    for node in (RECORDER, *SUITE_NODES):
-        group.start(node.name, node.module, [*files, '-r', f'__node:={node.name}'])
+    for kind, name, _ in instances():
+        group.start(name, kind.module, [*files, '-r', f'__node:={name}'])
 
 
 class _Watch:
@@ -159,19 +230,21 @@ class _Watch:
         player: ScenarioPlayer,
         group: ProcessGroup,
         interrupted: list[int],
+        say: Say,
     ) -> None:
-        self._executor, self._player, self._group, self._interrupted = (
+        self._executor, self._player, self._group, self._interrupted, self._say = (
             executor,
             player,
             group,
             interrupted,
+            say,
         )
         self._transitions = {
-            node.name: player.create_client(ChangeState, f'{node.name}/change_state')
-            for node in (*SUITE_NODES, RECORDER)
+            name: player.create_client(ChangeState, f'{name}/change_state')
+            for name in (*WALKING_NODES, RECORDER)
         }
         self._recording = True
-        self._recorded = player.create_client(Trigger, f'{RECORDER.name}/recorded')
+        self._recorded = player.create_client(Trigger, f'{RECORDER}/recorded')
 
     def until(self, future: Future, patience_s: float) -> bool:
         """Spin until a future is done; returns whether it is."""
@@ -179,7 +252,7 @@ class _Watch:
         while not future.done() and time.monotonic() < deadline:
             self._executor.spin_until_future_complete(future, timeout_sec=SLICE_S)
             if self._interrupted:
-                raise InterruptedRunError('interrupted')
+                raise InterruptedRunError(self._interrupted[0])
             ended = self._group.ended()
             if ended:
                 raise SuiteError('; '.join(map(str, ended)))
@@ -187,21 +260,14 @@ class _Watch:
 
     def until_ready(self, names: list[str]) -> None:
         """Ask every node whether it is active and connected until all say yes."""
-        deadline, waiting = time.monotonic() + READY_WITHIN_S, 'nodes to appear'
-        clients = {name: self._player.create_client(Trigger, f'{name}/ready') for name in names}
-        while clients or not self._player.connected():
+        deadline, tell = time.monotonic() + READY_WITHIN_S, Intervals(FIRST_WORD_S)
+        others = ReadinessOfOthers(self._player, names)
+        while (missing := others.missing()) or not self._player.connected():
+            waiting = '; '.join(missing) or 'topics and services of the player'
             if time.monotonic() > deadline:
                 raise SuiteError(f'not ready within {READY_WITHIN_S:g} s: {waiting}')
-            for name, client in list(clients.items()):
-                answer = self._ask(client, Trigger.Request())
-                if answer is not None and answer.success:
-                    self._player.destroy_client(clients.pop(name))
-                else:
-                    waiting = (
-                        f'{name} does not answer'
-                        if answer is None
-                        else f'{name}: {answer.message}'
-                    )
+            if tell.due():
+                self._say(math.nan, f'waiting for {waiting}')
             self.until(Future(), SLICE_S)
 
     def lay_down(self, lying_down: LyingDown) -> None:
@@ -212,7 +278,7 @@ class _Watch:
         begun = len(interrupted)
         try:
             for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
-                self._change_state(RECORDER.name, transition)
+                self._change_state(RECORDER, transition)
             self._recording = False
             down, deadline = lying_down.begin(), time.monotonic() + LYING_WITHIN_S
             while len(interrupted) == begun and time.monotonic() < deadline:
@@ -227,13 +293,13 @@ class _Watch:
         """Stop the robot, let the recorder take all that was said, deactivate everything."""
         if self._group.ended():
             return
-        *others, robot = SUITE_NODES
+        others = [name for name in WALKING_NODES if name != ROBOT]
         try:
-            self._deactivate(robot.name)
+            self._deactivate(ROBOT)
             if self._recording:
                 self._until_recorded()
-            for node in (*others, RECORDER) if self._recording else others:
-                self._deactivate(node.name)
+            for name in (*others, RECORDER) if self._recording else others:
+                self._deactivate(name)
         except DmpCpgError:
             return
 
@@ -279,15 +345,26 @@ class _Watch:
 
 @contextmanager
 def _interrupt() -> Iterator[list[int]]:
-    """Collect SIGINT and SIGTERM instead of being ended by them."""
+    """Collect signals that ask for the end instead of being ended by them."""
     received: list[int] = []
 
     def note(number: int, frame: FrameType | None) -> None:
         received.append(number)
+        if number == signal.SIGHUP:
+            _leave_terminal()
 
-    former = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    former = {number: signal.signal(number, note) for number in ENDING_SIGNALS}
     try:
         yield received
     finally:
         for number, handler in former.items():
             signal.signal(number, handler)
+
+
+def _leave_terminal() -> None:
+    """Write to nowhere instead of to a terminal that is gone."""
+    for descriptor in (1, 2):
+        if stat.S_ISCHR(os.fstat(descriptor).st_mode):
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, descriptor)
+            os.close(nowhere)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import signal
 import sys
 import time
 from collections.abc import Sequence
@@ -15,8 +16,14 @@ from typing import Any
 
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.commands.analyze import MARKS, analyze_run
+from dmp_cpg_ros.commands.ros_arguments import (
+    RosArguments,
+    checked_namespace,
+    parse_arguments,
+    read_parameter,
+)
 from dmp_cpg_ros.commands.run_folder import make_run_folder, resolved_parameters, write_parameters
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import config_folders, find_config, load_yaml, unused_sections
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
@@ -24,25 +31,32 @@ from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.suite import Suite, load_suite
+from dmp_cpg_ros.suite_table import KINDS, WALKING, namespace_rules
 
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-"""Exit statuses: a run that ended well, a fall or a dead node, bad input, Ctrl-C."""
+OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 128
+"""Exit statuses: a run that ended well, a fall or a dead node, bad input; plus the number of the
+signal that ended it.
+"""
 
 DEFAULT_SCENARIO = 'scenarios/start_stop.yaml'
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    options = _parser().parse_args(arguments)
-    begin = time.monotonic()
+    options, ros = parse_arguments(_parser(), arguments, parameters=True)
     try:
         scenario = load_scenario(options.scenario)
-        overrides = {**scenario.parameters, **_pairs(options.set)}
+        overrides = {
+            **scenario.parameters, **ros.parameters, **dict(map(read_parameter, options.set))}
+        ros.namespace = checked_namespace(options.namespace or ros.namespace)
+        if options.parameters and ros.parameters_file:
+            raise ParameterError('give --parameters or --params-file, not both')
         if options.robot is not None:
             overrides['robot'] = str(find_config(options.robot).resolve())
         if options.rate is not None:
             overrides['control_rate'] = options.rate
-        suite = load_suite(options.parameters, overrides)
+        file = options.parameters or ros.parameters_file
+        suite = load_suite(file, overrides, ros.namespace)
         if suite.robot.physics != 'mujoco' and any(e.kind == 'push' for e in scenario.events):
             raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')
         _check_votes(scenario, suite)
@@ -54,10 +68,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
             )
         if options.video:
             film_path(options.video, Path())
-        folder = make_run_folder(options.out)
+        for section in unused_sections(suite.file, ros.namespace, KINDS):
+            print(f"walk: '{suite.file}': section '{section}' means no node in namespace "
+                  f"'{ros.namespace or '/'}'; '/**/{section.rpartition('/')[2]}' would",
+                  file=sys.stderr)
+        from dmp_cpg_ros.commands.suite_run import alone_in_domain
+
+        with alone_in_domain(ros.namespace):
+            return _walk(scenario, suite, certificate, overrides, options, ros)
     except DmpCpgError as error:
         print(f'walk: {error}', file=sys.stderr)
         return BAD_INPUT
+
+
+def _walk(
+    scenario: Scenario,
+    suite: Suite,
+    certificate: Certificate,
+    overrides: dict[str, Any],
+    options: argparse.Namespace,
+    ros: RosArguments,
+) -> int:
+    """Run, record and report; returns the exit status."""
+    begin = time.monotonic()
+    folder = make_run_folder(options.out)
     print(
         f'{scenario.name}: {scenario.duration_s:g} s, {suite.gait.name}, '
         f'{"lock-step" if options.lock_step else "real time"}, '
@@ -70,19 +104,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         f'at rest at most {certificate.time_to_rest:.3f} s after a request',
         flush=True,
     )
-    status = _run(scenario, suite, overrides, folder, options)
+    status = _run(scenario, suite, overrides, folder, options, ros)
     recorded = (folder / 'bag').is_dir()
     try:
-        if recorded and status == INTERRUPTED:
+        if recorded and status > INTERRUPTED:
             print('walk: making the report, which a second Ctrl-C skips', file=sys.stderr)
         if recorded:
-            found = _analyze(scenario, suite, certificate, overrides, folder, options)
+            found = _analyze(scenario, suite, certificate, overrides, folder, options, ros)
             status = max(status, found)
         if recorded and options.video is not None:
             _film(folder, film_path(options.video, folder))
     except KeyboardInterrupt:
         print(f'walk: report skipped; make it with: analyze {folder}', file=sys.stderr)
-        status = INTERRUPTED
+        status = INTERRUPTED + signal.SIGINT
     print(f'{folder.name}: {time.monotonic() - begin:.0f} s in all')
     return status
 
@@ -113,43 +147,39 @@ def _run(
     overrides: dict[str, Any],
     folder: Path,
     options: argparse.Namespace,
+    ros: RosArguments,
 ) -> int:
     """Bring the suite up, play, bring it down; returns the exit status."""
     from dmp_cpg_ros.commands.suite_run import InterruptedRunError, RunPlan, run_suite
 
     shared = {**overrides, 'lock_step': options.lock_step, 'gated': True}
     resolved = resolved_parameters(
-        suite.file, {name: value for name, value in shared.items() if name != 'lock_step'}
+        suite.file, {name: value for name, value in shared.items() if name != 'lock_step'},
+        ros.namespace,
     )
     for values in resolved.values():
         values['lock_step'] = options.lock_step
-        values['expected_nodes'] = [*KINDS, 'bag_recorder']
+        values['expected_nodes'] = list(KINDS)
     parameters = write_parameters(
-        folder, resolved, {'output': str(folder / 'bag'), 'expected_nodes': list(KINDS)}
+        folder,
+        resolved,
+        {'output': str(folder / 'bag'), 'expected_nodes': [kind.name for kind in WALKING]},
     )
+    rules = [*ros.remappings, *namespace_rules(ros.namespace)]
+    remapped = [word for name, to in rules for word in ('-r', f'{name}:={to}')]
     plan = RunPlan(
-        scenario, suite.tick_ns, parameters, folder / 'logs', options.lock_step, options.composed
+        scenario, suite.tick_ns, parameters, folder / 'logs', options.lock_step, options.composed,
+        [*ros.others, *remapped],
     )
     try:
         run_suite(plan, _say)
         return OK
-    except InterruptedRunError:
-        print('walk: interrupted; the recording up to here is complete', file=sys.stderr)
-        return INTERRUPTED
+    except InterruptedRunError as error:
+        print(f'walk: {error}; the recording up to here is complete', file=sys.stderr)
+        return INTERRUPTED + error.signal
     except DmpCpgError as error:
         print(f'walk: {error}; see {folder / "logs"}', file=sys.stderr)
         return FAILED
-
-
-KINDS = (
-    'reference_filter',
-    'canonical_oscillators',
-    'leg_transformation',
-    'inhibition',
-    'posture_control',
-    'mujoco_robot',
-)
-"""Kinds of nodes that a run has besides its recorder."""
 
 
 def _analyze(
@@ -159,13 +189,14 @@ def _analyze(
     overrides: dict[str, Any],
     folder: Path,
     options: argparse.Namespace,
+    ros: RosArguments,
 ) -> int:
     """Write the run's folder and print what it says; returns the exit status."""
     try:
         results = analyze_run(
             folder,
             robot_file=suite.robot_file,
-            parameters=resolved_parameters(suite.file, overrides),
+            parameters=resolved_parameters(suite.file, overrides, ros.namespace),
             seeds={'robot': suite.robot.seed},
             lock_step=options.lock_step,
             report=not options.no_report,
@@ -224,17 +255,10 @@ def _say(time_s: float, text: str) -> None:
     print(f'{stamp}  {text}', flush=True)
 
 
-def _pairs(texts: Sequence[str]) -> dict[str, Any]:
-    """Values given as ``NAME:=VALUE``, as ROS does."""
-    import yaml
-
-    pairs = {}
-    for text in texts:
-        name, separator, value = text.partition(':=')
-        if not separator or not name:
-            raise ParameterError(f"'{text}' must be NAME:=VALUE, such as gait:=trot")
-        pairs[name] = yaml.safe_load(value)
-    return pairs
+def scenario_names() -> list[str]:
+    """Names of the scenarios of the package."""
+    return sorted({path.stem for folder in config_folders()
+                   for path in (folder / 'scenarios').glob('*.yaml')})
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -242,7 +266,8 @@ def _parser() -> argparse.ArgumentParser:
         prog='walk',
         description='Bring the suite up, play a scenario, record, report, shut everything down.',
         epilog='Exit status: 0 when all went well, 1 when the robot fell or a node died, 2 for '
-        'bad input, 130 for Ctrl-C.',
+        'bad input or where a suite is running already, 130 for Ctrl-C. '
+        f'Scenarios: {", ".join(scenario_names())}.',
     )
     parser.add_argument(
         'scenario',
@@ -270,6 +295,12 @@ def _parser() -> argparse.ArgumentParser:
         action='append',
         default=[],
         help='parameter of every node that has it; may be repeated',
+    )
+    parser.add_argument(
+        '--namespace',
+        metavar='NS',
+        default='',
+        help='namespace of all nodes and topics, /clock and /diagnostics included',
     )
     parser.add_argument('--rate', metavar='HZ', type=float, help='control rate (default: 250)')
     parser.add_argument(

@@ -1,9 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which node has which parameters; each is described in the file of the part that it belongs to.
+"""Parameters of the suite's nodes; each is described in the file of the part that it belongs to.
 
-A node that predicts or certifies another part declares that part's set too. In a parameter file
-such shared values stand once, under ``/**``.
+Which node has which is said by :mod:`dmp_cpg_ros.suite_table`.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from dataclasses import dataclass, field
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters, VotingSwitch
+from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
@@ -21,7 +20,6 @@ from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
@@ -184,35 +182,10 @@ CERTIFIED: tuple[type[Parameters], ...] = (
 them.
 """
 
-NODE_PARAMETERS: dict[str, tuple[type[Parameters], ...]] = {
-    'reference_filter': (*CERTIFIED, CommandParameters, CertificateParameters),
-    'canonical_oscillators': (*CERTIFIED, CertificateParameters),
-    'leg_transformation': (LegChoice, LegParameters, GaitParameters, RobotFileParameters),
-    'inhibition': (
-        *CERTIFIED,
-        CommandParameters,
-        CertificateParameters,
-        VoteSourceParameters,
-    ),
-    'posture_control': (
-        PostureParameters,
-        ModeParameters,
-        EstimationParameters,
-        StateSourceParameters,
-        GaitParameters,
-        RobotFileParameters,
-    ),
-    'mujoco_robot': (
-        RobotParameters,
-        SensorParameters,
-        WorldParameters,
-        StateSourceParameters,
-        TickParameters,
-        RobotFileParameters,
-        VotingSwitch,
-    ),
-}
-"""Parameter sets of every kind of node that has a part of the core in it."""
+REFERENCE, CANONICAL, INHIBITION = 'reference_filter', 'canonical_oscillators', 'inhibition'
+"""Nodes that own parameters which may change; the table of all nodes is
+:mod:`dmp_cpg_ros.suite_table`.
+"""
 
 UNCERTIFIED_VOTES = ('vote_fade', 'vote_resume')
 """Parameters of the counting of votes that no inequality depends on."""
@@ -227,7 +200,7 @@ VOTE_SOURCES = (
 """Parameters that may change and that the inhibition alone has."""
 
 CHANGEABLE: dict[str, tuple[str, ...]] = {
-    'reference_filter': (
+    REFERENCE: (
         'alpha_r',
         'max_speed',
         'max_lateral_speed',
@@ -235,7 +208,7 @@ CHANGEABLE: dict[str, tuple[str, ...]] = {
         'max_curve',
         'cmd_vel_timeout',
     ),
-    'canonical_oscillators': (
+    CANONICAL: (
         'rho',
         'coupling_gain',
         'coupling_graph',
@@ -247,7 +220,7 @@ CHANGEABLE: dict[str, tuple[str, ...]] = {
         'auto_speeds',
         'auto_hysteresis',
     ),
-    'inhibition': (
+    INHIBITION: (
         'inhibition_gain',
         'region_radius',
         'inhibited_legs',

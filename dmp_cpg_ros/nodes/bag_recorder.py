@@ -23,6 +23,7 @@ from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.interfaces import RECORDED, STAMPED_CMD_VEL, Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.tick_inputs import drain
+from dmp_cpg_ros.suite_table import RECORDER
 
 ALL = 'all'
 
@@ -56,7 +57,7 @@ class BagRecorder(ManagedNode):
     it is cleaned up or its process ends; a killed recorder leaves a bag that `analyze` can rescue.
     """
 
-    KIND = 'bag_recorder'
+    KIND = RECORDER
     PARAMETER_SETS = (RecorderParameters,)
     ENDS_WITH = (RecordingError,)
 

@@ -31,7 +31,7 @@ from dmp_cpg_ros.core.loop import initial_canonical_state
 from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
-    NODE_PARAMETERS,
+    CANONICAL,
     CertificateParameters,
     GaitParameters,
 )
@@ -45,6 +45,7 @@ from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.parameterized_node import Sets
 from dmp_cpg_ros.nodes.robot_state_messages import FootContactsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.suite_table import KINDS
 
 Array = NDArray[np.float64]
 
@@ -52,8 +53,8 @@ Array = NDArray[np.float64]
 class CanonicalOscillators(CertifiedNode):
     """Advances the four coupled oscillators with the robot's clock."""
 
-    KIND = 'canonical_oscillators'
-    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    KIND = CANONICAL
+    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
 
     def configure(self) -> None:
         """Build the network at its initial state and its topics."""

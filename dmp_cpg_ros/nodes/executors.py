@@ -26,6 +26,7 @@ from rclpy.task import Future
 from rclpy.utilities import get_default_context, remove_ros_args
 
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
+from dmp_cpg_ros.nodes.claims import claim_node
 from dmp_cpg_ros.nodes.help_text import help_text
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
@@ -169,11 +170,13 @@ def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[Man
     prepare_middleware()
     rclpy.init(args=[program, *arguments], signal_handler_options=SignalHandlerOptions.NO)
     nodes.extend(make())
+    claims = [claim_node(node) for node in nodes]
     for node in nodes:
         node.start()
     parameters = nodes[0].parameters_of(NodeParameters)
     schedule(parameters.scheduling)
     spin(nodes, parameters.executor, until)
+    del claims
 
 
 def _status(program: str, body: Callable[[], object]) -> int:

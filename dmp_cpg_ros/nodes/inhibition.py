@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
-    NODE_PARAMETERS,
+    INHIBITION,
     VOTE_SOURCES,
     TickParameters,
 )
@@ -32,6 +32,7 @@ from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
 from dmp_cpg_ros.nodes.inhibition_votes import NodeVotes
 from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.suite_table import KINDS
 
 
 class InhibitionNode(CertifiedNode):
@@ -39,8 +40,8 @@ class InhibitionNode(CertifiedNode):
     is.
     """
 
-    KIND = 'inhibition'
-    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    KIND = INHIBITION
+    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
     CHANGEABLE = (*CertifiedNode.CHANGEABLE, *VOTE_SOURCES)
 
     def configure(self) -> None:

@@ -29,6 +29,16 @@ from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE, GROUND_TRUTH
+from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION, REFERENCE
+from dmp_cpg_ros.suite_table import (
+    CLOCK_TOPIC,
+    DIAGNOSTICS_TOPIC,
+    KINDS,
+    LEG,
+    POSTURE,
+    RECORDER,
+    ROBOT,
+)
 
 PUBLISHER_DEPTH = 2000
 """Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the
@@ -40,14 +50,7 @@ READER_DEPTH = 10
 RECORDER_DEPTH = 8000
 """Messages per topic that the recorder queues."""
 
-INSTANCES = {'leg_transformation': 4}
-"""How many nodes of a kind make up the suite, where it is not one."""
-
-SUITE = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition',
-         'posture_control', 'mujoco_robot', 'bag_recorder')
-"""Kinds of nodes in the order of the data flow."""
-
-GATE_OWNER = 'mujoco_robot'
+GATE_OWNER = ROBOT
 """The node that holds the gate; its private topics bear its name."""
 
 
@@ -122,61 +125,59 @@ class Interface:
 
 def expected_count(kinds: tuple[str, ...] | list[str]) -> int:
     """Number of nodes that some kinds of nodes stand for."""
-    return sum(INSTANCES.get(kind, 1) for kind in kinds)
+    return sum(len(KINDS[kind].instances) for kind in kinds if kind in KINDS)
 
-
-_REFERENCE, _CANONICAL, _LEG, _INHIBITION, _POSTURE, _ROBOT, _RECORDER = SUITE
 
 TOPICS: tuple[Interface, ...] = (
     Interface('cmd_vel', Twist,
               'commanded speed and turn rate (TwistStamped with stamped_cmd_vel)',
-              ('user',), (_REFERENCE, _INHIBITION),
+              ('user',), (REFERENCE, INHIBITION),
               other_type='; with stamped_cmd_vel:=true it reads TwistStamped'),
     Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z',
-              (_REFERENCE,), (_CANONICAL, _LEG, _INHIBITION, _POSTURE)),
+              (REFERENCE,), (CANONICAL, LEG, INHIBITION, POSTURE)),
     Interface('canonical_state', JointState, 'oscillators: position = x, velocity = its rate',
-              (_CANONICAL,), (_LEG, _INHIBITION, _POSTURE)),
+              (CANONICAL,), (LEG, INHIBITION, POSTURE)),
     Interface('posture_feedback', JointState,
               'balance: torques, measured angles, shift, drift and forces of the feet',
-              (_POSTURE,), (_LEG,)),
+              (POSTURE,), (LEG,)),
     Interface('joint_targets', JointState, 'targets of the three joints of one leg',
-              (_LEG,), (_ROBOT,)),
+              (LEG,), (ROBOT,)),
     Interface('joint_states', JointState, 'measured joints; the tick of the suite',
-              (_ROBOT,), (_REFERENCE, _LEG, _POSTURE), sometimes=(_LEG,)),
+              (ROBOT,), (REFERENCE, LEG, POSTURE), sometimes=(LEG,)),
     Interface('votes', JointState,
               'votes for a stop: names = legs, effort or position = weights, frame_id = voter',
-              ('user',), (_INHIBITION,), sometimes=(_INHIBITION,)),
+              ('user',), (INHIBITION,), sometimes=(INHIBITION,)),
     Interface('push', WrenchStamped,
               'force on the base from its stamp on, for 0.1 s unless the next one comes before; '
               'frame base_footprint (along the heading) or odom',
-              ('user',), (_ROBOT,)),
+              ('user',), (ROBOT,)),
     Interface('imu', Imu, 'turn rate and specific force in base_link; no orientation',
-              (_ROBOT,), (_POSTURE, _INHIBITION), sometimes=(_POSTURE, _INHIBITION)),
+              (ROBOT,), (POSTURE, INHIBITION), sometimes=(POSTURE, INHIBITION)),
     Interface('odom', Odometry, "true pose and twist of base_link in odom, the simulator's",
-              (_ROBOT,), (_POSTURE,), sometimes=(_POSTURE,)),
+              (ROBOT,), (POSTURE,), sometimes=(POSTURE,)),
     Interface('foot_contacts', JointState, 'effort = normal force of each foot',
-              (_ROBOT,), (_CANONICAL, _LEG, _INHIBITION, _POSTURE),
-              sometimes=(_CANONICAL, _LEG, _INHIBITION, _POSTURE)),
+              (ROBOT,), (CANONICAL, LEG, INHIBITION, POSTURE),
+              sometimes=(CANONICAL, LEG, INHIBITION, POSTURE)),
     Interface('joint_work', JointState,
               'position = positive work of each joint since time 0 [J], effort = largest torque '
               'since the last message [N m], over every physics step; at every tenth tick',
-              (_ROBOT,), (), sometimes=(_ROBOT,)),
+              (ROBOT,), (), sometimes=(ROBOT,)),
     Interface('estimated_odom', Odometry,
               "estimated pose and twist of base_link, at the parameter's rate",
-              (_POSTURE,), (), sometimes=(_POSTURE,)),
-    Interface('/clock', Clock, 'the clock of the robot', (_ROBOT,), ()),
+              (POSTURE,), (), sometimes=(POSTURE,)),
+    Interface(CLOCK_TOPIC, Clock, 'the clock of the robot', (ROBOT,), ()),
     Interface('inhibition_state', DiagnosticArray,
               'stop and start: state word, gains, times',
-              (_INHIBITION,), (_REFERENCE, _CANONICAL), latched=True),
+              (INHIBITION,), (REFERENCE, CANONICAL), latched=True),
     Interface('body_mode', DiagnosticArray,
               'standing, lying, moving between the two, or fallen; with the reason',
-              (_POSTURE,), (_INHIBITION, _ROBOT), latched=True),
-    Interface('/diagnostics', DiagnosticArray, 'health of every node', SUITE, ()),
+              (POSTURE,), (INHIBITION, ROBOT), latched=True),
+    Interface(DIAGNOSTICS_TOPIC, DiagnosticArray, 'health of every node', tuple(KINDS), ()),
     Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds',
-              (_ROBOT,), ('user',), latched=True, sometimes=(_ROBOT,), recorded=False),
+              (ROBOT,), ('user',), latched=True, sometimes=(ROBOT,), recorded=False),
     Interface(f'{GATE_OWNER}/advance_until', Clock,
-              'stamp up to which the gate lets ticks pass', ('user',), (_ROBOT,),
-              sometimes=(_ROBOT,), recorded=False),
+              'stamp up to which the gate lets ticks pass', ('user',), (ROBOT,),
+              sometimes=(ROBOT,), recorded=False),
 )
 """Topics of the suite."""
 
@@ -185,21 +186,21 @@ RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 
 SERVICES: tuple[Interface, ...] = (
     Interface('inhibit', SetBool, 'true stops the gait, false resumes it',
-              (_INHIBITION,), ('user',), service=True),
+              (INHIBITION,), ('user',), service=True),
     Interface('stand_up', Trigger, 'stand up from wherever it lies or sinks',
-              (_POSTURE,), ('user',), service=True),
+              (POSTURE,), ('user',), service=True),
     Interface('lie_down', Trigger, 'stop the gait and lie down on the belly',
-              (_POSTURE,), ('user',), service=True),
+              (POSTURE,), ('user',), service=True),
     Interface('recover', Trigger, 'after a fall: roll over and stand up',
-              (_POSTURE,), ('user',), service=True),
+              (POSTURE,), ('user',), service=True),
     Interface('~/ready', Trigger,
               'whether the node is active and connected with its neighbours',
-              SUITE, ('user',), service=True),
+              tuple(KINDS), ('user',), service=True),
     Interface('~/commands_taken', Trigger,
               'how many messages on cmd_vel, push and votes the node has taken',
-              (_REFERENCE, _INHIBITION, _ROBOT), ('user',), service=True),
+              (REFERENCE, INHIBITION, ROBOT), ('user',), service=True),
     Interface('~/recorded', Trigger, 'how many messages of each topic are in the bag, as JSON',
-              (_RECORDER,), ('user',), service=True),
+              (RECORDER,), ('user',), service=True),
 )
 """Services of the suite."""
 
@@ -231,7 +232,7 @@ def published_by(kind: str) -> tuple[Interface, ...]:
 
 def read_by(kind: str) -> tuple[Interface, ...]:
     """Topics that a kind of node reads."""
-    if kind == 'bag_recorder':
+    if kind == RECORDER:
         return RECORDED
     return tuple(topic for topic in TOPICS if kind in topic.subscribers)
 
@@ -243,9 +244,9 @@ def served_by(kind: str) -> tuple[Interface, ...]:
 
 def partners(topic: Interface, *, readers: bool) -> tuple[str, ...]:
     """Kinds of nodes that always read (the recorder included) or always write a topic."""
-    recorder = ('bag_recorder',) if topic.recorded else ()
+    recorder = (RECORDER,) if topic.recorded else ()
     kinds = (*topic.subscribers, *recorder) if readers else topic.publishers
-    return tuple(kind for kind in kinds if kind in SUITE and kind not in topic.sometimes)
+    return tuple(kind for kind in kinds if kind in KINDS and kind not in topic.sometimes)
 
 
 STAMPED_CMD_VEL = replace(

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +12,7 @@ from dmp_cpg_ros.core.modes.body_command import BodyCommand
 from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
 from dmp_cpg_ros.core.modes.movements import Movements
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, LegChoice
+from dmp_cpg_ros.core.suite_parameters import LegChoice
 from dmp_cpg_ros.core.transformation.joint_system import TransformationState
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive
 from dmp_cpg_ros.nodes.conversions import (
@@ -28,22 +27,22 @@ from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import Array, frame_of, header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.suite_table import KINDS, LEG
 
 
 class LegTransformation(ManagedNode):
     """Turns a leg's oscillator state and the reference into targets of its joints."""
 
-    KIND = 'leg_transformation'
-    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    KIND = LEG
+    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
     CHANGEABLE = ('gait',)
 
     @classmethod
     def default_name(cls, arguments: Sequence[str]) -> str:
         """Name the node after its leg, which the command line gives as ``-p leg:=fl``."""
-        for argument in arguments:
-            found = re.fullmatch(r'leg:=([a-z]+)', argument)
-            if found and found[1] in LEGS:
-                return f'{cls.KIND}_{found[1]}'
+        for name, own in KINDS[LEG].instances.items():
+            if any(f'{key}:={value}' in arguments for key, value in own.items()):
+                return name
         return cls.KIND
 
     def configure(self) -> None:

@@ -25,7 +25,8 @@ from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
 from dmp_cpg_ros.core.suite_parameters import (
-    NODE_PARAMETERS,
+    CANONICAL,
+    INHIBITION,
     RobotFileParameters,
     RobotParameters,
     TickParameters,
@@ -37,15 +38,17 @@ from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.interfaces import BODY_TOPICS, Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.readiness import Intervals, ReadinessOfOthers
 from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
 from dmp_cpg_ros.nodes.robot_timing import RobotTiming
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters, NodeParameters
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
 from dmp_cpg_ros.robot.refuge import Refuge
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.target_guard import TargetGuard
+from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT
 
 INCIDENT_NS = 1_000_000_000
 """Time that all legs must have been heard for until their silence counts as over [ns]."""
@@ -78,8 +81,8 @@ RETREATS = {
 class MujocoRobotNode(ManagedNode):
     """Publishes the robot's state at every control tick and moves its joints to their targets."""
 
-    KIND = 'mujoco_robot'
-    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    KIND = ROBOT
+    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
 
     def configure(self) -> None:
         """Stand the robot up and create its topics."""
@@ -118,6 +121,11 @@ class MujocoRobotNode(ManagedNode):
         if self._options.gated:
             self._hold()
         elif self._lock_step:
+            self._waiting = Intervals()
+            expected = self.parameters_of(NodeParameters).expected_nodes
+            self._others = ReadinessOfOthers(
+                self, [name for kind in expected if kind != self.KIND
+                       for name in KINDS[kind].instances])
             self._timer = self.create_timer(
                 READY_PERIOD_S,
                 self._start_when_connected,
@@ -144,13 +152,13 @@ class MujocoRobotNode(ManagedNode):
         if self.local is not None:
             return readers
         if topic.name == 'joint_states' and self._options.reading == 'torque':
-            readers = (*readers, 'leg_transformation')
+            readers = (*readers, LEG)
         if topic.name in BODY_TOPICS[self.parameters_of(StateSourceParameters).state_source]:
-            readers = (*readers, 'posture_control')
+            readers = (*readers, POSTURE)
         if topic.name in VOTING_TOPICS and self.parameters_of(VotingSwitch).voting:
-            readers = (*readers, 'inhibition')
+            readers = (*readers, INHIBITION)
         if topic.name == 'foot_contacts' and self._options.contact_feedback:
-            readers = (*readers, 'canonical_oscillators')
+            readers = (*readers, CANONICAL)
         return readers
 
     def diagnostic_values(self) -> Mapping[str, Any]:
@@ -265,9 +273,13 @@ class MujocoRobotNode(ManagedNode):
     # Lock-step -----------------------------------------------------------------------------------
 
     def _start_when_connected(self) -> None:
-        if not self.missing():
+        # A tick that one of the others loses would be waited for for ever.
+        missing = self.missing() + self._others.missing()
+        if not missing:
             self.deactivate()
             self._publish_state()
+        elif self._waiting.due():
+            self.get_logger().info(f'waiting for {"; ".join(missing)}')
 
     def _hold(self) -> None:
         """Publish the state, or wait at the gate until it may be published."""

@@ -14,7 +14,6 @@ from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.modes.body_requests import REQUESTS
 from dmp_cpg_ros.core.robot_model.legs import RobotLegs
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.body_mode_messages import BodyModeWriter
 from dmp_cpg_ros.nodes.body_state import BodyState
@@ -28,6 +27,7 @@ from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, gait_reade
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.suite_table import KINDS, POSTURE
 
 
 class PostureControl(ManagedNode):
@@ -36,8 +36,8 @@ class PostureControl(ManagedNode):
     Decides its mode, too: stands it up, lays it down, notices a fall, brings it back.
     """
 
-    KIND = 'posture_control'
-    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    KIND = POSTURE
+    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
     # The rate of the swings' activity is the legs' too, and the certificate's.
     CHANGEABLE = tuple(name for cls in (PostureParameters, EstimationParameters)
                        for name in cls.__dataclass_fields__

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
+from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import ReferenceWriter
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.suite_table import KINDS
 
 
 class ReferenceFilter(CertifiedNode):
@@ -25,8 +26,8 @@ class ReferenceFilter(CertifiedNode):
     requested.
     """
 
-    KIND = 'reference_filter'
-    PARAMETER_SETS = (*NODE_PARAMETERS[KIND], LockStepParameters)
+    KIND = REFERENCE
+    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
 
     def configure(self) -> None:
         """Build the filter and its topics."""

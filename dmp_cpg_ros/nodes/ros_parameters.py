@@ -13,15 +13,15 @@ from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.nodes.interfaces import SUITE
 from dmp_cpg_ros.nodes.scheduling import BATCH, POLICIES
+from dmp_cpg_ros.suite_table import KINDS, WALKING
 
 P = TypeVar('P', bound=Parameters)
 
@@ -41,7 +41,8 @@ class NodeParameters(Parameters):
         BATCH, 'policy of the Linux scheduler; batch keeps a reader from interrupting its writer',
         choices=POLICIES)
     expected_nodes: tuple[str, ...] = parameter(
-        SUITE[:-1], 'kinds of nodes that must be connected before ~/ready says yes', choices=SUITE)
+        tuple(kind.name for kind in WALKING),
+        'kinds of nodes that must be connected before ~/ready says yes', choices=tuple(KINDS))
 
 
 @dataclass(frozen=True)
@@ -195,8 +196,7 @@ def shared_names(arguments: Iterable[str]) -> set[str]:
     arguments = list(arguments)
     for flag, path in zip(arguments, arguments[1:], strict=False):
         if flag == '--params-file' and Path(path).is_file():
-            content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
-            section = content.get('/**') if isinstance(content, dict) else None
+            section = load_yaml(path).get('/**')
             values = section.get('ros__parameters') if isinstance(section, dict) else None
             names |= set(_flat_names(values)) if isinstance(values, dict) else set()
     return names

@@ -31,9 +31,6 @@ FAR_NS = 2**31 * 10**9 - 1
 """A stamp later than every run [ns]."""
 
 
-GAIT_OWNER = 'canonical_oscillators'
-"""The node whose parameter ``gait`` changes the gait."""
-
 LEAD_NS = 40_000_000
 """In real time a push is stamped so much later than the clock that its message is in time [ns]."""
 

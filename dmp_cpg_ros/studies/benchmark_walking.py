@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.studies import benchmark_contacts, benchmark_tables
 
@@ -32,7 +33,7 @@ TABLES = ('speeds', 'pushes', 'rough', 'contacts', 'gaits', 'robots')
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark and print its tables; returns the exit status."""
-    options = _parser().parse_args(arguments)
+    options, _ = parse_arguments(_parser(), arguments)
     results: dict[str, Any] = {}
     with Pool(options.jobs) as pool:
         for name in options.tables:

@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -65,7 +66,7 @@ class Recovery:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study and print its table; returns the exit status."""
-    options = _parser().parse_args(arguments)
+    options, _ = parse_arguments(_parser(), arguments)
     rows, outcomes, fine = [], {}, []
     try:
         with Pool(options.jobs) as pool:

@@ -22,6 +22,7 @@ from pathlib import Path
 
 from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, summary
 from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
@@ -41,7 +42,7 @@ COLUMNS = ('gait', 'm/s', 'leg', 'cadence', 'stopped by', 'cases', 'fell', 'stoo
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study and print its table; returns the exit status."""
-    options = _parser().parse_args(arguments)
+    options, _ = parse_arguments(_parser(), arguments)
     try:
         cases = cases_of(options)
         suite = suite_of(options.file, cases[0].leg)

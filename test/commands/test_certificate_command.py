@@ -35,7 +35,7 @@ def test_the_packages_own_parameters_hold(capsys: pytest.CaptureFixture[str]) ->
 
 @pytest.mark.parametrize('gait', ['walk', 'trot', 'pace', 'bound', 'pronk'])
 def test_every_gait_can_be_certified(gait: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(['--gait', gait, '--ros-args', '-p', 'a:=1']) == 0
+    assert main(['--ros-args', '-p', f'gait:={gait}']) == 0
     assert f': {gait} at up to' in capsys.readouterr().out
 
 
@@ -62,6 +62,8 @@ def test_json_has_every_inequality_and_the_suggestion(
     (['there_is_none.yaml'], 'does not exist'),
     (['--gait', 'gallop'], 'valid are amble'),
     (['--robot', 'robots/horse.yaml'], 'does not exist'),
+    (['--ros-args', '-p', 'gate:=trot'], "no parameter 'gate'"),
+    (['a.yaml', '--ros-args', '--params-file', 'b.yaml'], 'not both'),
 ])
 def test_bad_input_has_status_2(arguments: list[str], said: str,
                                 capsys: pytest.CaptureFixture[str]) -> None:

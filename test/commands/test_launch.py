@@ -1,18 +1,39 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The launch file starts the suite, as seen by recorders in the place of ROS 2's launch system."""
+"""The launch file starts the suite: its nodes, read by stand-ins for ROS 2's launch system and
+started with the command lines that the real one makes of them, become ready.
+"""
 
 from __future__ import annotations
 
 import importlib.util
 import sys
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import pytest
-from checkout import ROOT, setup_constant
 
-ARGUMENTS = {'parameters': 'suite.yaml', 'robot': '', 'lock_step': '', 'record': 'false'}
+pytest.importorskip('rclpy')
+
+import ros_processes
+import yaml
+from checkout import ROOT
+from ros_processes import Processes, Ros
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+
+from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, WALKING_NODES
+
+processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
+
+ARGUMENTS = {'parameters': '', 'robot': '', 'lock_step': '', 'namespace': '', 'record': 'false',
+             'bag': 'bag'}
+
+UP_S = 90.0
+"""How long nine processes may take to start and to find each other on a loaded machine [s]."""
 
 
 class Recorded(SimpleNamespace):
@@ -25,15 +46,14 @@ class Recorded(SimpleNamespace):
         return context[self.positional[0]]
 
 
+@pytest.fixture
 def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     names = {
         'launch': ['LaunchContext', 'LaunchDescription'],
         'launch.actions': ['DeclareLaunchArgument', 'OpaqueFunction', 'Shutdown'],
-        'launch.conditions': ['IfCondition'],
-        'launch.substitutions': ['LaunchConfiguration', 'PathJoinSubstitution'],
+        'launch.substitutions': ['LaunchConfiguration'],
         'launch_ros': [],
         'launch_ros.actions': ['Node'],
-        'launch_ros.substitutions': ['FindPackageShare'],
     }
     for module, members in names.items():
         stand_in = ModuleType(module)
@@ -48,36 +68,90 @@ def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return module
 
 
-def test_every_node_is_started_once_and_each_leg_has_its_own(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    nodes = launch_file(monkeypatch).nodes(ARGUMENTS)
-    executables = setup_constant('EXECUTABLES')
-    assert isinstance(executables, dict)
-    wanted = {name for name, target in executables.items() if '.nodes.' in target}
-    assert {node.executable for node in nodes} == wanted
-    names = [node.name for node in nodes]
-    assert len(set(names)) == len(names) == len(wanted) + 3
-    for leg in ('fl', 'fr', 'rl', 'rr'):
-        node = nodes[names.index(f'leg_{leg}')]
-        assert node.executable == 'leg_transformation'
-        assert node.parameters[-1] == {'leg': leg}
+def start(processes: Processes, node: Any, folder: Path) -> None:
+    """Start a node with the command line that launch_ros makes of its description."""
+    rules = [('__node', node.name), *([('__ns', node.namespace)] if node.namespace else []),
+             *node.remappings]
+    words = [word for name, to in rules for word in ('-r', f'{name}:={to}')]
+    for number, given in enumerate(node.parameters):
+        if isinstance(given, dict):
+            path = folder / f'{node.name}_{number}.yaml'
+            values = {key: tuple(value) if isinstance(value, list) else value
+                      for key, value in given.items()}
+            content = {f'{node.namespace or ""}/{node.name}': {'ros__parameters': values}}
+            path.write_text(yaml.dump(content), encoding='utf-8')
+            given = path
+        words += ['--params-file', str(given)]
+    processes.node(node.executable, *words)
+
+
+def test_launched_nodes_are_those_of_the_table(launch_file: ModuleType) -> None:
+    described = launch_file.nodes(ARGUMENTS)
+    assert sorted(node.name for node in described) == sorted(WALKING_NODES)
+    recording = launch_file.nodes({**ARGUMENTS, 'record': 'true'})
+    assert {node.name for node in recording} == {*WALKING_NODES, RECORDER}
+    for node in recording:
+        assert node.name in KINDS[node.executable].instances
+    assert recording[-1].name == ROBOT and recording[-1].on_exit is not None
+    sections = {name.rpartition('/')[2] for name in load_yaml(find_config('suite.yaml'))}
+    assert sections - {'**'} <= {*WALKING_NODES, RECORDER}
+
+
+@pytest.mark.parametrize(('lock_step', 'namespace'), [('', ''), ('true', ''), ('true', 'robot1')])
+def test_what_is_launched_becomes_ready_and_ticks(
+        launch_file: ModuleType, processes: Processes, ros: Ros, tmp_path: Path,
+        lock_step: str, namespace: str) -> None:
+    given = {**ARGUMENTS, 'lock_step': lock_step, 'namespace': namespace, 'record': 'true',
+             'bag': str(tmp_path / 'bag')}
+    space = f'/{namespace}' if namespace else ''
+    ticks = ros.collect(Clock, f'{space}/clock')
+    for node in launch_file.nodes(given):
+        start(processes, node, tmp_path)
+    for name in (*WALKING_NODES, RECORDER):
+        answers: list[Any] = []
+
+        def ready(name: str = name, answers: list[Any] = answers) -> bool:
+            answers.append(ros.call(Trigger, f'{space}/{name}/ready', Trigger.Request(), UP_S))
+            return bool(answers[-1].success)
+
+        ros.spin_until(ready, UP_S, what=lambda answers=answers: answers[-1].message)
+    ros.spin_until(lambda: len(ticks) > 2 and ticks[-1] != ticks[0], UP_S)
+    running = {name for name, place in ros.node.get_node_names_and_namespaces()
+               if place == (space or '/')}
+    assert running - {'test'} == {*WALKING_NODES, RECORDER}
+
+
+def test_a_lock_step_robot_says_what_it_waits_for(processes: Processes) -> None:
+    robot = processes.node(ROBOT, lock_step=True)
+    robot.wait_for_output('waiting for .*joint_targets is not published by leg_transformation_fl')
 
 
 def test_arguments_left_empty_override_nothing_and_given_ones_reach_the_nodes(
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    module = launch_file(monkeypatch)
-    quiet = {node.name: node.parameters[1:] for node in module.nodes(ARGUMENTS)}
+        launch_file: ModuleType) -> None:
+    quiet = {node.name: node.parameters[1:] for node in launch_file.nodes(ARGUMENTS)}
     assert quiet['mujoco_robot'] == quiet['reference_filter'] == quiet['inhibition'] == []
-    given = {node.name: node.parameters[1:]
-             for node in module.nodes({**ARGUMENTS, 'robot': 'go2.yaml', 'lock_step': 'true'})}
-    assert given['mujoco_robot'] == [{'lock_step': True, 'robot': 'go2.yaml'}]
-    assert given['reference_filter'] == [{'lock_step': True}]
-    assert given['leg_rr'] == [{'lock_step': True, 'robot': 'go2.yaml', 'leg': 'rr'}]
-    assert given['bag_recorder'] == []
+    given = {node.name: node.parameters[1] for node in launch_file.nodes(
+        {**ARGUMENTS, 'robot': 'robots/mini_quadruped.yaml', 'lock_step': 'true'})}
+    file = str(find_config('robots/mini_quadruped.yaml'))
+    assert given['mujoco_robot'] == {'lock_step': True, 'robot': file}
+    assert given['leg_transformation_rr'] == {'lock_step': True, 'robot': file, 'leg': 'rr'}
 
 
-def test_the_arguments_are_declared(monkeypatch: pytest.MonkeyPatch) -> None:
-    description = launch_file(monkeypatch).generate_launch_description()
+@pytest.mark.parametrize('name', ['parameters', 'robot'])
+def test_a_file_that_is_not_there_is_one_error_before_any_node(
+        launch_file: ModuleType, name: str) -> None:
+    with pytest.raises(DmpCpgError, match=r'nosuch\.yaml'):
+        launch_file.nodes({**ARGUMENTS, name: 'nosuch.yaml'})
+
+
+def test_a_bag_that_exists_is_an_error_before_any_node(
+        launch_file: ModuleType, tmp_path: Path) -> None:
+    with pytest.raises(FileExistsError, match='bag:=FOLDER'):
+        launch_file.nodes({**ARGUMENTS, 'record': 'true', 'bag': str(tmp_path)})
+
+
+def test_the_arguments_are_declared(launch_file: ModuleType) -> None:
+    description = launch_file.generate_launch_description()
     declared = [entity.positional[0] for entity in description.positional[0]
                 if type(entity).__name__ == 'DeclareLaunchArgument']
     assert set(declared) == set(ARGUMENTS)

@@ -30,7 +30,7 @@ from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
 from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
 from dmp_cpg_ros.nodes.interfaces import interface
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
-from dmp_cpg_ros.nodes.suite_nodes import SUITE_NODES
+from dmp_cpg_ros.suite_table import WALKING_NODES
 
 CLIENT = ('-m', 'dmp_cpg_ros.commands.robot_client', '--wait', '20')
 
@@ -144,8 +144,8 @@ def test_a_suite_in_a_namespace_is_found_there_and_elsewhere_named(
 
 def test_all_nodes_are_ready(suite: Processes) -> None:
     lines = dict(line.split(maxsplit=1) for line in said(suite, 'nodes').splitlines())
-    assert {node.name: lines.get(node.name) for node in SUITE_NODES} == {
-        node.name: 'ready' for node in SUITE_NODES}
+    assert {name: lines.get(name) for name in WALKING_NODES} == {
+        name: 'ready' for name in WALKING_NODES}
     assert lines['bag_recorder'] == 'does not run'
 
 

@@ -38,6 +38,7 @@ from ros_processes import NodeProcess, Processes, Ros
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
+from dmp_cpg_ros.configuration import node_parameters
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -49,7 +50,6 @@ from dmp_cpg_ros.nodes.executors import make_executor, spin
 from dmp_cpg_ros.nodes.help_text import help_text
 from dmp_cpg_ros.nodes.interfaces import (
     INTERFACES,
-    SUITE,
     TOPICS,
     expected_count,
     interface,
@@ -60,6 +60,7 @@ from dmp_cpg_ros.nodes.interfaces import (
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters, NodeParameters, ParameterTable
+from dmp_cpg_ros.suite_table import KINDS
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
@@ -202,12 +203,12 @@ def test_every_topic_is_lossless_and_the_latched_ones_are_latched() -> None:
 
 
 def test_every_node_has_its_place_in_the_table() -> None:
-    for kind in SUITE:
+    for kind in tuple(KINDS):
         assert {'/diagnostics'} <= {topic.name for topic in published_by(kind)}
         assert {'~/ready'} <= {service.name for service in served_by(kind)}
         assert read_by(kind)
     for entry in INTERFACES.values():
-        known = {*SUITE, 'user'}
+        known = {*tuple(KINDS), 'user'}
         assert set(entry.publishers) | set(entry.subscribers) <= known
         assert set(entry.sometimes) <= set(entry.publishers) | set(entry.subscribers)
         assert entry.type_name.split('/')[1] == ('srv' if entry.service else 'msg')
@@ -513,6 +514,25 @@ def test_a_node_takes_back_the_parameters_that_it_tells(ros: Ros, started: Relay
                       SetParameters.Request(parameters=[executor]))
     assert not answer.results[0].successful
 
+SECTIONS = ('/**', 'node', '/**/node', '/robot1/node', '/*/node', '/robot1/**', '/other')
+
+
+@pytest.mark.parametrize('namespace', ['', '/robot1', '/a/b'])
+def test_sections_apply_and_override_as_in_ros(
+        namespace: str, ros_domain: int, tmp_path: Path) -> None:
+    for turn in range(len(SECTIONS)):
+        order = SECTIONS[turn:] + SECTIONS[:turn]
+        path = tmp_path / 'sections.yaml'
+        path.write_text('\n'.join(
+            f'{name}: {{ros__parameters: {{a: {number}, own_{number}: 1}}}}'
+            for number, name in enumerate(order)), encoding='utf-8')
+        context = rclpy.context.Context()
+        rclpy.init(context=context, args=['--ros-args', '--params-file', str(path)])
+        node = rclpy.node.Node('node', context=context, namespace=namespace)
+        overrides = {name: value.value for name, value in node._parameter_overrides.items()}
+        context.try_shutdown()
+        assert node_parameters(path, f'{namespace}/node') == overrides, order
+
 
 # Readiness -------------------------------------------------------------------------------------
 
@@ -532,18 +552,17 @@ def test_ready_lists_who_is_missing(ros: Ros) -> None:
     assert not success
     for part in ('joint_states is not published by mujoco_robot',
                  'reference is not read by canonical_oscillators',
-                 'reference is not read by leg_transformation (0 of 4)'):
+                 'reference is not read by leg_transformation_fl'):
         assert part in said
     assert 'posture_control' not in said and 'bag_recorder' not in said
-    legs = (f'leg_transformation_{i}' for i in range(4))
-    names = ('mujoco_robot', 'canonical_oscillators', *legs)
+    names = ('mujoco_robot', 'canonical_oscillators', *KINDS['leg_transformation'].instances)
     others = [rclpy.node.Node(name, context=ros.context) for name in names]
     joints, reference = interface('joint_states'), interface('reference')
     others[0].create_publisher(joints.type, joints.name, joints.publisher_qos)
     for other in others[1:-1]:
         other.create_subscription(reference.type, reference.name, lambda m: None,
                                   reference.reader_qos)
-    almost = 'reference is not read by leg_transformation (3 of 4)'
+    almost = 'reference is not read by leg_transformation_rr'
     ros.spin_until(lambda: ready() == (False, almost), what=lambda: ready()[1])
     others[-1].create_subscription(reference.type, reference.name, lambda m: None,
                                    reference.reader_qos)

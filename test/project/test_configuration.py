@@ -12,7 +12,13 @@ from pathlib import Path
 import pytest
 from checkout import PACKAGE, ROOT
 
-from dmp_cpg_ros.configuration import config_folders, find_config, load_yaml, node_parameters
+from dmp_cpg_ros.configuration import (
+    config_folders,
+    find_config,
+    load_yaml,
+    node_parameters,
+    unused_sections,
+)
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 
 
@@ -41,8 +47,11 @@ def test_the_packages_files_are_found_by_name(name: str, tmp_path: Path,
 def test_a_missing_name_lists_the_places_and_the_names() -> None:
     with pytest.raises(MissingFileError) as error:
         find_config('gates.yaml')
-    for text in ('gates.yaml', str(config_folders()[0]), 'gaits.yaml', 'robots/'):
+    for text in ('gates.yaml', str(config_folders()[0]), 'suite.yaml', 'did you mean gaits?'):
         assert text in str(error.value)
+    with pytest.raises(MissingFileError, match='did you mean scenarios/start_stop') as error:
+        find_config('scenarios/startstop')
+    assert 'robots/' not in str(error.value)
 
 
 def test_a_missing_absolute_path_is_not_searched_elsewhere(tmp_path: Path) -> None:
@@ -115,8 +124,8 @@ def test_an_anchor_may_be_merged_and_overridden(tmp_path: Path) -> None:
 
 
 PARAMETERS = """
-leg_fl: {ros__parameters: {leg: fl, gain: 1.0}}
 /**: {ros__parameters: {gain: 2.0, rate: 250.0, group: {a: 1, b: {c: [1, 2]}}}}
+leg_fl: {ros__parameters: {leg: fl, gain: 1.0}}
 /robot_1:
   leg_fl: {ros__parameters: {gain: 3.0}}
 /robot_1/leg_fr: {ros__parameters: {gain: 4.0}}
@@ -148,3 +157,16 @@ def test_a_nodes_own_section_overrides_the_shared_one(node: str, gain: float,
 def test_what_is_no_parameter_file_says_so(text: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(DataError, match=said):
         node_parameters(written(tmp_path, text), 'leg_fl')
+
+
+def test_a_section_that_means_no_node_in_the_namespace_is_found(tmp_path: Path) -> None:
+    path = written(tmp_path, """
+/**: {ros__parameters: {a: 1}}
+robot: {ros__parameters: {a: 1}}
+/**/leg_fl: {ros__parameters: {a: 1}}
+/robot_1/leg_fr: {ros__parameters: {a: 1}}
+other: {ros__parameters: {a: 1}}
+""")
+    kinds = ('robot', 'leg')
+    assert unused_sections(path, '/robot_1', kinds) == ['/robot']
+    assert unused_sections(path, '', kinds) == ['/robot_1/leg_fr']

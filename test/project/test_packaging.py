@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -47,9 +48,9 @@ installed = pytest.mark.skipif(
     reason='the package is not installed in the environment of this Python')
 
 
-def executables() -> dict[str, str]:
+def executables() -> tuple[str, ...]:
     table = setup_constant('EXECUTABLES')
-    assert isinstance(table, dict)
+    assert isinstance(table, tuple)
     return table
 
 
@@ -150,10 +151,11 @@ def test_the_executables_of_the_contract_are_there() -> None:
 
 @pytest.mark.parametrize('executable', executables())
 def test_an_executable_has_its_function(executable: str) -> None:
-    module, function = executables()[executable].split(':')
-    assert module in modules(), f'{module} does not exist'
+    places = [f'{PACKAGE}.{folder}.{executable}' for folder in ('commands', 'nodes')]
+    module = next(name for name in places if name in modules())
     tree = ast.parse(modules()[module].read_text(encoding='utf-8'))
-    assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    assert 'main' in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    assert callable(getattr(import_module(f'{PACKAGE}.__main__'), executable))
 
 
 def test_a_wrapper_runs_its_console_script_with_the_same_arguments_and_status(

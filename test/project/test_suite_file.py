@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import pytest
 
 from dmp_cpg_ros.configuration import find_config, load_yaml
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.suite import load_gaits, load_suite, node_sets
+from dmp_cpg_ros.suite_table import WALKING, Kind
 
 FILE = find_config('suite.yaml')
 
@@ -19,15 +20,25 @@ PER_RUN = {'leg', 'stamped_cmd_vel', 'gated', 'viewer'}
 """Parameters that are chosen for a run and not for a robot."""
 
 
-@pytest.mark.parametrize('kind', list(NODE_PARAMETERS))
-def test_the_file_holds_the_defaults(kind: str) -> None:
-    assert node_sets(FILE, kind) == {cls: cls() for cls in NODE_PARAMETERS[kind]}
+@pytest.mark.parametrize('namespace', ['', '/robot1'])
+@pytest.mark.parametrize('kind', WALKING, ids=lambda kind: kind.name)
+def test_the_file_holds_the_defaults(kind: Kind, namespace: str) -> None:
+    sets = node_sets(FILE, kind.name, namespace=namespace)
+    assert sets == {cls: cls() for cls in kind.sets}
+
+
+def test_a_robot_in_a_namespace_has_its_world(tmp_path: Path) -> None:
+    path = tmp_path / 'blocks.yaml'
+    path.write_text(FILE.read_text(encoding='utf-8').replace('world: flat', 'world: blocks'),
+                    encoding='utf-8')
+    for namespace in ('', '/robot1', '/a/b'):
+        assert load_suite(path, namespace=namespace).world.KIND == 'blocks'
 
 
 def test_the_file_names_every_parameter() -> None:
     content = load_yaml(FILE)
     named = {name for section in content.values() for name in section['ros__parameters']}
-    known = {field.name for sets in NODE_PARAMETERS.values() for cls in sets
+    known = {field.name for kind in WALKING for cls in kind.sets
              for field in dataclasses.fields(cls)}
     assert known - PER_RUN <= named
 

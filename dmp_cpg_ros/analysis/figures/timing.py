@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.metrics.timing import ROBOT_NODE
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
+from dmp_cpg_ros.suite_table import ROBOT
 
 CAPTION = (
     'Top: what the robot measured of itself, control rate and latency from a state to the last of '
@@ -44,7 +44,7 @@ def robot_history(recording: Recording) -> list[StatusEvent]:
     statuses = (
         status
         for name, history in recording.statuses.items()
-        if ROBOT_NODE in name
+        if ROBOT in name
         for status in history
     )
     return sorted(

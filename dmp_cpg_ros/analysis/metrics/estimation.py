@@ -14,14 +14,12 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.ground import height_over_ground
 from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations
 from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording
+from dmp_cpg_ros.suite_table import POSTURE
 
 Array = NDArray[np.float64]
 
 SHORTEST_DISTANCE = 0.5
 """Distance below which figures per metre are not given [m]."""
-
-ESTIMATOR = 'posture_control'
-"""Node whose diagnostics tell the estimated height."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +110,7 @@ def _height_error(recording: Recording, context: RunContext) -> float | None:
     odometry = recording.odometry
     told = [
         (event.time, event.number('estimated_height_m'))
-        for event in recording.statuses.get(ESTIMATOR, ())
+        for event in recording.statuses.get(POSTURE, ())
     ]
     told = [entry for entry in told if entry[1] is not None]
     if not told:

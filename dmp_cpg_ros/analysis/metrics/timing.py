@@ -7,12 +7,12 @@ from __future__ import annotations
 from typing import Any
 
 from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.suite_table import ROBOT
 
-ROBOT_NODE = 'mujoco_robot'
 KEYS = ('rate_hz', 'real_time_factor', 'latency_ms_p50', 'latency_ms_p99', 'deadline_misses')
 
 
-def timing_metrics(recording: Recording, node: str = ROBOT_NODE) -> dict[str, Any]:
+def timing_metrics(recording: Recording, node: str = ROBOT) -> dict[str, Any]:
     """Group ``timing`` of ``metrics.json``, as the robot stated each key last.
 
     Parameters

@@ -1,0 +1,84 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``python -m dmp_cpg_ros``: lists the executables and runs them; all console scripts begin here.
+
+Nothing but the standard library is imported before an executable is chosen, so that Ctrl-C ends
+quietly from the first moment on.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+
+COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client')
+STUDIES = ('study_stops', 'benchmark_walking', 'study_recovery')
+"""Executables that are no nodes; those that are stand in :mod:`dmp_cpg_ros.suite_table`."""
+
+BAD_INPUT, INTERRUPTED = 2, 130
+"""Exit statuses."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run ``python -m dmp_cpg_ros [NAME ...]``; returns the exit status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if given and not given[0].startswith('-'):
+        sys.argv = given
+        return run(given[0])
+    from dmp_cpg_ros.suite_table import KINDS
+
+    print('usage: python -m dmp_cpg_ros NAME [...], or NAME [...] alone; NAME --help says more')
+    for title, names in (('commands', COMMANDS), ('studies', STUDIES),
+                         ('nodes', tuple(KINDS))):
+        print(f'\n{title}:')
+        for name in names:
+            print(f'  {name:22}{_summary(name)}')
+    return BAD_INPUT if given and given[0] not in ('-h', '--help') else 0
+
+
+def run(name: str) -> int:
+    """Run an executable with the process's arguments; returns the exit status."""
+    try:
+        if find_spec(_module(name)) is None:
+            from difflib import get_close_matches
+
+            from dmp_cpg_ros.suite_table import KINDS
+
+            names = (*COMMANDS, *STUDIES, *KINDS)
+            near = get_close_matches(name, names, n=1)
+            guess = f'did you mean {near[0]}? ' if near else ''
+            print(f"dmp_cpg_ros: there is no '{name}'; {guess}valid are {', '.join(names)}",
+                  file=sys.stderr)
+            return BAD_INPUT
+        return int(import_module(_module(name)).main())
+    except KeyboardInterrupt:
+        return INTERRUPTED
+
+
+def __getattr__(name: str) -> Callable[[], int]:
+    """Entry point of a console script: a function without arguments for every executable."""
+    if name.startswith('_') or find_spec(_module(name)) is None:
+        raise AttributeError(name)
+    return partial(run, name)
+
+
+def _module(name: str) -> str:
+    folder = 'commands' if name in COMMANDS else 'studies' if name in STUDIES else 'nodes'
+    return f'dmp_cpg_ros.{folder}.{name}'
+
+
+def _summary(name: str) -> str:
+    """First line of an executable's module, read without importing what it needs."""
+    spec = find_spec(_module(name))
+    assert spec is not None and spec.origin is not None
+    text = ast.get_docstring(ast.parse(Path(spec.origin).read_text(encoding='utf-8'))) or ''
+    return text.split('\n\n')[0].replace('\n', ' ').removeprefix(f'``{name}``: ')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,168 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``--ros-args`` of the commands that are not nodes: what they take of it and what not."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from dmp_cpg_ros.configuration import read_value
+from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+
+LEVELS = {'debug': logging.DEBUG, 'info': logging.INFO, 'warn': logging.WARNING,
+          'error': logging.ERROR, 'fatal': logging.CRITICAL}
+"""Log levels of ROS as those of Python."""
+
+VALUED = {'-p': '--param', '-r': '--remap', '-e': '--enclave', '--param': '--param',
+          '--remap': '--remap', '--params-file': '--params-file', '--log-level': '--log-level',
+          '--log-config-file': '--log-config-file', '--enclave': '--enclave'}
+"""Flags of ROS with a value, by their long form."""
+
+SWITCHES = tuple(f'--{able}-{what}-logs' for able in ('enable', 'disable')
+                 for what in ('rosout', 'stdout', 'external-lib'))
+
+
+@dataclass
+class RosArguments:
+    """What stood after ``--ros-args``.
+
+    Attributes
+    ----------
+    parameters : dict of str to value
+        Of ``-p NAME:=VALUE``.
+    parameters_file : str or None
+        Of ``--params-file``.
+    remappings : list of (str, str)
+        Of ``-r FROM:=TO``, without ``__ns``.
+    namespace : str
+        Of ``-r __ns:=NAMESPACE``; empty without.
+    others : list of str
+        Flags that concern logging and security, as given.
+    """
+
+    parameters: dict[str, Any] = field(default_factory=dict)
+    parameters_file: str | None = None
+    remappings: list[tuple[str, str]] = field(default_factory=list)
+    namespace: str = ''
+    others: list[str] = field(default_factory=list)
+
+
+def parse_arguments(
+    parser: argparse.ArgumentParser, arguments: Sequence[str] | None, *, parameters: bool = False
+) -> tuple[argparse.Namespace, RosArguments]:
+    """Parse a command line with ``--ros-args``; exits with status 2 where it is wrong.
+
+    Parameters
+    ----------
+    parser : ArgumentParser
+        For the arguments that are not ROS's.
+    arguments : sequence of str, optional
+        Default: those of the process.
+    parameters : bool
+        Whether the command has the parameters of the suite; others refuse all parameters.
+    """
+    own, ros = _split(list(sys.argv[1:] if arguments is None else arguments))
+    parser.add_argument_group('ROS').add_argument(
+        '--ros-args', nargs='...',
+        help='[-r __ns:=NAMESPACE] [-r __node:=NAME] [--log-level LEVEL]'
+        + (' [-p NAME:=VALUE] [--params-file FILE]' if parameters else '')
+        + '; ends at the end of the line or at --')
+    options = parser.parse_args(own)
+    try:
+        read = _read(ros)
+        if not parameters and (read.parameters or read.parameters_file):
+            what = next(iter(read.parameters), f'--params-file {read.parameters_file}')
+            raise ParameterError(
+                f"there is no parameter '{what}': {parser.prog} has none; valid after --ros-args "
+                'are -r __ns:=NAMESPACE, -r __node:=NAME and --log-level LEVEL')
+    except DmpCpgError as error:
+        parser.error(str(error))
+    return options, read
+
+
+def read_pair(text: str) -> tuple[str, str]:
+    """Read ``NAME:=VALUE``; raises ParameterError when it is no such pair."""
+    name, separator, value = text.partition(':=')
+    if not separator or not name or not value:
+        raise ParameterError(f"'{text}' must be NAME:=VALUE, such as gait:=trot")
+    return name, value
+
+
+def read_parameter(text: str) -> tuple[str, Any]:
+    """Read ``NAME:=VALUE`` with a value in YAML."""
+    name, value = read_pair(text)
+    if ':' in name:
+        raise ParameterError(f"'{text}' is for one node; values here hold for every node that has "
+                             f'the parameter: {text.rpartition(":")[0].rpartition(":")[2]}:=...')
+    return name, read_value(value)
+
+
+def checked_namespace(text: str) -> str:
+    """Return a namespace as ROS writes it, such as ``/robot1``; empty for the root's."""
+    words = text.strip('/')
+    if not words:
+        return ''
+    if not all(word.isidentifier() and word.isascii() for word in words.split('/')):
+        raise ParameterError(f"'{text}' is no namespace; valid are words of letters, digits and "
+                             "underscores with '/' between, such as /robot1")
+    return f'/{words}'
+
+
+def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
+    """What is the command's own, and what stands between ``--ros-args`` and ``--`` or the end."""
+    own: list[str] = []
+    ros: list[str] = []
+    into = own
+    for argument in arguments:
+        if argument == '--ros-args':
+            into = ros
+        elif argument == '--' and into is ros:
+            into = own
+        else:
+            into.append(argument)
+    return own, ros
+
+
+def _read(arguments: list[str]) -> RosArguments:
+    read, waiting = RosArguments(), iter(arguments)
+    for flag in waiting:
+        if flag in SWITCHES:
+            read.others.append(flag)
+            continue
+        if flag not in VALUED:
+            raise ParameterError(f"unknown ROS argument '{flag}'; valid are "
+                                 f"{', '.join([*VALUED, *SWITCHES])}")
+        value = next(waiting, None)
+        if value is None:
+            raise ParameterError(f"'{flag}' needs a value")
+        _take(read, VALUED[flag], value)
+    return read
+
+
+def _take(read: RosArguments, flag: str, value: str) -> None:
+    if flag == '--param':
+        name, parsed = read_parameter(value)
+        read.parameters[name] = parsed
+    elif flag == '--params-file':
+        if read.parameters_file is not None:
+            raise ParameterError('only one --params-file can be taken')
+        read.parameters_file = value
+    elif flag == '--remap':
+        name, target = read_pair(value)
+        if name == '__ns':
+            read.namespace = checked_namespace(target)
+        else:
+            read.remappings.append((name, target))
+    else:
+        read.others += [flag, value]
+        level = value.rpartition(':=')[2].lower()
+        if flag == '--log-level':
+            if level not in LEVELS:
+                raise ParameterError(
+                    f"'{value}' is no log level; valid are {', '.join(LEVELS)}")
+            logging.getLogger().setLevel(LEVELS[level])

@@ -1,0 +1,127 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The table of the suite's nodes: executables, names in the graph, classes, parameter sets.
+
+A node that predicts or certifies another part declares that part's set too. In a parameter file
+such shared values stand once, under ``/**``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters, VotingSwitch
+from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
+from dmp_cpg_ros.core.modes.body_mode import ModeParameters
+from dmp_cpg_ros.core.parameters import Parameters
+from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.suite_parameters import (
+    CANONICAL,
+    CERTIFIED,
+    INHIBITION,
+    REFERENCE,
+    CertificateParameters,
+    CommandParameters,
+    GaitParameters,
+    LegChoice,
+    RobotFileParameters,
+    RobotParameters,
+    TickParameters,
+)
+from dmp_cpg_ros.core.transformation.leg import LegParameters
+
+LEG, POSTURE, ROBOT, RECORDER = (
+    'leg_transformation', 'posture_control', 'mujoco_robot', 'bag_recorder')
+
+CLOCK_TOPIC = '/clock'
+DIAGNOSTICS_TOPIC = '/diagnostics'
+ABSOLUTE_TOPICS = (CLOCK_TOPIC, DIAGNOSTICS_TOPIC)
+"""Topics that ROS names absolutely, once for all nodes of a domain."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of node.
+
+    Attributes
+    ----------
+    name : str
+        Its executable.
+    class_name : str
+        Its class in :attr:`module`.
+    sets : tuple of Parameters classes
+        Parameter sets of its part of the core; those that it has as a node are its class's.
+    instances : mapping of str to mapping
+        Name in the graph of each of its nodes, with the parameters that make it that one.
+    """
+
+    name: str
+    class_name: str
+    sets: tuple[type[Parameters], ...]
+    instances: Mapping[str, Mapping[str, str]]
+
+    @property
+    def module(self) -> str:
+        """Module whose ``main`` runs it."""
+        return f'dmp_cpg_ros.nodes.{self.name}'
+
+    def has(self, parameter: str) -> bool:
+        """Whether a parameter is in one of the sets."""
+        return any(field.name == parameter for cls in self.sets
+                   for field in dataclasses.fields(cls))
+
+
+def _single(name: str, class_name: str, *sets: type[Parameters]) -> Kind:
+    return Kind(name, class_name, sets, {name: {}})
+
+
+SUITE_TABLE: tuple[Kind, ...] = (
+    _single(REFERENCE, 'ReferenceFilter',
+            *CERTIFIED, CommandParameters, CertificateParameters),
+    _single(CANONICAL, 'CanonicalOscillators', *CERTIFIED, CertificateParameters),
+    _single(INHIBITION, 'InhibitionNode',
+            *CERTIFIED, CommandParameters, CertificateParameters, VoteSourceParameters),
+    _single(POSTURE, 'PostureControl', PostureParameters, ModeParameters, EstimationParameters,
+            StateSourceParameters, GaitParameters, RobotFileParameters),
+    Kind(LEG, 'LegTransformation',
+         (LegChoice, LegParameters, GaitParameters, RobotFileParameters),
+         {f'{LEG}_{leg}': {'leg': leg} for leg in LEGS}),
+    _single(ROBOT, 'MujocoRobotNode', RobotParameters, SensorParameters, WorldParameters,
+            StateSourceParameters, TickParameters, RobotFileParameters, VotingSwitch),
+    _single(RECORDER, 'BagRecorder'),
+)
+"""All kinds of nodes in the order of the data flow; the robot comes last of those that walk, so
+that its first state finds everybody listening.
+"""
+
+KINDS: dict[str, Kind] = {kind.name: kind for kind in SUITE_TABLE}
+"""The table by the name of the kind."""
+
+WALKING: tuple[Kind, ...] = tuple(kind for kind in SUITE_TABLE if kind.name != RECORDER)
+"""Kinds of nodes that walk: all but the recorder."""
+
+WALKING_NODES: tuple[str, ...] = tuple(name for kind in WALKING for name in kind.instances)
+"""Names in the graph of all nodes but the recorder's."""
+
+
+def instances() -> Iterator[tuple[Kind, str, Mapping[str, str]]]:
+    """Every node of the suite, the recorder first: its kind, its name, its own parameters."""
+    for kind in (KINDS[RECORDER], *WALKING):
+        for name, own in kind.instances.items():
+            yield kind, name, own
+
+
+def namespace_rules(namespace: str) -> list[tuple[str, str]]:
+    """Remapping rules (from, to) with which a whole suite runs in a namespace.
+
+    A robot in a namespace has its own clock and diagnostics there: absolute names would mix
+    the clocks of two robots in one domain.
+    """
+    if namespace in ('', '/'):
+        return []
+    return [('__ns', namespace), *((name, name.strip('/')) for name in ABSOLUTE_TOPICS)]

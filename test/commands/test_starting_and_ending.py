@@ -1,0 +1,236 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A suite starts alone in its domain, in a namespace or not, and ends as a whole."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import rclpy
+import ros_processes
+from ros_processes import NodeProcess, Processes, Ros, wait_until
+
+from dmp_cpg_ros.analysis.digests import payload_digests
+from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.commands.suite_run import alone_in_domain
+from dmp_cpg_ros.nodes.claims import AlreadyRunningError
+
+processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
+
+SCENARIO = """\
+name: brief
+duration: {duration}
+events:
+  - {{at: 0.1, inhibit: false}}
+  - {{at: 0.1, command: {{v_x: 0.4}}}}
+"""
+
+RUN_S = 240.0
+"""How long a run may take on a loaded machine before the test gives up [s]."""
+
+
+def scenario(folder: Path, duration_s: float) -> str:
+    path = folder / f'brief_{duration_s:g}.yaml'
+    path.write_text(SCENARIO.format(duration=duration_s), encoding='utf-8')
+    return str(path)
+
+
+def walk(processes: Processes, *arguments: str) -> NodeProcess:
+    return processes.python('-m', 'dmp_cpg_ros', 'walk', *arguments)
+
+
+def children(parent: int) -> list[int]:
+    """Processes whose parent is a process."""
+    found = []
+    for folder in Path('/proc').iterdir():
+        if folder.name.isdigit():
+            try:
+                status = (folder / 'stat').read_text(encoding='utf-8')
+            except OSError:
+                continue
+            if int(status.rpartition(')')[2].split()[1]) == parent:
+                found.append(int(folder.name))
+    return found
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs; one that nobody has waited for does not."""
+    try:
+        status = Path(f'/proc/{pid}/stat').read_text(encoding='utf-8')
+    except OSError:
+        return False
+    return status.rpartition(')')[2].split()[0] not in 'ZX'
+
+
+# Starting ----------------------------------------------------------------------------------------
+
+
+def test_a_second_suite_in_the_domain_is_refused_and_the_first_walks_on(
+        processes: Processes, tmp_path: Path) -> None:
+    lasting, brief = scenario(tmp_path, 60.0), scenario(tmp_path, 0.5)
+    first = walk(processes, lasting, '--out', str(tmp_path / 'first'), '--composed')
+    second = walk(processes, lasting, '--out', str(tmp_path / 'second'), '--composed')
+    wait_until(lambda: not (first.running and second.running), RUN_S)
+    refused, walking = (second, first) if first.running else (first, second)
+    assert refused.wait() == 2
+    domain = processes.domain
+    assert f'already running in ROS domain {domain}' in refused.output
+    assert 'ROS_DOMAIN_ID' in refused.output and 'Traceback' not in refused.output
+    walking.wait_for_output('walking', RUN_S)
+    late = walk(processes, brief, '--out', str(tmp_path / 'late'))
+    assert late.wait(RUN_S) == 2 and not (tmp_path / 'late').exists()
+    beside = walk(processes, brief, '--composed', '--lock-step', '--no-report', '--namespace',
+                  'robot2', '--out', str(tmp_path / 'beside'))
+    assert beside.wait(RUN_S) == 0, beside
+    assert walking.running
+    walking.interrupt()
+    assert walking.wait(RUN_S) == 130, walking
+
+
+def test_nodes_left_over_are_named_instead_of_measured(
+        processes: Processes, ros: Ros, tmp_path: Path) -> None:
+    processes.node('inhibition')
+    ros.spin_until(lambda: 'inhibition' in ros.node.get_node_names())
+    process = walk(processes, scenario(tmp_path, 0.5), '--out', str(tmp_path / 'run'))
+    assert process.wait(RUN_S) == 2
+    assert f'ROS domain {processes.domain} (nodes /inhibition)' in process.output
+
+
+def test_nodes_that_only_the_graph_shows_are_found(ros: Ros) -> None:
+    # As of another machine: it has claimed nothing here.
+    foreign = rclpy.node.Node('posture_control', context=ros.context, namespace='/robot1')
+    with (pytest.raises(AlreadyRunningError, match=r'nodes /robot1/posture_control'),
+          alone_in_domain('/robot1')):
+        pass
+    with alone_in_domain(''):
+        pass
+    foreign.destroy_node()
+
+
+def test_a_node_that_runs_already_is_not_started_again(processes: Processes, ros: Ros) -> None:
+    first = processes.node('reference_filter')
+    ros.spin_until(lambda: 'reference_filter' in ros.node.get_node_names())
+    second = processes.node('reference_filter')
+    assert second.wait() == 2
+    assert f'/reference_filter, process {first.pid}' in second.output
+    assert processes.node('reference_filter', '-r', '__ns:=/robot1', autostart=False).running
+    first.kill()
+    third = processes.node('reference_filter')
+    ros.spin_until(lambda: ros.node.get_node_names().count('reference_filter') >= 1)
+    assert third.running
+
+
+@pytest.mark.parametrize('options', [
+    ('--lock-step',), ('--lock-step', '--composed'), ('--composed',)])
+def test_a_walk_in_a_namespace_is_the_walk_without(
+        processes: Processes, tmp_path: Path, options: tuple[str, ...]) -> None:
+    brief = scenario(tmp_path, 0.6)
+    runs = {}
+    for namespace, given in (('', ()), (
+            '/robot1', ('--ros-args', '-r', '__ns:=/robot1', '-p', 'seed:=0'))):
+        out = tmp_path / f'run{namespace.strip("/")}'
+        process = walk(processes, brief, '--out', str(out), *options, *given)
+        assert process.wait(RUN_S) == 0, process
+        assert 'deprecated' not in process.output
+        recording = load_recording(out / 'bag')
+        assert len(recording.joints.time) >= 149
+        assert recording.counts[f'{namespace}/clock'] > 1
+        assert (out / 'report.html').is_file() and (out / 'metrics.json').is_file()
+        runs[namespace] = payload_digests(out / 'bag')
+    if '--lock-step' in options:
+        assert runs[''] == runs['/robot1'] and len(runs['']) == 6
+
+
+# Ending ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('composed', [(), ('--composed',)], ids=['processes', 'composed'])
+@pytest.mark.parametrize('number', [
+    signal.SIGHUP, signal.SIGQUIT, signal.SIGTERM, signal.SIGKILL])
+def test_whatever_ends_walk_ends_its_nodes_and_closes_the_bag(
+        processes: Processes, tmp_path: Path, number: int, composed: tuple[str, ...]) -> None:
+    process = walk(processes, scenario(tmp_path, 600.0), '--lock-step', '--out',
+                   str(tmp_path / 'run'), '--no-report', *composed)
+    process.wait_for_output('  walking\n', RUN_S)
+    nodes = children(process.pid)
+    assert len(nodes) == (2 if composed else 10)
+    process.signal(number)
+    killed = number == signal.SIGKILL
+    assert process.wait(RUN_S) == (-number if killed else 128 + number), process
+    wait_until(lambda: not any(map(alive, nodes)), RUN_S,
+               what=lambda: f'the end of {[pid for pid in nodes if alive(pid)]}')
+    assert (tmp_path / 'run' / 'bag' / 'metadata.yaml').is_file()
+    assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
+
+
+def test_ctrl_c_while_modules_are_imported_ends_quietly(processes: Processes) -> None:
+    # The hook interrupts at the very moment at which a module of the command is imported.
+    program = (
+        'import os, signal, sys\n'
+        'class Interrupt:\n'
+        '    def find_spec(self, name, path=None, target=None):\n'
+        "        if name == 'numpy':\n"
+        '            os.kill(os.getpid(), signal.SIGINT)\n'
+        'sys.meta_path.insert(0, Interrupt())\n'
+        "sys.argv = ['walk']\n"
+        'from dmp_cpg_ros.__main__ import walk\n'
+        'sys.exit(walk())\n')
+    process = processes.python('-c', program)
+    assert process.wait() == 130
+    assert process.output == ''
+
+
+# --ros-args --------------------------------------------------------------------------------------
+
+
+COMMANDS = ('analyze', 'learn', 'inspect_robot', 'study_stops', 'benchmark_walking',
+            'study_recovery')
+NEEDED = {'analyze': ['bag'], 'learn': ['bag', '--out', 'x'], 'inspect_robot': ['nosuch.xml']}
+
+
+@pytest.mark.parametrize('name', COMMANDS)
+def test_commands_without_parameters_refuse_them_and_say_what_is_valid(
+        processes: Processes, name: str) -> None:
+    process = processes.python('-m', 'dmp_cpg_ros', name, *NEEDED.get(name, []), '--ros-args',
+                               '-r', '__node:=x', '-p', 'gait:=trot')
+    assert process.wait() == 2
+    assert "no parameter 'gait'" in process.output and '__ns' in process.output
+
+
+@pytest.mark.parametrize('name', ['analyze', 'inspect_robot'])
+def test_commands_take_what_launch_adds(
+        processes: Processes, tmp_path: Path, name: str) -> None:
+    process = processes.python('-m', 'dmp_cpg_ros', name, str(tmp_path / 'nosuch'), '--ros-args',
+                               '-r', '__node:=x', '-r', '__ns:=/a', '--log-level', 'info')
+    assert process.wait() == 2
+    assert 'nosuch' in process.output and 'usage' not in process.output
+
+
+@pytest.mark.parametrize(('arguments', 'text'), [
+    (['--ros-args', '-p', 'gaitt:=trot'], "no parameter 'gaitt'"),
+    (['--ros-args', '-p', 'gait'], 'must be NAME:=VALUE'),
+    (['--ros-args', '-p'], 'needs a value'),
+    (['--ros-args', '--parms-file', 'x'], '--params-file'),
+    (['--ros-args', '--params-file', 'nosuch.yaml'], 'nosuch.yaml'),
+    (['--ros-args', '--log-level', 'loud'], 'debug, info'),
+    (['--ros-args', '-r', '__ns:=/a b'], 'is no namespace'),
+    (['--namespace', '1st'], 'is no namespace'),
+    (['startstop'], 'did you mean scenarios/start_stop?'),
+])
+def test_walk_refuses_what_is_wrong_and_says_what_is_valid(
+        processes: Processes, arguments: list[str], text: str) -> None:
+    process = walk(processes, *arguments)
+    assert process.wait() == 2, process
+    assert text in process.output, process
+    assert 'Traceback' not in process.output
+
+
+def test_help_of_walk_lists_the_scenarios(processes: Processes) -> None:
+    process = walk(processes, '--help')
+    assert process.wait() == 0
+    assert 'start_stop' in process.output and 'votes' in process.output
