@@ -151,7 +151,7 @@ def test_the_executables_of_the_contract_are_there() -> None:
 
 @pytest.mark.parametrize('executable', executables())
 def test_an_executable_has_its_function(executable: str) -> None:
-    places = [f'{PACKAGE}.{folder}.{executable}' for folder in ('commands', 'nodes')]
+    places = [f'{PACKAGE}.{folder}.{executable}' for folder in ('commands', 'studies', 'nodes')]
     module = next(name for name in places if name in modules())
     tree = ast.parse(modules()[module].read_text(encoding='utf-8'))
     assert 'main' in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}

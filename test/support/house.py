@@ -14,7 +14,7 @@ import tokenize
 from collections import Counter
 from pathlib import Path
 
-from checkout import PACKAGE, ROOT, imports, modules
+from checkout import PACKAGE, ROOT, imports, modules, setup_constant
 
 _NO_CODE = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
             tokenize.ENDMARKER}
@@ -48,15 +48,23 @@ def reached() -> set[str]:
     """Modules that are imported, in any number of steps, by what users start.
 
     They start the executables of ``setup.py`` and what the Makefile and the documents start with
-    ``python -m``. A module that is named in a text, as the classes of the nodes are, is imported.
+    ``python -m``; what the table of equations names of ``paper`` is a library for readers. A
+    module that is named in a text, as the classes of the nodes are, is imported.
     """
     known = modules()
-    texts = [ROOT / 'setup.py', ROOT / 'Makefile', ROOT / 'README.md', *ROOT.glob('doc/*.md'),
+    executables = setup_constant('EXECUTABLES')
+    assert isinstance(executables, tuple)
+    todo = {f'{PACKAGE}.__main__'} | {
+        name for name in known if name.split('.')[-1] in executables}
+    texts = [ROOT / 'Makefile', ROOT / 'README.md', *ROOT.glob('doc/*.md'),
              *ROOT.glob('launch/*.py')]
     pattern = re.compile(rf'{PACKAGE}(?:\.\w+)+')
-    todo = {name for text in texts
-            for found in pattern.findall(text.read_text(encoding='utf-8'))
-            for name in _prefixes(found) if name in known}
+    todo |= {name for text in texts
+             for found in pattern.findall(text.read_text(encoding='utf-8'))
+             for name in _prefixes(found) if name in known}
+    equations = (ROOT / 'doc' / 'equations.md').read_text(encoding='utf-8')
+    todo |= {name for found in re.findall(r'`(paper(?:\.\w+)+)`', equations)
+             for name in _prefixes(f'{PACKAGE}.{found}') if name in known}
     done: set[str] = set()
     while todo:
         name = todo.pop()
