@@ -21,6 +21,7 @@ from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
+from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -103,7 +104,7 @@ def load_gait(name: str, file: str | Path = 'gaits.yaml') -> Gait:
     """Read one gait; raises ParameterError with the valid names when it is not there."""
     gaits = load_gaits(file)
     if name not in gaits:
-        raise ParameterError(f"there is no gait '{name}'; valid are {', '.join(gaits)}")
+        raise ParameterError(f"there is no gait {shown(name)}; valid are {', '.join(gaits)}")
     return gaits[name]
 
 
@@ -135,7 +136,8 @@ def load_suite(
             raise ParameterError(
                 f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}"
             )
-    sets = {kind: node_sets(path, kind, overrides) for kind in NODE_PARAMETERS}
+    content = load_yaml(path)
+    sets = {kind: _node_sets(content, path, kind, overrides) for kind in NODE_PARAMETERS}
     canonical, robot = sets['canonical_oscillators'], sets['mujoco_robot']
     parameters = SuiteParameters(
         sets['reference_filter'][ReferenceParameters],
@@ -189,8 +191,14 @@ def node_sets(
     DmpCpgError
         As :func:`load_suite`.
     """
+    return _node_sets(load_yaml(path), path, kind, overrides or {})
+
+
+def _node_sets(
+    content: Mapping[str, Any], path: Path, kind: str, overrides: Mapping[str, Any]
+) -> dict[type[Any], Any]:
     node = f'{kind}_{LEGS[0]}' if kind == 'leg_transformation' else kind
-    given = {**node_parameters(path, node), **(overrides or {})}
+    given = {**node_parameters(content, node, path), **overrides}
     for name in given:
         if name not in SUITE_NAMES and name not in NODE_NAMES:
             raise ParameterError(

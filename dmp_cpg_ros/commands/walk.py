@@ -16,7 +16,7 @@ from typing import Any
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.commands.analyze import MARKS, analyze_run
 from dmp_cpg_ros.commands.run_folder import make_run_folder, resolved_parameters, write_parameters
-from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.configuration import find_config, load_yaml, parse_yaml
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
@@ -218,14 +218,12 @@ def _say(time_s: float, text: str) -> None:
 
 def _pairs(texts: Sequence[str]) -> dict[str, Any]:
     """Values given as ``NAME:=VALUE``, as ROS does."""
-    import yaml
-
     pairs = {}
     for text in texts:
         name, separator, value = text.partition(':=')
         if not separator or not name:
             raise ParameterError(f"'{text}' must be NAME:=VALUE, such as gait:=trot")
-        pairs[name] = yaml.safe_load(value)
+        pairs[name] = parse_yaml(value, f"--set '{name}'")
     return pairs
 
 

@@ -13,11 +13,11 @@ from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.nodes.interfaces import SUITE
@@ -195,8 +195,7 @@ def shared_names(arguments: Iterable[str]) -> set[str]:
     arguments = list(arguments)
     for flag, path in zip(arguments, arguments[1:], strict=False):
         if flag == '--params-file' and Path(path).is_file():
-            content = yaml.safe_load(Path(path).read_text(encoding='utf-8'))
-            section = content.get('/**') if isinstance(content, dict) else None
+            section = load_yaml(path).get('/**')
             values = section.get('ros__parameters') if isinstance(section, dict) else None
             names |= set(_flat_names(values)) if isinstance(values, dict) else set()
     return names

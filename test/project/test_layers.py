@@ -27,7 +27,7 @@ LAYERS = {
     'configuration': ({'core'}, {'yaml'}),
     'suite': ({'core', 'configuration'}, set()),
     'primitive_files': ({'core', 'configuration'}, {'numpy', 'yaml'}),
-    'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml'}),
+    'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco'}),
     'nodes': ({'core', 'configuration', 'suite', 'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
     'analysis': ({'core', 'paper', 'configuration', 'suite'}, {'numpy', *RECORDS, *FIGURES}),
     'commands': ({'core', 'configuration', 'suite', 'primitive_files', 'robot', 'nodes',
