@@ -45,8 +45,8 @@ from dmp_cpg_ros.core.maths.vec3 import (
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.legs import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.transformation.foot_path import activities_step
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
-from dmp_cpg_ros.core.transformation.swing_activity import activities_step
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
 
