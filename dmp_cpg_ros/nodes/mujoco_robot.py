@@ -20,7 +20,7 @@ from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.canonical.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
-from dmp_cpg_ros.core.modes.body_command import BALANCED
+from dmp_cpg_ros.core.modes.command import BALANCED
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.modes.postures import lying_height, lying_posture
+from dmp_cpg_ros.core.modes.motion_library import lying_posture
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 
 Vector = NDArray[np.float64]
@@ -68,7 +68,7 @@ def start_pose(name: str, description: RobotDescription, seed: int) -> StartPose
         If there is no such pose.
     """
     if name == 'lying':
-        place = np.array((0.0, 0.0, lying_height(description)))
+        place = np.array((0.0, 0.0, description.belly_depth))
         upright = np.array((1.0, 0.0, 0.0, 0.0))
         return StartPose(place, upright, lying_posture(description), False, LYING_SETTLES_S)
     if name == 'fallen':

@@ -12,8 +12,8 @@ from core_examples import GAITS, GRAVITY, TICK, suite_parameters
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.modes.body_mode import ModeParameters
-from dmp_cpg_ros.core.modes.movements import Movements
+from dmp_cpg_ros.core.modes.manager import ModeParameters
+from dmp_cpg_ros.core.modes.motion_library import Movements
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 
 pytest.importorskip('mujoco')
@@ -60,7 +60,7 @@ def test_it_stands_up_from_its_belly_within_its_limits_and_never_sinks() -> None
     low = life.robot.description.belly_depth
     assert life.states[0].base_position_in_world[2] == pytest.approx(low, abs=2e-3)
     life.loop.request_mode('stand_up')
-    life.go(life.loop.body.modes.movements.duration(('rise',)))
+    life.go(life.loop.body.movements.duration(('rise',)))
     height = life.column('base_position_in_world')[:, 2]
     assert (np.diff(height) > -5e-4).all()
     life.go(0.8)

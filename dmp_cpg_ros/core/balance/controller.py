@@ -71,7 +71,7 @@ class PostureFeedback:
     correction : ndarray (3,)
         What the legs add to the reference velocity of the stance feet: v_x, v_y [m/s], γ [rad/s].
     mode : str
-        What the body does, see :mod:`~dmp_cpg_ros.core.modes.body_command`.
+        What the body does, see :mod:`~dmp_cpg_ros.core.modes.command`.
     measured : ndarray (12,)
         Measured joint angles that the feedback was made of [rad].
     foot_force : ndarray (4,)
