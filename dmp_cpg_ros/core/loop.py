@@ -45,7 +45,7 @@ from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
 from dmp_cpg_ros.core.modes.requests import REQUESTS, request
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters

@@ -40,12 +40,12 @@ from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
 from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
 from dmp_cpg_ros.nodes.robot_timing import RobotTiming
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.robot.fallback import FallbackController
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
-from dmp_cpg_ros.robot.refuge import Refuge
 from dmp_cpg_ros.robot.robot_file import load_robot_file
-from dmp_cpg_ros.robot.target_guard import TargetGuard
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 
 READY_PERIOD_S = 0.05
 """How often a lock-step robot without a gate asks whether its partners are there [s]."""
@@ -84,8 +84,8 @@ class MujocoRobotNode(ManagedNode):
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._tick_ns = self.parameters_of(TickParameters).tick_ns
         self._robot = self._make_robot()
-        refuge = Refuge(self._robot.description)
-        self._guard = TargetGuard(refuge, round(self._options.target_timeout * 1e9))
+        fallback = FallbackController(self._robot.description)
+        self._guard = CommandWatchdog(fallback, round(self._options.target_timeout * 1e9))
         self._body_mode = 'standing' if self._options.start_pose == 'standing' else 'lying'
         self._timing, self._writer, self._reader = (
             RobotTiming(),
@@ -192,7 +192,7 @@ class MujocoRobotNode(ManagedNode):
             self.warn(
                 'silent',
                 f'no targets from {", ".join(silent)} for {self._options.target_timeout} s: '
-                f'the robot looks after itself: {RETREATS[self._guard.retreat]}',
+                f'the robot looks after itself: {RETREATS[self._guard.fallback]}',
                 error=True,
             )
         elif not silent:

@@ -14,7 +14,7 @@ from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.modes.command import BALANCED
 from dmp_cpg_ros.core.modes.manager import ModeManager, ModeParameters
 from dmp_cpg_ros.core.modes.requests import REQUESTS
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.body_mode_messages import BodyModeWriter

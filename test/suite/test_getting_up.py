@@ -17,9 +17,9 @@ from dmp_cpg_ros.core.modes.motion_library import Movements
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 
 pytest.importorskip('mujoco')
+from dmp_cpg_ros.robot.fallback import FallbackController
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.robot.refuge import Refuge
-from dmp_cpg_ros.robot.target_guard import TargetGuard
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 
 HOLD_NS = 200_000_000
 
@@ -141,10 +141,10 @@ def test_a_start_pose_that_is_none_is_refused() -> None:
         MujocoRobot(start_pose='hanging')
 
 
-def left_alone(life: Life, seconds: float, prepare: Callable[[Life], None]) -> TargetGuard:
+def left_alone(life: Life, seconds: float, prepare: Callable[[Life], None]) -> CommandWatchdog:
     """Let the legs fall silent and the robot look after itself."""
     prepare(life)
-    guard = TargetGuard(Refuge(life.robot.description), HOLD_NS)
+    guard = CommandWatchdog(FallbackController(life.robot.description), HOLD_NS)
     for i, leg in enumerate(LEGS):
         joints = slice(3 * i, 3 * i + 3)
         targets = life.loop.tick(life.states[-1]).targets
@@ -179,7 +179,7 @@ def test_left_alone_it_looks_after_itself_and_does_not_drop(
     life = Life(start)
     begin = len(life.states)
     guard = left_alone(life, 3.0, prepare)
-    assert guard.retreat == retreat
+    assert guard.fallback == retreat
     down = np.diff(life.column('base_position_in_world')[begin:, 2]) / TICK
     last = life.states[-1]
     assert np.linalg.norm(last.base_velocity_in_base) < 0.02

@@ -41,16 +41,7 @@ Array = NDArray[np.float64]
 TILT, VELOCITY, GYRO_BIAS, ACCELEROMETER_BIAS = (slice(3 * i, 3 * i + 3) for i in range(4))
 """Places in the error state."""
 
-_STAYING = np.eye(12)
-
-_TURNING = (
-    *(12 * i + j for i in range(3) for j in range(3) if i != j),  # of the tilt
-    *(12 * (i + 3) + j + 3 for i in range(3) for j in range(3) if i != j),  # of the velocity
-    *(12 * (i + 3) + j for i in range(3) for j in range(3) if i != j),  # gravity
-    *(12 * (i + 3) + j + 6 for i in range(3) for j in range(3) if i != j),  # bias of gyroscope
-    *(12 * i + i + 6 for i in range(6)),  # biases
-)
-"""Places in the transition's matrix, read by rows, of what is neither 0 nor 1."""
+_IDENTITY = np.eye(12)
 
 
 @dataclass(frozen=True)
@@ -125,15 +116,20 @@ def transition(velocity: Triple, up_in_base: Triple, rate: Triple, dt: float) ->
     ndarray (12, 12)
         I + A dt.
     """
-    a, b, c = rate[0] * dt, rate[1] * dt, rate[2] * dt
-    fall = -GRAVITY * dt
-    d, e, f = up_in_base[0] * fall, up_in_base[1] * fall, up_in_base[2] * fall
-    g, h, i = velocity[0] * -dt, velocity[1] * -dt, velocity[2] * -dt
-    F = _STAYING.copy()
-    F.put(_TURNING, (
-        c, -b, -c, a, b, -a, c, -b, -c, a, b, -a, -f, e, f, -d, -e, d, -i, h, i, -g, -h, g,
-        -dt, -dt, -dt, -dt, -dt, -dt))  # fmt: skip
+    F, turning = _IDENTITY.copy(), _skew(rate, -dt)
+    F[TILT, TILT] += turning
+    F[VELOCITY, VELOCITY] += turning
+    F[VELOCITY, TILT] = _skew(up_in_base, -GRAVITY * dt)
+    F[VELOCITY, GYRO_BIAS] = _skew(velocity, -dt)
+    F[TILT, GYRO_BIAS] -= dt * _IDENTITY[:3, :3]
+    F[VELOCITY, ACCELEROMETER_BIAS] -= dt * _IDENTITY[:3, :3]
     return F
+
+
+def _skew(v: Triple, scale: float) -> Matrix:
+    """Matrix of the cross product with v times a scale."""
+    x, y, z = v[0] * scale, v[1] * scale, v[2] * scale
+    return (0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)
 
 
 def predict(

@@ -17,7 +17,7 @@ from dmp_cpg_ros.core.gait.gait import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import upward
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
 Array = NDArray[np.float64]

@@ -32,7 +32,7 @@ from dmp_cpg_ros.core.modes.motion import phase_at
 from dmp_cpg_ros.core.modes.motion_library import SIDES, Movements
 from dmp_cpg_ros.core.parameters import parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.transformation.leg import body_scale
 
