@@ -44,6 +44,25 @@ TILT, VELOCITY, GYRO_BIAS, ACCELEROMETER_BIAS = (slice(3 * i, 3 * i + 3) for i i
 _IDENTITY = np.eye(12)
 
 
+def _places(rows: slice, columns: slice, diagonal: bool) -> tuple[int, ...]:
+    """Places of a block's diagonal, or of all else in it, in a matrix (12, 12) read by rows."""
+    return tuple(
+        12 * (rows.start + i) + columns.start + j
+        for i in range(3) for j in range(3) if (i == j) == diagonal
+    )
+
+
+_TRANSITION = (
+    *_places(TILT, TILT, False),
+    *_places(VELOCITY, VELOCITY, False),
+    *_places(VELOCITY, TILT, False),
+    *_places(VELOCITY, GYRO_BIAS, False),
+    *_places(TILT, GYRO_BIAS, True),
+    *_places(VELOCITY, ACCELEROMETER_BIAS, True),
+)
+"""Places in the transition's matrix of what is neither 0 nor 1, block by block."""
+
+
 @dataclass(frozen=True)
 class FilterNoise:
     """What the filter believes of its sensors.
@@ -117,19 +136,15 @@ def transition(velocity: Triple, up_in_base: Triple, rate: Triple, dt: float) ->
         I + A dt.
     """
     F, turning = _IDENTITY.copy(), _skew(rate, -dt)
-    F[TILT, TILT] += turning
-    F[VELOCITY, VELOCITY] += turning
-    F[VELOCITY, TILT] = _skew(up_in_base, -GRAVITY * dt)
-    F[VELOCITY, GYRO_BIAS] = _skew(velocity, -dt)
-    F[TILT, GYRO_BIAS] -= dt * _IDENTITY[:3, :3]
-    F[VELOCITY, ACCELEROMETER_BIAS] -= dt * _IDENTITY[:3, :3]
+    gravity, transport = _skew(up_in_base, -GRAVITY * dt), _skew(velocity, -dt)
+    F.put(_TRANSITION, (*turning, *turning, *gravity, *transport, *[-dt] * 6))
     return F
 
 
-def _skew(v: Triple, scale: float) -> Matrix:
-    """Matrix of the cross product with v times a scale."""
+def _skew(v: Triple, scale: float) -> tuple[float, ...]:
+    """Off-diagonal entries, by rows, of the matrix of the cross product with v times a scale."""
     x, y, z = v[0] * scale, v[1] * scale, v[2] * scale
-    return (0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0)
+    return -z, y, z, -x, -y, x
 
 
 def predict(
