@@ -11,20 +11,28 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from difflib import get_close_matches
 from itertools import count
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.core.parameters import shown
 
 PACKAGE = 'dmp_cpg_ros'
 _PACKAGE_FOLDER = Path(__file__).resolve().parent
 _IN_SHARE = Path('share', PACKAGE, 'config')
 _PARAMETERS_KEY = 'ros__parameters'
+
+LARGEST_FILE = 2**18
+"""Longest file that is read [B]."""
+
+DEEPEST = 32
+"""Deepest nesting of mappings and lists."""
 
 
 def find_config(name: str | Path) -> Path:
@@ -48,13 +56,13 @@ def find_config(name: str | Path) -> Path:
     MissingFileError
         If there is no such file; the text lists the folders searched and the names that exist.
     """
-    given = Path(name).expanduser()
-    if given.is_file():
+    given = Path(os.path.expanduser(name))
+    if os.path.isfile(given):
         return given.absolute()
     folders = [] if given.is_absolute() else config_folders()
     for folder in folders:
         for candidate in (folder / given, folder / f'{given}.yaml'):
-            if candidate.is_file():
+            if os.path.isfile(candidate):
                 return candidate
     raise MissingFileError(_not_found(name, folders))
 
@@ -78,10 +86,7 @@ def config_folders() -> list[Path]:
 
 
 def load_yaml(path: str | Path) -> dict[str, Any]:
-    """Read a YAML file that holds one mapping.
-
-    Stricter than PyYAML in one thing, a key that stands twice is an error, and as generous as
-    ROS 2 in another, ``1e-3`` is a number.
+    """Read a YAML file that holds one mapping, see :func:`parse_yaml`.
 
     Parameters
     ----------
@@ -98,23 +103,22 @@ def load_yaml(path: str | Path) -> dict[str, Any]:
     MissingFileError
         If the file does not exist or cannot be read.
     DataError
-        If it is not YAML, or not a mapping; the text names the line.
+        If it is too large, not YAML, or not a mapping; the text names the line.
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding='utf-8')
-    except OSError as error:
-        raise MissingFileError(f"cannot read '{path}': {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise DataError(f"'{path}' is not a text file in UTF-8: {error}") from error
+        with path.open('rb') as file:
+            data = file.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise MissingFileError(f"cannot read '{path}': {reason}") from error
     try:
-        content = yaml.load(text, Loader=_StrictLoader)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
-        raise DataError(f"'{path}'{where}: {error.problem or error.context}") from error
-    except yaml.YAMLError as error:
-        raise DataError(f"'{path}' is not YAML: {error}") from error
+        text = data.decode('utf-8')
+    except UnicodeDecodeError as error:
+        line = data.count(b'\n', 0, error.start) + 1
+        raise DataError(
+            f"'{path}', line {line}: not a text file in UTF-8: {error.reason}") from error
+    content = parse_yaml(text, f"'{path}'")
     if content is None:
         return {}
     if not isinstance(content, dict):
@@ -123,26 +127,59 @@ def load_yaml(path: str | Path) -> dict[str, Any]:
     return content
 
 
-def read_value(text: str) -> Any:
-    """Read one value as a parameter file's; raises DataError when it is not YAML."""
+def parse_yaml(text: str, where: str) -> Any:
+    """Read YAML strictly: mappings, lists, and scalars as ROS 2 reads them.
+
+    Stricter than PyYAML: a name that stands twice, an alias and a tag other than those of the
+    scalars are errors (an alias can stand for more values than there is memory; ROS 2 refuses
+    them too). ``1e-3`` is a number, a date is text, and names are always text.
+
+    Parameters
+    ----------
+    text : str
+        At most ``LARGEST_FILE`` characters, nested at most ``DEEPEST`` deep.
+    where : str
+        What the text is, for errors.
+
+    Returns
+    -------
+    dict, list, str, float, int, bool or None
+
+    Raises
+    ------
+    DataError
+        If it is not such YAML; the text names line and column.
+    """
+    if len(text) > LARGEST_FILE:
+        raise DataError(f'{where} is longer than {LARGEST_FILE} characters')
     try:
-        return yaml.load(text, Loader=_StrictLoader)
-    except yaml.YAMLError as error:
-        raise DataError(f"'{text}' is no value in YAML: {error}") from error
+        node = _Composer(text).get_single_node()
+        return None if node is None else _value(node)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
+        raise DataError(f'{where}{place}: {error.problem or error.context}') from error
+    except yaml.reader.ReaderError as error:
+        line = text.count('\n', 0, error.position) + 1
+        raise DataError(f'{where}, line {line}: not YAML: {error.reason}') from error
 
 
-def node_parameters(path: str | Path, node_name: str) -> dict[str, Any]:
-    """Read the parameters of one node from a ROS 2 parameter file, as the node itself would.
+def node_parameters(
+    content: Mapping[str, Any], node_name: str, path: str | Path
+) -> dict[str, Any]:
+    """Pick the parameters of one node from a ROS 2 parameter file, as the node itself would.
 
     Of the sections that mean the node (its own, ``/**``, ``/**/name`` ...) the later one in the
     file overrides the earlier one. Parameters in groups get dotted names.
 
     Parameters
     ----------
-    path : str or Path
-        Parameter file with ``ros__parameters`` under each node's name.
+    content : mapping
+        Of the file, with ``ros__parameters`` under each node's name.
     node_name : str
         With a namespace where it has one: ``/robot_1/posture_control``.
+    path : str or Path
+        The file, for errors.
 
     Returns
     -------
@@ -151,12 +188,10 @@ def node_parameters(path: str | Path, node_name: str) -> dict[str, Any]:
 
     Raises
     ------
-    MissingFileError
-        If the file does not exist or cannot be read.
     DataError
         If it is no parameter file, or has neither a section ``/**`` nor one for this node.
     """
-    sections = _sections(load_yaml(path), '', path)
+    sections = _sections(content, '', path)
     matching = [name for name in sections if _applies(name, node_name)]
     if not matching:
         raise DataError(f"'{path}' has no parameters for node '{node_name}'; it has sections for "
@@ -188,34 +223,92 @@ def unused_sections(path: str | Path, namespace: str, kinds: Collection[str]) ->
     return found
 
 
-class _StrictLoader(yaml.SafeLoader):
-    """A SafeLoader that refuses a key twice and reads ``1e-3`` as a number, as ROS 2 does."""
+class _Composer(yaml.SafeLoader):
+    """PyYAML's parser with the scalars of ROS 2, without aliases and bottomless nesting."""
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: set[str] = set()
-        for key, _ in node.value:
-            if isinstance(key, yaml.ScalarNode) and key.tag != 'tag:yaml.org,2002:merge':
-                if key.value in seen:
-                    raise yaml.constructor.ConstructorError(
-                        None, None, f"the key '{key.value}' stands twice", key.start_mark)
-                seen.add(key.value)
-        return super().construct_mapping(node, deep=deep)
+    _depth = 0
 
-    def construct_tuple(self, node: yaml.SequenceNode) -> list[Any]:
-        """Read what launch makes of a list that it hands to a node."""
-        return list(self.construct_sequence(node))
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        problem = ''
+        if self.check_event(yaml.AliasEvent):
+            problem = 'an alias (*name) is not valid; write out what it stands for'
+        elif self._depth >= DEEPEST:
+            problem = f'nested deeper than {DEEPEST}'
+        if problem:
+            raise yaml.MarkedYAMLError(problem=problem, problem_mark=self.peek_event().start_mark)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
 
 
-_StrictLoader.add_implicit_resolver(
-    'tag:yaml.org,2002:float', re.compile(r'^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$'),
-    list('-+.0123456789'))
-_StrictLoader.add_constructor('tag:yaml.org,2002:python/tuple', _StrictLoader.construct_tuple)
+def _value(node: yaml.Node) -> Any:
+    """Content of a node as plain Python values."""
+    if node.tag == f'{_TAG}map' and isinstance(node, yaml.MappingNode):
+        content: dict[str, Any] = {}
+        for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode) or not key.value.isprintable():
+                raise _error(key, 'a name must be a word or text on one line')
+            if key.value in content:
+                raise _error(key, f'the key {key.value!r} stands twice')
+            content[key.value] = _value(value)
+        return content
+    # launch writes the lists that it hands to a node as tuples.
+    if (node.tag in (f'{_TAG}seq', f'{_TAG}python/tuple')
+            and isinstance(node, yaml.SequenceNode)):
+        return [_value(entry) for entry in node.value]
+    kind = node.tag.removeprefix(_TAG)
+    if kind not in _SCALARS or not isinstance(node, yaml.ScalarNode):
+        raise _error(node, f'the tag {node.tag!r} is not valid here; valid are '
+                           f"{', '.join(_SCALARS)}")
+    try:
+        return _SCALARS[kind](node.value)
+    except ValueError as error:
+        raise _error(node, f'no value of type {kind}: {error}') from error
+
+
+def _error(node: yaml.Node, problem: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+
+
+def _whole(text: str) -> int:
+    """Whole number in decimal, octal (``010``) or hexadecimal notation."""
+    digits = text.lstrip('+-').lower()
+    base = 16 if digits.startswith('0x') else 8 if digits.startswith('0') else 10
+    value = int(text, base) if len(text) < 80 else inf
+    if not -2**63 <= value < 2**63:
+        raise ValueError('a whole number has at most 64 bits')
+    return int(value)
+
+
+def _truth(text: str) -> bool:
+    """``true``, ``yes``, ``on`` or their opposites."""
+    if not _BOOL.fullmatch(text):
+        raise ValueError('valid are true and false')
+    return text.lower() in ('true', 'yes', 'on')
+
+
+_TAG = 'tag:yaml.org,2002:'
+_BOOL = re.compile('(?i:true|false|yes|no|on|off)')
+_SCALARS: dict[str, Callable[[str], Any]] = {
+    'str': str, 'null': lambda _: None, 'bool': _truth, 'int': _whole,
+    'float': lambda text: float(re.sub(r'\.(?=[iInN])', '', text))}
+_Composer.yaml_implicit_resolvers = {}
+for _kind, _pattern, _first in (
+    ('null', r'~|null|Null|NULL|', '~nN'),
+    ('bool', _BOOL.pattern, 'tTfFyYnNoO'),
+    ('int', r'[-+]?(0[0-7]*|[1-9][0-9]*|0x[0-9a-fA-F]+)', '-+0123456789'),
+    ('float', r'[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?\.(?i:inf)|\.(?i:nan)',
+     '-+.0123456789'),
+):
+    _Composer.add_implicit_resolver(
+        f'{_TAG}{_kind}', re.compile(f'(?:{_pattern})$'), [*_first, *([''] * (_kind == 'null'))])
 
 
 def _not_found(name: str | Path, folders: list[Path]) -> str:
     """Say what is there instead: the files of the folder that was meant, and near names."""
     if not folders:
-        return f"file '{name}' does not exist"
+        return f'file {str(name)!r} does not exist'
     meant = Path(name).parent
     exist = sorted({path.relative_to(folder) for folder in folders
                     for path in folder.rglob('*.yaml')})
@@ -223,7 +316,7 @@ def _not_found(name: str | Path, folders: list[Path]) -> str:
     by_stem = {path.stem: path for path in exist if path.parent == meant or meant == Path('.')}
     near = get_close_matches(Path(name).stem, by_stem, n=1)
     guess = f'did you mean {by_stem[near[0]].with_suffix("").as_posix()}? ' if near else ''
-    return (f"file '{name}' does not exist in the current folder nor in "
+    return (f"file {str(name)!r} does not exist in the current folder nor in "
             f"{', '.join(map(str, folders))}; {guess}there are {', '.join(beside) or 'no files'}")
 
 
@@ -232,15 +325,15 @@ def _sections(content: Mapping[str, Any], prefix: str,
     """Collect the flat parameters of every node, keyed by the node's full name or pattern."""
     sections: dict[str, dict[str, Any]] = {}
     for key, value in content.items():
-        name = f"{prefix}/{str(key).strip('/')}"
+        name = f"{prefix}/{key.strip('/')}"
         if not isinstance(value, Mapping):
             raise DataError(f"'{path}': '{name}' must be a mapping with '{_PARAMETERS_KEY}:' in "
-                            f'it, not {value!r}')
+                            f'it, not {shown(value)}')
         below = dict(value)
         parameters = below.pop(_PARAMETERS_KEY, {})
         if not isinstance(parameters, Mapping):
             raise DataError(f"'{path}': '{_PARAMETERS_KEY}' of '{name}' must be a mapping, "
-                            f'not {parameters!r}')
+                            f'not {shown(parameters)}')
         if _PARAMETERS_KEY in value:
             sections.setdefault(name, {}).update(_flat(parameters))
         sections.update(_sections(below, name, path))

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.core.parameters import check_names, shown
 from dmp_cpg_ros.core.primitives.basis import GaussianBases, VonMisesBases
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
@@ -111,28 +113,18 @@ def load_primitive(path: str | Path) -> DiscretePrimitive | RhythmicPrimitive:
         If a number is out of its range.
     """
     path = Path(path)
-    try:
-        content = yaml.safe_load(path.read_text(encoding='utf-8'))
-    except OSError as error:
-        raise MissingFileError(f'{path} cannot be read: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise DataError(f'{path} is not YAML: {error}') from error
-    if not isinstance(content, dict) or str(content.get('kind')) not in _SCALARS:
+    content = load_yaml(path)
+    kind = content.get('kind')
+    if not isinstance(kind, str) or kind not in _SCALARS:
         raise DataError(
             f"{path} is not a movement primitive: its 'kind' must be one of {', '.join(_SCALARS)}"
         )
-    kind = content['kind']
     if content.get('format') != _FORMAT:
         raise DataError(
-            f'{path}: format {content.get("format")!r} is not known; valid is {_FORMAT}'
+            f'{path}: format {shown(content.get("format"))} is not known; valid is {_FORMAT}'
         )
     keys = (*_COMMON, *_SCALARS[kind], *_VECTORS[kind])
-    for key in keys:
-        if key not in content:
-            raise DataError(f"{path}: key '{key}' is missing; needed are {', '.join(keys)}")
-    for key in content:
-        if key not in keys:
-            raise DataError(f"{path}: there is no key '{key}'; valid are {', '.join(keys)}")
+    check_names(content, keys, keys, str(path))
     return _built(content, path)
 
 

@@ -20,7 +20,8 @@ from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
-from dmp_cpg_ros.core.modes.body_mode import ModeParameters
+from dmp_cpg_ros.core.modes.manager import ModeParameters
+from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.world import World
@@ -105,7 +106,7 @@ def load_gait(name: str, file: str | Path = 'gaits.yaml') -> Gait:
     """Read one gait; raises ParameterError with the valid names when it is not there."""
     gaits = load_gaits(file)
     if name not in gaits:
-        raise ParameterError(f"there is no gait '{name}'; valid are {', '.join(gaits)}")
+        raise ParameterError(f"there is no gait {shown(name)}; valid are {', '.join(gaits)}")
     return gaits[name]
 
 
@@ -141,7 +142,9 @@ def load_suite(
             raise ParameterError(
                 f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}"
             )
-    sets = {kind.name: node_sets(path, kind.name, overrides, namespace) for kind in WALKING}
+    content = load_yaml(path)
+    sets = {kind.name: _node_sets(content, path, kind.name, overrides, namespace)
+            for kind in WALKING}
     canonical, robot = sets[CANONICAL], sets[ROBOT]
     parameters = SuiteParameters(
         sets[REFERENCE][ReferenceParameters],
@@ -202,8 +205,15 @@ def node_sets(
     DmpCpgError
         As :func:`load_suite`.
     """
+    return _node_sets(load_yaml(path), path, kind, overrides or {}, namespace, name)
+
+
+def _node_sets(
+    content: Mapping[str, Any], path: Path, kind: str, overrides: Mapping[str, Any],
+    namespace: str = '', name: str | None = None,
+) -> dict[type[Any], Any]:
     node = f'{namespace.rstrip("/")}/{name or next(iter(KINDS[kind].instances))}'
-    given = {**node_parameters(path, node), **(overrides or {})}
+    given = {**node_parameters(content, node, path), **overrides}
     for name in given:
         if name not in SUITE_NAMES and name not in NODE_NAMES:
             raise ParameterError(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.modes.body_command import BALANCED
+from dmp_cpg_ros.core.modes.command import BALANCED
 
 Array = NDArray[np.float64]
 

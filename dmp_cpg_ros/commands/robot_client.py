@@ -31,7 +31,7 @@ from dmp_cpg_ros.commands.suite_client import (
     deliver,
 )
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.core.modes.body_requests import REQUESTS
+from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.nodes.middleware import prepare_middleware
 from dmp_cpg_ros.nodes.ros_parameters import plain

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dmp_cpg_ros.configuration import read_value
+from dmp_cpg_ros.configuration import parse_yaml
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 
 LEVELS = {'debug': logging.DEBUG, 'info': logging.INFO, 'warn': logging.WARNING,
@@ -99,7 +99,7 @@ def read_parameter(text: str) -> tuple[str, Any]:
     if ':' in name:
         raise ParameterError(f"'{text}' is for one node; values here hold for every node that has "
                              f'the parameter: {text.rpartition(":")[0].rpartition(":")[2]}:=...')
-    return name, read_value(value)
+    return name, parse_yaml(value, f"'{name}'")
 
 
 def checked_namespace(text: str) -> str:

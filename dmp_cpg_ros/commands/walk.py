@@ -23,7 +23,12 @@ from dmp_cpg_ros.commands.ros_arguments import (
     read_parameter,
 )
 from dmp_cpg_ros.commands.run_folder import make_run_folder, resolved_parameters, write_parameters
-from dmp_cpg_ros.configuration import config_folders, find_config, load_yaml, unused_sections
+from dmp_cpg_ros.configuration import (
+    config_folders,
+    find_config,
+    load_yaml,
+    unused_sections,
+)
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork

@@ -39,14 +39,13 @@ from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorSta
 from dmp_cpg_ros.core.inhibition.vote_counter import VoteCounter
 from dmp_cpg_ros.core.inhibition.voting_sensors import vote_sensors
 from dmp_cpg_ros.core.maths.updated import updated
-from dmp_cpg_ros.core.modes.body_command import BodyCommand
-from dmp_cpg_ros.core.modes.body_control import BodyControl
-from dmp_cpg_ros.core.modes.body_mode import ModeState
-from dmp_cpg_ros.core.modes.body_requests import REQUESTS
+from dmp_cpg_ros.core.modes.command import BALANCED, BodyCommand
+from dmp_cpg_ros.core.modes.manager import ModeManager, ModeState
 from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
+from dmp_cpg_ros.core.modes.requests import REQUESTS, request
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
@@ -128,10 +127,10 @@ class WalkingLoop:
         )
         known_legs = RobotLegs(description)
         self.posture = PostureController(description, self.network.gait, p.posture, known_legs)
-        self.body = BodyControl(description, p.mode, known_legs)
+        self.body = ModeManager(description, p.mode, known_legs)
         self.legs = [LegPrimitive(leg, description, self.network.gait, p.leg) for leg in LEGS]
         self.motions = [
-            LegMotion(slice(3 * i, 3 * i + 3), self.body.modes.movements, leg.transformation)
+            LegMotion(slice(3 * i, 3 * i + 3), self.body.movements, leg.transformation)
             for i, leg in enumerate(self.legs)
         ]
         self.stop = self.supervisor.initial_state()
@@ -261,7 +260,7 @@ class WalkingLoop:
         DataError
             If it is refused.
         """
-        self.mode, answer = self.body.request(self.mode, what)
+        self.mode, answer = request(self.body, self.mode, what)
         if not answer.accepted:
             raise DataError(f'{what}: {answer.text}')
         return answer.text
@@ -380,13 +379,13 @@ class WalkingLoop:
         self.mode = body.step(
             self.mode, state, self.x, x_dot, self.r, self.posture_state.activity
         )
-        if not body.balances(self.mode):
+        if self.mode.mode not in BALANCED:
             self.posture_state = self.posture.initial_state()
             return body.feedback(self.mode, state)
         self.posture_state, feedback = self.posture.step(
             self.posture_state, state, self.x, x_dot, self.r, dt
         )
-        return body.labelled(self.mode, feedback)
+        return updated(feedback, mode=self.mode.mode)
 
     def _leg(
         self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float

@@ -10,12 +10,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, TypeVar
 
 from dmp_cpg_ros.core.errors import ParameterError
 
 P = TypeVar('P', bound='Parameters')
+
+LONGEST_SHOWN = 120
+"""Length up to which an error shows a wrong value."""
 
 
 def parameter(
@@ -77,12 +80,7 @@ class Parameters:
         ParameterError
             If a name is not a parameter (the valid names are listed) or a value is bad.
         """
-        names = [field.name for field in dataclasses.fields(cls)]
-        for name in values:
-            if name not in names:
-                raise ParameterError(
-                    f"{where}: there is no parameter '{name}'; valid are {', '.join(names)}"
-                )
+        check_names(values, [field.name for field in dataclasses.fields(cls)], (), where)
         return cls(**values)
 
 
@@ -93,12 +91,37 @@ def range_of(cls: type[Parameters], name: str) -> tuple[float, float]:
     return -math.inf if low is None else low, math.inf if high is None else high
 
 
+def check_names(
+    values: Any, valid: Collection[str], required: Collection[str], where: str,
+) -> None:
+    """Raise ParameterError unless the values are a mapping with valid names, the required ones
+    among them; the text says what is valid.
+    """
+    if not isinstance(values, Mapping):
+        raise ParameterError(f'{where} must be a mapping with {", ".join(valid)}, '
+                             f'not {shown(values)}')
+    for name in values:
+        if name not in valid:
+            raise ParameterError(
+                f"{where}: there is no entry {shown(name)}; valid are {', '.join(valid)}")
+    for name in required:
+        if name not in values:
+            raise ParameterError(
+                f"{where}: the entry '{name}' is missing; required are {', '.join(required)}")
+
+
+def shown(value: Any) -> str:
+    """Any value in an error: one line that is not long."""
+    text = repr(value)
+    return text if len(text) <= LONGEST_SHOWN else f'{text[:LONGEST_SHOWN]}...'
+
+
 def _checked(field: dataclasses.Field[Any], value: Any) -> Any:
     """Return the value converted to the type of its default, or raise ParameterError."""
     default = field.default
     if isinstance(default, tuple):
         if not isinstance(value, (tuple, list)):
-            raise ParameterError(f"parameter '{field.name}' must be a list, not {value!r}")
+            raise ParameterError(f"parameter '{field.name}' must be a list, not {shown(value)}")
         like = default[0] if default else 0.0
         return tuple(_checked_scalar(field, like, entry) for entry in value)
     return _checked_scalar(field, default, value)
@@ -108,18 +131,18 @@ def _checked_scalar(field: dataclasses.Field[Any], like: Any, value: Any) -> Any
     name, unit = field.name, field.metadata.get('unit', '')
     if isinstance(like, bool):
         if not isinstance(value, bool):
-            raise ParameterError(f"parameter '{name}' must be true or false, not {value!r}")
+            raise ParameterError(f"parameter '{name}' must be true or false, not {shown(value)}")
         return value
     if isinstance(like, str):
         choices = field.metadata.get('choices', ())
         if not isinstance(value, str) or (choices and value not in choices):
             valid = f'one of {", ".join(choices)}' if choices else 'text'
-            raise ParameterError(f"parameter '{name}' must be {valid}, not {value!r}")
+            raise ParameterError(f"parameter '{name}' must be {valid}, not {shown(value)}")
         return value
     if isinstance(like, int) and not (isinstance(value, int) and not isinstance(value, bool)):
-        raise ParameterError(f"parameter '{name}' must be a whole number, not {value!r}")
+        raise ParameterError(f"parameter '{name}' must be a whole number, not {shown(value)}")
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ParameterError(f"parameter '{name}' must be a number, not {value!r}")
+        raise ParameterError(f"parameter '{name}' must be a number, not {shown(value)}")
     low, high = field.metadata.get('minimum'), field.metadata.get('maximum')
     if (
         not math.isfinite(value)
@@ -129,7 +152,7 @@ def _checked_scalar(field: dataclasses.Field[Any], like: Any, value: Any) -> Any
         low_text = '-inf' if low is None else f'{low:g}'
         high_text = 'inf' if high is None else f'{high:g}'
         raise ParameterError(
-            f"parameter '{name}' = {value!r} {unit} is outside its range "
+            f"parameter '{name}' = {shown(value)} {unit} is outside its range "
             f'[{low_text}, {high_text}] {unit}'.replace('  ', ' ').rstrip()
         )
     return value if isinstance(like, int) else float(value)

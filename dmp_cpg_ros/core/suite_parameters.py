@@ -17,7 +17,7 @@ from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSo
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
-from dmp_cpg_ros.core.modes.body_mode import ModeParameters
+from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS

@@ -7,8 +7,8 @@ from __future__ import annotations
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.modes.body_command import MODES
-from dmp_cpg_ros.core.modes.body_mode import ModeState
+from dmp_cpg_ros.core.modes.command import MODES
+from dmp_cpg_ros.core.modes.manager import ModeState
 from dmp_cpg_ros.nodes.message_values import set_stamp
 
 

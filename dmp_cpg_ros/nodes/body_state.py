@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.estimation.parameters import (
 )
 from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.nodes.interfaces import BODY_TOPICS

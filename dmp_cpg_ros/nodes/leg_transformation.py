@@ -8,9 +8,9 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dmp_cpg_ros.core.modes.body_command import BodyCommand
+from dmp_cpg_ros.core.modes.command import BodyCommand
 from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
-from dmp_cpg_ros.core.modes.movements import Movements
+from dmp_cpg_ros.core.modes.motion_library import Movements
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.core.suite_parameters import LegChoice
 from dmp_cpg_ros.core.transformation.joint_system import TransformationState

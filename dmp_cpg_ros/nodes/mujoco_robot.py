@@ -20,7 +20,7 @@ from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.canonical.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
-from dmp_cpg_ros.core.modes.body_command import BALANCED
+from dmp_cpg_ros.core.modes.command import BALANCED
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
@@ -42,12 +42,12 @@ from dmp_cpg_ros.nodes.readiness import Intervals, ReadinessOfOthers
 from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
 from dmp_cpg_ros.nodes.robot_timing import RobotTiming
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters, NodeParameters
+from dmp_cpg_ros.robot.fallback import FallbackController
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
-from dmp_cpg_ros.robot.refuge import Refuge
 from dmp_cpg_ros.robot.robot_file import load_robot_file
-from dmp_cpg_ros.robot.target_guard import TargetGuard
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT
 
 INCIDENT_NS = 1_000_000_000
@@ -227,7 +227,7 @@ class MujocoRobotNode(ManagedNode):
                 self.warn(
                     'silent',
                     f'no targets from {", ".join(silent)} for {self._options.target_timeout} s: '
-                    f'the robot looks after itself: {RETREATS[self._guard.retreat]}',
+                    f'the robot looks after itself: {RETREATS[self._guard.fallback]}',
                     error=True,
                 )
 
@@ -340,9 +340,9 @@ class MujocoRobotNode(ManagedNode):
 
     # Inside --------------------------------------------------------------------------------------
 
-    def _new_guard(self) -> TargetGuard:
-        refuge = Refuge(self._robot.description)
-        return TargetGuard(refuge, round(self._options.target_timeout * 1e9))
+    def _new_guard(self) -> CommandWatchdog:
+        fallback = FallbackController(self._robot.description)
+        return CommandWatchdog(fallback, round(self._options.target_timeout * 1e9))
 
     def _make_robot(self) -> Robot:
         p, file = self._options, find_config(self.parameters_of(RobotFileParameters).robot)

@@ -10,10 +10,11 @@ from typing import Any
 
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
-from dmp_cpg_ros.core.modes.body_control import BodyControl
-from dmp_cpg_ros.core.modes.body_mode import ModeParameters
-from dmp_cpg_ros.core.modes.body_requests import REQUESTS
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.modes.command import BALANCED
+from dmp_cpg_ros.core.modes.manager import ModeManager, ModeParameters
+from dmp_cpg_ros.core.modes.requests import REQUESTS
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.body_mode_messages import BodyModeWriter
 from dmp_cpg_ros.nodes.body_state import BodyState
@@ -53,7 +54,7 @@ class PostureControl(ManagedNode):
         )
         self._body = BodyState(self, description, legs)
         self._memory = self._controller.initial_state()
-        self._modes = BodyControl(description, self.parameters_of(ModeParameters), legs)
+        self._modes = ModeManager(description, self.parameters_of(ModeParameters), legs)
         self._mode, self._told = self._modes.initial_state(), ''
         self._mode_writer, self._mode_publisher = BodyModeWriter(), self.publisher('body_mode')
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
@@ -98,9 +99,9 @@ class PostureControl(ManagedNode):
         follow_gait(self, self._controller.gait)
         r, modes = values['reference'], self._modes
         self._mode = modes.step(self._mode, state, x, x_dot, r, self._memory.activity)
-        if modes.balances(self._mode):
+        if self._mode.mode in BALANCED:
             self._memory, feedback = self._controller.step(self._memory, state, x, x_dot, r, dt)
-            feedback = modes.labelled(self._mode, feedback)
+            feedback = updated(feedback, mode=self._mode.mode)
         else:
             self._memory, feedback = (
                 self._controller.initial_state(),
@@ -133,7 +134,7 @@ class PostureControl(ManagedNode):
                 response.success = False
                 response.message = f'posture_control is {self.state_label}, not active'
                 return response
-            self._mode, given = self._modes.request(self._mode, what)
+            self._mode, given = request(self._modes, self._mode, what)
             response.success, response.message = given.accepted, given.text
             return response
 

@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.core.modes.body_requests import REQUESTS
+from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.scenario.events import Command
 from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Scenario

@@ -8,11 +8,11 @@ import numpy as np
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.camera import Camera, Picture
-from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.leg_reader import foot_position
 from dmp_cpg_ros.robot.model_reader import find_ids, read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import RobotFile
+from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 COLOURS = {
     'fl': (0.86, 0.15, 0.15), 'fr': (0.10, 0.38, 0.90),

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.robot.foot_load import rolling_radius
-from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.leg_reader import (
     Foot,
     check_leg,
@@ -26,6 +24,7 @@ from dmp_cpg_ros.robot.leg_reader import (
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
+from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 Vector = NDArray[np.float64]
 
@@ -35,6 +34,9 @@ USUAL_VELOCITY_LIMIT = 30.0  # [rad/s] Unitree Go1's published figure, for model
 GAIN_OVER_WEIGHT = 1.7  # kp / (m g L); gives 60 N m/rad for 9 kg and legs of 0.4 m
 DAMPING_TIME = 0.15  # kd / kp in units of sqrt(L / g)
 _PLACE_OF_LEG = {'fl': (1, 1), 'fr': (1, -1), 'rl': (-1, 1), 'rr': (-1, -1)}  # signs of x, y
+
+BISECTIONS = 30
+"""Of the search for the rolling radius of the feet."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
         belly_depth=_belly_depth(model, ids.base))
     standing = pose(model, ids, home_joint_position(description))
     com, inertia = _composite_inertia(model, standing, ids.base)
-    radius = rolling_radius(model, standing, int(model.jnt_qposadr[ids.free_joint]), ids.feet)
+    radius = _rolling_radius(model, standing, int(model.jnt_qposadr[ids.free_joint]), ids.feet)
     if radius is not None:
         legs = tuple(replace(leg, foot_radius=radius) for leg in legs)
     return replace(description, legs=legs, base_inertia=inertia, com_in_base=com)
@@ -225,3 +227,59 @@ def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData,
         inertia += (R * model.body_inertia[body]) @ R.T
         inertia += m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     return com, inertia
+
+
+def _rolling_radius(model: mujoco.MjModel, data: mujoco.MjData, base_qpos: int,
+                  feet: tuple[Foot, ...]) -> float | None:
+    """Distance from the feet's centres to where they touch while the robot stands on them.
+
+    Some models have soft feet (centimetres), which roll on a smaller radius than their shape says;
+    where the body's way is told from the joints, that shows as a wrong speed. The base is lowered
+    until inverse dynamics at rest finds contact forces that carry the weight.
+    MuJoCo's contact point, at which friction acts, is half as deep in the ground as the foot.
+
+    Parameters
+    ----------
+    model, data
+        MuJoCo's, the joints in the home pose; the base is moved.
+    base_qpos : int
+        Where the base's position is in ``qpos``.
+    feet : tuple of Foot
+        The feet.
+
+    Returns
+    -------
+    float or None
+        [m]; None where the feet have no contact sphere, or sink in to their centres.
+    """
+    radius = float(np.mean([foot.radius for foot in feet]))
+    if radius == 0.0:
+        return None
+    body = int(model.body_rootid[feet[0].body])
+    weight = -float(model.body_subtreemass[body] * model.opt.gravity[2])
+    data.qvel[:], data.qacc[:] = 0.0, 0.0
+
+    def carried(centre: float) -> float:
+        mujoco.mj_kinematics(model, data)
+        heights = [float(foot_position(data, foot)[2]) for foot in feet]
+        data.qpos[base_qpos + 2] += centre - np.mean(heights)
+        mujoco.mj_inverse(model, data)
+        return _normal_force(model, data)
+
+    low, high = 0.0, radius
+    if not carried(low) > weight > carried(high):
+        return None
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if carried(middle) > weight else (low, middle)
+    return 0.5 * (radius + high)
+
+
+def _normal_force(model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Sum of the normal forces of all contacts [N]."""
+    wrench: Vector = np.zeros(6)
+    total = 0.0
+    for i in range(data.ncon):
+        mujoco.mj_contactForce(model, data, i, wrench)
+        total += float(wrench[0])
+    return total

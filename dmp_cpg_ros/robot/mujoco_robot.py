@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import World, height_over_ground
 from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue
 from dmp_cpg_ros.robot.contact_reader import ContactReader
-from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.joint_actuators import JointActuators, as_slice
 from dmp_cpg_ros.robot.joint_drive import JointDrive
 from dmp_cpg_ros.robot.model_loader import load_model
@@ -28,7 +28,7 @@ from dmp_cpg_ros.robot.port import RobotError, steps_per_tick
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
 from dmp_cpg_ros.robot.sensor_noise import SensorNoise
 from dmp_cpg_ros.robot.standing_torque import standing_torque
-from dmp_cpg_ros.robot.start_pose import StartPose
+from dmp_cpg_ros.robot.start_pose import StartPose, home_joint_position
 from dmp_cpg_ros.robot.start_pose import start_pose as pose_of
 
 Vector = NDArray[np.float64]
@@ -326,8 +326,4 @@ def _xyzw(quaternion: Vector) -> Vector:
 
 def _rotation(quaternion: Vector) -> Vector:
     """Rotation matrix (3, 3) of a quaternion w, x, y, z."""
-    w, x, y, z = quaternion.tolist()
-    return np.array((
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))))
+    return np.array(rotation(_xyzw(quaternion).tolist()))

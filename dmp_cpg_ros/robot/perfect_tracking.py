@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.modes.postures import lying_posture
+from dmp_cpg_ros.core.modes.motion_library import lying_posture
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
-from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.joint_drive import checked_targets
 from dmp_cpg_ros.robot.port import steps_per_tick
+from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 Vector = NDArray[np.float64]
 

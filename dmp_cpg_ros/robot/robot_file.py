@@ -7,21 +7,23 @@ from __future__ import annotations
 import dataclasses
 import importlib.resources
 import importlib.util
-import math
-from collections.abc import Mapping
+import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-import yaml
-
+from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
+from dmp_cpg_ros.core.parameters import check_names, shown
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 
+T = TypeVar('T')
 Triple = tuple[float, float, float]
 
 _REQUIRED = ('model', 'base', 'joints', 'feet')
-_OPTIONAL = ('stance_height', 'kp', 'kd', 'torque_limit', 'velocity_limit')
+_PER_JOINT = ('kp', 'kd', 'torque_limit', 'velocity_limit')
 
 OWN_MODEL = 'mini_quadruped.xml'
 
@@ -85,49 +87,33 @@ def load_robot_file(path: Path | str) -> RobotFile:
     ------
     MissingFileError
         If the file or the model that it names does not exist.
+    DataError
+        If the file is no YAML mapping.
     ParameterError
-        If the file is no YAML mapping, or an entry is missing, unknown or of the wrong form.
+        If an entry is missing, unknown or of the wrong form.
     """
-    path = Path(path).expanduser()
-    try:
-        text = path.read_text(encoding='utf-8')
-    except OSError as error:
-        raise MissingFileError(f"robot file '{path}' cannot be read: {error.strerror}") from error
-    try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise ParameterError(f"robot file '{path}' is not valid YAML: {error}") from error
-    return parse_robot_file(content, str(path), path.parent)
+    path = Path(os.path.expanduser(path))
+    return parse_robot_file(load_yaml(path), f"robot file '{path}'", path.parent)
 
 
 def parse_robot_file(content: Any, where: str, folder: Path | None) -> RobotFile:
     """Build a RobotFile from a YAML file's content; `where` names the file in errors."""
-    if not isinstance(content, Mapping):
-        raise ParameterError(f"{where}: a robot file is a mapping with {', '.join(_REQUIRED)}")
-    for key in content:
-        if key not in _REQUIRED + _OPTIONAL:
-            raise ParameterError(f"{where}: there is no entry '{key}'; valid are "
-                                 f"{', '.join(_REQUIRED + _OPTIONAL)}")
-    for key in _REQUIRED:
-        if key not in content:
-            raise ParameterError(f"{where}: the entry '{key}' is missing; required are "
-                                 f"{', '.join(_REQUIRED)}")
-    model, base = _text(content['model'], 'model', where), _text(content['base'], 'base', where)
-    per_leg = _by_leg(content['joints'], 'joints', where)
-    joints = []
-    for leg, names in zip(LEGS, per_leg, strict=True):
-        if not isinstance(names, (list, tuple)) or len(names) != len(JOINTS_OF_LEG):
-            raise ParameterError(f"{where}: joints.{leg} must list the three joints "
-                                 f"{', '.join(JOINTS_OF_LEG)}, not {names!r}")
-        abduction, hip, knee = (_text(name, f'joints.{leg}', where) for name in names)
-        joints.append((abduction, hip, knee))
-    feet = tuple(_text(name, 'feet', where) for name in _by_leg(content['feet'], 'feet', where))
+    check_names(content, (*_REQUIRED, 'stance_height', *_PER_JOINT), _REQUIRED, where)
+    joints = [
+        _entries(names, JOINTS_OF_LEG, f'{where}: joints.{leg}', _name)
+        for leg, names in zip(LEGS, _by_leg(content, 'joints', where), strict=True)
+    ]
     height = content.get('stance_height')
+    model = _name(content['model'], f"{where}: 'model'")
     return RobotFile(
-        model=find_model(model, folder), base=base, joints=tuple(joints), feet=feet,
-        stance_height=None if height is None else _positive(height, 'stance_height', where),
-        **{key: _triple(content.get(key), key, where)
-           for key in ('kp', 'kd', 'torque_limit', 'velocity_limit')})
+        model=find_model(model, folder),
+        base=_name(content['base'], f"{where}: 'base'"),
+        joints=tuple(joints),
+        feet=tuple(_name(foot, f"{where}: 'feet'") for foot in _by_leg(content, 'feet', where)),
+        stance_height=(
+            None if height is None else _positive(height, f"{where}: 'stance_height'")),
+        **{key: _per_joint(content[key], f"{where}: '{key}'")
+           for key in _PER_JOINT if content.get(key) is not None})
 
 
 def find_model(name: str, folder: Path | None) -> Path:
@@ -143,48 +129,53 @@ def find_model(name: str, folder: Path | None) -> Path:
     """
     if name.startswith('package://'):
         package, _, inside = name[len('package://'):].partition('/')
-        spec = importlib.util.find_spec(package) if package.isidentifier() else None
+        try:
+            spec = importlib.util.find_spec(package) if package.isidentifier() else None
+        except ValueError:  # a module that nothing was loaded for, such as __main__
+            spec = None
         if spec is None:
-            raise MissingFileError(f"model '{name}': there is no Python package '{package}' here")
+            raise MissingFileError(f'model {shown(name)}: there is no such Python package here')
         places = [Path(root) / inside for root in spec.submodule_search_locations or ()]
     else:
         own = Path(str(importlib.resources.files('dmp_cpg_ros') / 'models'))
-        file = Path(name).expanduser()
+        file = Path(os.path.expanduser(name))
         places = ([] if folder is None else [folder / file]) + [own / file]
     for place in places:
-        if place.is_file():
+        if os.path.isfile(place):
             return place.resolve()
-    looked = ', '.join(f"'{place}'" for place in places)
-    raise MissingFileError(f"model '{name}' was not found; looked at {looked}")
+    looked = ', '.join(repr(str(place)) for place in places)
+    raise MissingFileError(f'model {shown(name)} was not found; looked at {looked}')
 
 
-def _by_leg(value: Any, key: str, where: str) -> list[Any]:
-    if not isinstance(value, Mapping) or sorted(value) != sorted(LEGS):
-        raise ParameterError(f"{where}: '{key}' must have exactly one entry for each leg "
-                             f"{', '.join(LEGS)}, not {value!r}")
-    return [value[leg] for leg in LEGS]
+def _by_leg(content: Mapping[str, Any], key: str, where: str) -> list[Any]:
+    check_names(content[key], LEGS, LEGS, f"{where}: '{key}'")
+    return [content[key][leg] for leg in LEGS]
 
 
-def _text(value: Any, key: str, where: str) -> str:
+def _name(value: Any, where: str) -> str:
     if not isinstance(value, str) or not value:
-        raise ParameterError(f"{where}: '{key}' must be a name, not {value!r}")
+        raise ParameterError(f'{where} must be a name, not {shown(value)}')
     return value
 
 
-def _positive(value: Any, key: str, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not (
-            math.isfinite(value) and value > 0):
-        raise ParameterError(f"{where}: '{key}' must be a positive number, not {value!r}")
+def _positive(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < inf:
+        raise ParameterError(f'{where} must be a positive number, not {shown(value)}')
     return float(value)
 
 
-def _triple(value: Any, key: str, where: str) -> Triple | None:
-    if value is None:
-        return None
+def _per_joint(value: Any, where: str) -> tuple[float, float, float]:
+    """One number for all joints of a leg, or one for each."""
     if not isinstance(value, (list, tuple)):
         value = (value,) * len(JOINTS_OF_LEG)
-    if len(value) != len(JOINTS_OF_LEG):
-        raise ParameterError(f"{where}: '{key}' must be one number or three "
-                             f"({', '.join(JOINTS_OF_LEG)}), not {value!r}")
-    first, second, third = (_positive(entry, key, where) for entry in value)
+    return _entries(value, JOINTS_OF_LEG, where, _positive)
+
+
+def _entries(
+    value: Any, names: tuple[str, ...], where: str, read: Callable[[Any, str], T]
+) -> tuple[T, T, T]:
+    if not isinstance(value, (list, tuple)) or len(value) != len(names):
+        raise ParameterError(
+            f'{where} must list three entries ({", ".join(names)}), not {shown(value)}')
+    first, second, third = (read(entry, where) for entry in value)
     return first, second, third

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How a simulated robot may be found: standing, lying on its belly, or fallen somehow."""
+"""Start poses of a simulated robot: standing at home, lying on its belly, or fallen."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.modes.postures import lying_height, lying_posture
-from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.modes.motion_library import lying_posture
+from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG
 
 Vector = NDArray[np.float64]
 
@@ -23,6 +25,8 @@ FALLEN_SETTLES_S = 1.6
 """Time that the robot is given to come to rest on the ground before its clock starts [s]."""
 
 DROP_CLEARANCE = 0.05  # [m] over the ground of the lowest point that a fallen robot can have
+
+TOLERANCE = 1e-6  # [m] of the foot's place
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ def start_pose(name: str, description: RobotDescription, seed: int) -> StartPose
         If there is no such pose.
     """
     if name == 'lying':
-        place = np.array((0.0, 0.0, lying_height(description)))
+        place = np.array((0.0, 0.0, description.belly_depth))
         upright = np.array((1.0, 0.0, 0.0, 0.0))
         return StartPose(place, upright, lying_posture(description), False, LYING_SETTLES_S)
     if name == 'fallen':
@@ -84,3 +88,44 @@ def start_pose(name: str, description: RobotDescription, seed: int) -> StartPose
         quaternion /= np.linalg.norm(quaternion)
         return StartPose(place, quaternion, joints, True, FALLEN_SETTLES_S)
     raise ParameterError(f"start_pose = '{name}' must be one of {', '.join(START_POSES)}")
+
+
+def home_joint_position(description: RobotDescription) -> Vector:
+    """Return the standing pose.
+
+    Abduction is zero; hip and knee put the centre of the foot straight below the hip joint (in the
+    plane of the leg) so that it touches the ground at the stance height.
+
+    Returns
+    -------
+    ndarray (12,)
+        Joint angles [rad].
+
+    Raises
+    ------
+    ParameterError
+        If a leg cannot reach the ground from the stance height, or only beyond a joint limit.
+    """
+    height = description.stance_height
+    return np.concatenate([_home_of_leg(leg, height) for leg in description.legs])
+
+
+def _home_of_leg(leg: LegGeometry, height: float) -> Vector:
+    kinematics = LegKinematics(leg)
+    foot_in_base = leg.hip_in_base + leg.hip_offset
+    foot_in_base[1] = leg.hip_in_base[1] + kinematics.lateral_offset
+    foot_in_base[2] = leg.foot_radius - height
+    angles = kinematics.inverse(foot_in_base)
+    if np.linalg.norm(kinematics.foot_in_base(angles) - foot_in_base) > TOLERANCE:
+        reach = kinematics.thigh_length + kinematics.shank_length
+        down = leg.hip_in_base[2] + leg.hip_offset[2] - foot_in_base[2]
+        raise ParameterError(
+            f'leg {leg.name} cannot stand at a base height of {height:g} m: its hip joint would '
+            f'be {down:.3f} m over the foot, the leg is {reach:.3f} m long')
+    for angle, low, high, joint in zip(angles, leg.position_lower, leg.position_upper,
+                                       JOINTS_OF_LEG, strict=True):
+        if not low <= angle <= high:
+            raise ParameterError(
+                f'leg {leg.name}: standing at {height:g} m needs {angle:.3f} rad at the {joint}, '
+                f'its limits are {low:.3f} to {high:.3f} rad')
+    return angles

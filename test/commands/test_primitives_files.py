@@ -55,7 +55,7 @@ def test_extreme_numbers_come_back(tmp_path):
         ({'weights': 'many'}, DataError, 'weights'),
         ({'weights': [[1.0], [2.0, 3.0]]}, DataError, 'weights'),
         ({'weights': [[1.0]]}, ParameterError, 'weights'),
-        ({'colour': 'red'}, DataError, 'colour'),
+        ({'colour': 'red'}, ParameterError, 'colour'),
         ({'duration': -1.0}, ParameterError, 'duration'),
         ({'duration': [1.0, 2.0]}, DataError, 'one number'),
         ({'form': 'other'}, ParameterError, 'scaled, printed'),
@@ -76,7 +76,7 @@ def test_a_missing_key_is_named(tmp_path):
     content = yaml.safe_load(path.read_text())
     del content['omega']
     path.write_text(yaml.safe_dump(content))
-    with pytest.raises(DataError, match="'omega' is missing"):
+    with pytest.raises(ParameterError, match="'omega' is missing"):
         load_primitive(path)
 
 
@@ -84,10 +84,10 @@ def test_files_that_are_none_are_named(tmp_path):
     with pytest.raises(MissingFileError, match='nowhere.yaml'):
         load_primitive(tmp_path / 'nowhere.yaml')
     (tmp_path / 'list.yaml').write_text('[1, 2]')
-    with pytest.raises(DataError, match='not a movement primitive'):
+    with pytest.raises(DataError, match='must be a mapping'):
         load_primitive(tmp_path / 'list.yaml')
     (tmp_path / 'broken.yaml').write_text('{a: [')
-    with pytest.raises(DataError, match='not YAML'):
+    with pytest.raises(DataError, match='line 1'):
         load_primitive(tmp_path / 'broken.yaml')
     (tmp_path / 'file').write_text('')
     with pytest.raises(MissingFileError, match='cannot be written'):

@@ -55,7 +55,7 @@ def test_bad_values_are_refused_by_name_with_what_is_valid(
 
 
 def test_unknown_names_list_the_known_ones() -> None:
-    with pytest.raises(ParameterError, match="here: .* no parameter 'speed'; valid are rate,"):
+    with pytest.raises(ParameterError, match="here: .* no entry 'speed'; valid are rate,"):
         Example.from_mapping({'speed': 1.0}, 'here')
 
 

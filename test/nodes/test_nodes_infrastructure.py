@@ -38,7 +38,7 @@ from ros_processes import NodeProcess, Processes, Ros
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from dmp_cpg_ros.configuration import node_parameters
+from dmp_cpg_ros.configuration import load_yaml, node_parameters
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -531,7 +531,7 @@ def test_sections_apply_and_override_as_in_ros(
         node = rclpy.node.Node('node', context=context, namespace=namespace)
         overrides = {name: value.value for name, value in node._parameter_overrides.items()}
         context.try_shutdown()
-        assert node_parameters(path, f'{namespace}/node') == overrides, order
+        assert node_parameters(load_yaml(path), f'{namespace}/node', path) == overrides, order
 
 
 # Readiness -------------------------------------------------------------------------------------

@@ -13,6 +13,8 @@ import pytest
 from checkout import PACKAGE, ROOT
 
 from dmp_cpg_ros.configuration import (
+    DEEPEST,
+    LARGEST_FILE,
     config_folders,
     find_config,
     load_yaml,
@@ -67,7 +69,8 @@ def test_a_missing_absolute_path_is_not_searched_elsewhere(tmp_path: Path) -> No
 def test_every_kind_of_install(package: str, config: str, prefix_path: str,
                                tmp_path: Path) -> None:
     (tmp_path / package / 'core').mkdir(parents=True)
-    for module in ('__init__.py', 'configuration.py', 'core/__init__.py', 'core/errors.py'):
+    for module in ('__init__.py', 'configuration.py', 'core/__init__.py', 'core/errors.py',
+                   'core/parameters.py'):
         shutil.copy(ROOT / PACKAGE / module, tmp_path / package / module)
     (tmp_path / config).mkdir(parents=True)
     (tmp_path / config / 'only_here.yaml').touch()
@@ -85,8 +88,11 @@ def test_every_kind_of_install(package: str, config: str, prefix_path: str,
 
 
 def test_numbers_are_read_as_ros_reads_them(tmp_path: Path) -> None:
-    content = load_yaml(written(tmp_path, 'a: 1e-3\nb: -2.5E2\nc: .5e1\nd: 3\ne: 1e3x\nf: 1.0\n'))
-    assert content == {'a': 0.001, 'b': -250.0, 'c': 5.0, 'd': 3, 'e': '1e3x', 'f': 1.0}
+    text = 'a: 1e-3\nb: -2.5E2\nc: .5e1\nd: 3\ne: 1e3x\nf: 1.0\ng: 010\nh: 0x1F\n'
+    text += 'i: 1:30\nj: .inf\n'
+    content = load_yaml(written(tmp_path, text))
+    assert content == {'a': 0.001, 'b': -250.0, 'c': 5.0, 'd': 3, 'e': '1e3x', 'f': 1.0, 'g': 8,
+                       'h': 31, 'i': '1:30', 'j': float('inf')}
     assert isinstance(content['d'], int) and isinstance(content['a'], float)
 
 
@@ -118,9 +124,23 @@ def test_what_cannot_be_read_is_a_missing_file(tmp_path: Path) -> None:
         load_yaml(tmp_path / 'latin.yaml')
 
 
-def test_an_anchor_may_be_merged_and_overridden(tmp_path: Path) -> None:
-    content = load_yaml(written(tmp_path, 'a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}\n'))
-    assert content['b'] == {'x': 1, 'y': 3}
+@pytest.mark.parametrize(('text', 'said'), [
+    ('a: &a [x]\nb: *a\n', r'line 2, column 4: an alias \(\*name\) is not valid'),
+    ('a: &a [*a]\n', 'line 1, column 8: an alias'),
+    ('a: &a {x: 1}\nb: {<<: *a}\n', 'line 2, column 9: an alias'),
+    ('- ' * 10000, f'nested deeper than {DEEPEST}'),
+    ('[' * 100000, f'nested deeper than {DEEPEST}'),
+    ('a: ' + 'b' * LARGEST_FILE, 'longer than'),
+    ('a: ' + '9' * 5000, 'at most 64 bits'),
+    ('[a, b]: 1', 'line 1, column 1: a name must be'),
+    ('a: !!binary AAAA', "line 1, column 4: the tag .*binary' is not valid"),
+    ('a: !!int b', 'line 1, column 4: no value of type int'),
+    ('a: 1\nb: "\x00"', 'line 2: not YAML'),
+])
+def test_what_would_explode_or_hang_is_refused(text: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=said) as error:
+        load_yaml(written(tmp_path, text))
+    assert '\n' not in str(error.value)
 
 
 PARAMETERS = """
@@ -141,7 +161,8 @@ leg_fl: {ros__parameters: {leg: fl, gain: 1.0}}
 ])
 def test_a_nodes_own_section_overrides_the_shared_one(node: str, gain: float,
                                                       tmp_path: Path) -> None:
-    parameters = node_parameters(written(tmp_path, PARAMETERS), node)
+    path = written(tmp_path, PARAMETERS)
+    parameters = node_parameters(load_yaml(path), node, path)
     assert parameters['gain'] == gain
     assert parameters['rate'] == 250.0
     assert (parameters['group.a'], parameters['group.b.c']) == (1, [1, 2])
@@ -155,8 +176,9 @@ def test_a_nodes_own_section_overrides_the_shared_one(node: str, gain: float,
     ('', 'sections for no node'),
 ])
 def test_what_is_no_parameter_file_says_so(text: str, said: str, tmp_path: Path) -> None:
+    path = written(tmp_path, text)
     with pytest.raises(DataError, match=said):
-        node_parameters(written(tmp_path, text), 'leg_fl')
+        node_parameters(load_yaml(path), 'leg_fl', path)
 
 
 def test_a_section_that_means_no_node_in_the_namespace_is_found(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ LAYERS = {
     'suite_table': ({'core'}, set()),
     'suite': ({'core', 'configuration', 'suite_table'}, set()),
     'primitive_files': ({'core', 'configuration'}, {'numpy', 'yaml'}),
-    'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml'}),
+    'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco'}),
     'nodes': ({'core', 'configuration', 'suite_table', 'suite', 'robot'},
               {'numpy', 'yaml', *ROS, *RECORDS}),
     'analysis': ({'core', 'paper', 'configuration', 'suite_table', 'suite'},

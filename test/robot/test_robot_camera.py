@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.robot.camera import Camera, open_viewer, pose_pictures
-from dmp_cpg_ros.robot.home_pose import home_joint_position
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco, usable_backend
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 HOME = home_joint_position(load_description())
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)

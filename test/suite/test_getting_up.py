@@ -12,14 +12,14 @@ from core_examples import GAITS, GRAVITY, TICK, suite_parameters
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.modes.body_mode import ModeParameters
-from dmp_cpg_ros.core.modes.movements import Movements
+from dmp_cpg_ros.core.modes.manager import ModeParameters
+from dmp_cpg_ros.core.modes.motion_library import Movements
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 
 pytest.importorskip('mujoco')
+from dmp_cpg_ros.robot.fallback import FallbackController
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.robot.refuge import Refuge
-from dmp_cpg_ros.robot.target_guard import TargetGuard
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 
 HOLD_NS = 200_000_000
 
@@ -60,7 +60,7 @@ def test_it_stands_up_from_its_belly_within_its_limits_and_never_sinks() -> None
     low = life.robot.description.belly_depth
     assert life.states[0].base_position_in_world[2] == pytest.approx(low, abs=2e-3)
     life.loop.request_mode('stand_up')
-    life.go(life.loop.body.modes.movements.duration(('rise',)))
+    life.go(life.loop.body.movements.duration(('rise',)))
     height = life.column('base_position_in_world')[:, 2]
     assert (np.diff(height) > -5e-4).all()
     life.go(0.8)
@@ -141,10 +141,10 @@ def test_a_start_pose_that_is_none_is_refused() -> None:
         MujocoRobot(start_pose='hanging')
 
 
-def left_alone(life: Life, seconds: float, prepare: Callable[[Life], None]) -> TargetGuard:
+def left_alone(life: Life, seconds: float, prepare: Callable[[Life], None]) -> CommandWatchdog:
     """Let the legs fall silent and the robot look after itself."""
     prepare(life)
-    guard = TargetGuard(Refuge(life.robot.description), HOLD_NS)
+    guard = CommandWatchdog(FallbackController(life.robot.description), HOLD_NS)
     for i, leg in enumerate(LEGS):
         joints = slice(3 * i, 3 * i + 3)
         targets = life.loop.tick(life.states[-1]).targets
@@ -179,7 +179,7 @@ def test_left_alone_it_looks_after_itself_and_does_not_drop(
     life = Life(start)
     begin = len(life.states)
     guard = left_alone(life, 3.0, prepare)
-    assert guard.retreat == retreat
+    assert guard.fallback == retreat
     down = np.diff(life.column('base_position_in_world')[begin:, 2]) / TICK
     last = life.states[-1]
     assert np.linalg.norm(last.base_velocity_in_base) < 0.02

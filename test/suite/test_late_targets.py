@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
+from dmp_cpg_ros.robot.fallback import FallbackController
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
-from dmp_cpg_ros.robot.refuge import Refuge
-from dmp_cpg_ros.robot.target_guard import CARRIED_NS, TargetGuard
+from dmp_cpg_ros.robot.watchdog import CARRIED_NS, CommandWatchdog
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 pytest.importorskip('mujoco')
@@ -28,11 +28,12 @@ LONGEST = CARRIED_NS // TICK_NS
 SUITE = load_suite(None, {'auto_inhibit': False, 'cmd_vel_timeout': 0.0})
 
 
-def make_guard(description: object) -> TargetGuard:
-    return TargetGuard(Refuge(description), round(1e9 * RobotParameters().target_timeout))
+def make_guard(description: object) -> CommandWatchdog:
+    timeout_ns = round(1e9 * RobotParameters().target_timeout)
+    return CommandWatchdog(FallbackController(description), timeout_ns)
 
 
-def accept(guard: TargetGuard, stamp_ns: int, targets: JointTargets) -> None:
+def accept(guard: CommandWatchdog, stamp_ns: int, targets: JointTargets) -> None:
     for place, leg in enumerate(LEGS):
         joints = slice(3 * place, 3 * place + 3)
         guard.accept(leg, stamp_ns, JointTargets(

@@ -1,14 +1,11 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Feedback from the body's state to the legs: torques, foot placement, stance velocity.
+"""Balance controller: from the body's state to torques, footholds and stance velocity of the legs.
 
 The virtual model (:mod:`~dmp_cpg_ros.core.balance.virtual_model`) says which wrench the body
-needs, the
-stance feet share it (:mod:`~dmp_cpg_ros.core.balance.force_distribution`), and the forces become
-joint
-torques τ_fb = −Jᵀ f. Swinging feet are placed so as to catch the body
-(:mod:`~dmp_cpg_ros.core.balance.foot_placement`), and a slow loop keeps speed and heading
-(:mod:`~dmp_cpg_ros.core.balance.speed_keeping`).
+needs, the stance feet share it, and the forces become joint torques τ_fb = −Jᵀ f. Swinging feet
+are placed so as to catch the body (:mod:`~dmp_cpg_ros.core.balance.footholds`), and a slow loop
+corrects velocity and heading (:mod:`~dmp_cpg_ros.core.balance.velocity_correction`).
 """
 
 from __future__ import annotations
@@ -20,14 +17,17 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.balance.foot_placement import FootPlacement
-from dmp_cpg_ros.core.balance.force_distribution import distribute
-from dmp_cpg_ros.core.balance.ground_frame import ground_from_base, lean
+from dmp_cpg_ros.core.balance.com_plan import (
+    SIDEWAYS,
+    STRAIGHT,
+    LateralPlan,
+    contact_weights,
+    lateral_plan,
+)
+from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.balance.speed_keeping import SpeedKeeping
-from dmp_cpg_ros.core.balance.stance_load import planned_load
-from dmp_cpg_ros.core.balance.sway import SIDEWAYS, STRAIGHT, Sway, planned_sway
-from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel
+from dmp_cpg_ros.core.balance.velocity_correction import VelocityCorrection
+from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
 from dmp_cpg_ros.core.gait.foot_contact import believed
@@ -43,10 +43,10 @@ from dmp_cpg_ros.core.maths.vec3 import (
     triple,
 )
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.transformation.foot_path import activities_step
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
-from dmp_cpg_ros.core.transformation.swing_activity import activities_step
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
 
@@ -71,7 +71,7 @@ class PostureFeedback:
     correction : ndarray (3,)
         What the legs add to the reference velocity of the stance feet: v_x, v_y [m/s], γ [rad/s].
     mode : str
-        What the body does, see :mod:`~dmp_cpg_ros.core.modes.body_command`.
+        What the body does, see :mod:`~dmp_cpg_ros.core.modes.command`.
     measured : ndarray (12,)
         Measured joint angles that the feedback was made of [rad].
     foot_force : ndarray (4,)
@@ -101,12 +101,12 @@ class PostureState:
     ----------
     activity : ndarray (4,)
         Swing activity of the legs.
-    keeping : SpeedKeeping
+    integral : VelocityCorrection
         State of the slow loop.
     """
 
     activity: Array
-    keeping: SpeedKeeping
+    integral: VelocityCorrection
 
 
 class PostureController:
@@ -148,7 +148,7 @@ class PostureController:
     def initial_state(self) -> PostureState:
         """State of a robot that stands."""
         return PostureState(
-            np.zeros(len(self.kinematics)), SpeedKeeping((0.0, 0.0), 0.0, float('nan')))
+            np.zeros(len(self.kinematics)), VelocityCorrection((0.0, 0.0), 0.0, float('nan')))
 
     def step(
         self, memory: PostureState, state: RobotState, x: Array, x_dot: Array, r: Array, dt: float
@@ -183,14 +183,14 @@ class PostureController:
         swings = activity.tolist()
         positions = [
             gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
-        load = planned_load(positions, duty, swings, p.load_transfer)
+        load = contact_weights(positions, duty, swings, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
         velocity = times(R_ground_base, triple(state.base_velocity_in_base.tolist()))
         rate = times(R_ground_base, triple(state.base_rate_in_base.tolist()))
         moving = sum(swings) / len(swings)
-        keeping = memory.keeping.following(
+        integral = memory.integral.integrated(
             p, leg_length, moving, state.base_quaternion.tolist(), velocity, reference, dt)
-        correction = keeping.acting(p, leg_length, moving)
+        correction = integral.acting(p, leg_length, moving)
         sway = self._sway(positions, duty, omega, reference, moving)
         measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
         planned = plus(reference, correction)
@@ -205,7 +205,7 @@ class PostureController:
             times(R_ground_base, minus(foot, self._com_in_base)) for foot, _ in legs]
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(positions, duty, omega, moving)
-        return PostureState(activity, keeping), PostureFeedback(
+        return PostureState(activity, integral), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, sway.acceleration),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
             np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
@@ -234,13 +234,13 @@ class PostureController:
 
     def _sway(
         self, positions: list[float], duty: float, omega: float, reference: Triple, moving: float
-    ) -> Sway:
+    ) -> LateralPlan:
         """Planned sway of the body; it fades with the legs' activity and with speed sideways."""
-        sway = planned_sway(positions, duty, omega, self._across, self.model.height)
+        sway = lateral_plan(positions, duty, omega, self._across, self.model.height)
         if sway is STRAIGHT:
             return STRAIGHT
         share = moving * max(0.0, 1.0 - abs(reference[1]) / self.scale.speed(SIDEWAYS))
-        return Sway(*(share * value for value in sway))
+        return LateralPlan(*(share * value for value in sway))
 
     def _torque(
         self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],

@@ -1,15 +1,12 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The state of the body from what a robot has: gyroscope, accelerometer, joints, contacts.
+"""Body state estimator from gyroscope, accelerometer, joints and contacts.
 
 A Kalman filter (:mod:`~dmp_cpg_ros.core.estimation.velocity_filter`) fuses the IMU with the
-velocities that
-the standing legs measure (:mod:`~dmp_cpg_ros.core.estimation.leg_odometry`); position is
-integrated, the
-ground is a plane through the newest footholds
-(:mod:`~dmp_cpg_ros.core.estimation.terrain_plane`). An
-attitude that the IMU's driver may give is not used: here yaw is the gyroscope's, whose bias the
-standing legs correct.
+velocities that the standing legs measure (:mod:`~dmp_cpg_ros.core.estimation.leg_odometry`);
+position is integrated, the ground is a plane through the newest footholds
+(:mod:`~dmp_cpg_ros.core.estimation.terrain_plane`). An attitude that the IMU's driver may give is
+not used: here yaw is the gyroscope's, whose bias the standing legs correct.
 
 What cannot be used (not finite, impossible, absent) never reaches the filter and is named in
 ``BodyEstimate.problems``: a leg without joints measures nothing, a foot without contact sensor is
@@ -57,7 +54,7 @@ from dmp_cpg_ros.core.maths.vec3 import (
     upward,
 )
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -176,11 +173,8 @@ class BodyEstimator:
         if memory is None or readings.time_ns <= memory.estimate.time_ns:
             return self._begin(readings)
         dt = (readings.time_ns - memory.estimate.time_ns) * 1e-9
-        legs, contacts, seeing = (
-            readings.usable_legs,
-            readings.usable_contacts,
-            readings.imu_is_usable,
-        )
+        legs, contacts = readings.usable_legs, readings.usable_contacts
+        seeing = readings.imu_is_usable
         blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
         noise = self._blind_noise if blind else self._seeing_noise
         if seeing:
@@ -245,10 +239,7 @@ class BodyEstimator:
         return EstimatorState(state, terrain, estimate, rate, 0.0, 0.0), estimate
 
     def _guessed(
-        self,
-        memory: EstimatorState,
-        readings: SensorReadings,
-        legs: tuple[bool, ...],
+        self, memory: EstimatorState, readings: SensorReadings, legs: tuple[bool, ...],
         blind: float,
     ) -> tuple[Array, Array]:
         """Guess what a silent IMU would read: the feet tell the turn rate, nothing accelerates."""
@@ -263,10 +254,7 @@ class BodyEstimator:
         return rate, GRAVITY * up + state.accelerometer_bias
 
     def _motion(
-        self,
-        terrain: TerrainState,
-        state: FilterState,
-        readings: SensorReadings,
+        self, terrain: TerrainState, state: FilterState, readings: SensorReadings,
         legs: tuple[bool, ...],
     ) -> tuple[FootMotion, Triple]:
         """Motion of the feet, and the normal of the ground in the base."""
@@ -278,12 +266,8 @@ class BodyEstimator:
         return self.odometry.motion(q.tolist(), q_dot.tolist(), normal), normal
 
     def _trust(
-        self,
-        readings: SensorReadings,
-        legs: tuple[bool, ...],
-        contacts: tuple[bool, ...],
-        motion: FootMotion,
-        normal: Triple,
+        self, readings: SensorReadings, legs: tuple[bool, ...], contacts: tuple[bool, ...],
+        motion: FootMotion, normal: Triple,
     ) -> list[float]:
         """Trust in each foot from its force alone, in [0, 1]; 0 for legs without joints."""
         force = readings.foot_force.tolist()
@@ -301,14 +285,8 @@ class BodyEstimator:
         ]
 
     def _finished(
-        self,
-        memory: EstimatorState,
-        state: FilterState,
-        time_ns: int,
-        rate: Array,
-        motion: FootMotion,
-        trust: list[float],
-        problems: tuple[str, ...],
+        self, memory: EstimatorState, state: FilterState, time_ns: int, rate: Array,
+        motion: FootMotion, trust: list[float], problems: tuple[str, ...],
     ) -> tuple[TerrainState, BodyEstimate]:
         """Integrate the position, follow the ground, and put the estimate together."""
         last = memory.estimate

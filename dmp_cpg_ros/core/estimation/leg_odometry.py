@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, times, triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 
 Array = NDArray[np.float64]
 

@@ -41,16 +41,26 @@ Array = NDArray[np.float64]
 TILT, VELOCITY, GYRO_BIAS, ACCELEROMETER_BIAS = (slice(3 * i, 3 * i + 3) for i in range(4))
 """Places in the error state."""
 
-_STAYING = np.eye(12)
+_IDENTITY = np.eye(12)
 
-_TURNING = (
-    *(12 * i + j for i in range(3) for j in range(3) if i != j),  # of the tilt
-    *(12 * (i + 3) + j + 3 for i in range(3) for j in range(3) if i != j),  # of the velocity
-    *(12 * (i + 3) + j for i in range(3) for j in range(3) if i != j),  # gravity
-    *(12 * (i + 3) + j + 6 for i in range(3) for j in range(3) if i != j),  # bias of gyroscope
-    *(12 * i + i + 6 for i in range(6)),  # biases
+
+def _places(rows: slice, columns: slice, diagonal: bool) -> tuple[int, ...]:
+    """Places of a block's diagonal, or of all else in it, in a matrix (12, 12) read by rows."""
+    return tuple(
+        12 * (rows.start + i) + columns.start + j
+        for i in range(3) for j in range(3) if (i == j) == diagonal
+    )
+
+
+_TRANSITION = (
+    *_places(TILT, TILT, False),
+    *_places(VELOCITY, VELOCITY, False),
+    *_places(VELOCITY, TILT, False),
+    *_places(VELOCITY, GYRO_BIAS, False),
+    *_places(TILT, GYRO_BIAS, True),
+    *_places(VELOCITY, ACCELEROMETER_BIAS, True),
 )
-"""Places in the transition's matrix, read by rows, of what is neither 0 nor 1."""
+"""Places in the transition's matrix of what is neither 0 nor 1, block by block."""
 
 
 @dataclass(frozen=True)
@@ -125,15 +135,16 @@ def transition(velocity: Triple, up_in_base: Triple, rate: Triple, dt: float) ->
     ndarray (12, 12)
         I + A dt.
     """
-    a, b, c = rate[0] * dt, rate[1] * dt, rate[2] * dt
-    fall = -GRAVITY * dt
-    d, e, f = up_in_base[0] * fall, up_in_base[1] * fall, up_in_base[2] * fall
-    g, h, i = velocity[0] * -dt, velocity[1] * -dt, velocity[2] * -dt
-    F = _STAYING.copy()
-    F.put(_TURNING, (
-        c, -b, -c, a, b, -a, c, -b, -c, a, b, -a, -f, e, f, -d, -e, d, -i, h, i, -g, -h, g,
-        -dt, -dt, -dt, -dt, -dt, -dt))  # fmt: skip
+    F, turning = _IDENTITY.copy(), _skew(rate, -dt)
+    gravity, transport = _skew(up_in_base, -GRAVITY * dt), _skew(velocity, -dt)
+    F.put(_TRANSITION, (*turning, *turning, *gravity, *transport, *[-dt] * 6))
     return F
+
+
+def _skew(v: Triple, scale: float) -> tuple[float, ...]:
+    """Off-diagonal entries, by rows, of the matrix of the cross product with v times a scale."""
+    x, y, z = v[0] * scale, v[1] * scale, v[2] * scale
+    return -z, y, z, -x, -y, x
 
 
 def predict(

@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, Ballot
 from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.transformation.swing_activity import activities_step
+from dmp_cpg_ros.core.transformation.foot_path import activities_step
 
 Array = NDArray[np.float64]
 

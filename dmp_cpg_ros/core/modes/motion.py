@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A leg's discrete primitives: from wherever the joints are to the posture that is wanted.
+"""Motion player: a leg's discrete primitives, from wherever its joints are to a configuration.
 
 The discrete transformation system of the paper (eqs. p2p_trans, p2p_phase) makes the goals θ_g(t),
 θ̇_g(t); the leg's joints follow them through the same transformation system that follows the gait,
@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
-from dmp_cpg_ros.core.modes.body_command import BodyCommand
-from dmp_cpg_ros.core.modes.movements import Movement, Movements, minimum_jerk
+from dmp_cpg_ros.core.modes.command import BodyCommand
+from dmp_cpg_ros.core.modes.motion_library import Movement, Movements, minimum_jerk
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.states import DiscreteInput, DiscreteState

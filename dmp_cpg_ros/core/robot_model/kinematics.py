@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, triple
-from dmp_cpg_ros.core.robot_model.description import LegGeometry
+from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 
 Array = NDArray[np.float64]
 
@@ -169,3 +169,48 @@ class LegKinematics:
 
 def _wrapped(angle: float) -> float:
     return (angle + 3.141592653589793) % 6.283185307179586 - 3.141592653589793
+
+
+class RobotLegs:
+    """Feet and Jacobians of all legs of a robot; those of the last joint angles are kept.
+
+    Estimator, sense of the body and posture controller ask for the same measured angles in turn,
+    so they share one of these.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        The robot.
+
+    Attributes
+    ----------
+    kinematics : list of LegKinematics
+        Of each leg.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        """Build the legs."""
+        self.kinematics = [LegKinematics(leg) for leg in description.legs]
+        self._at: list[float] = []
+        self._found: tuple[tuple[Triple, Matrix], ...] = ()
+
+    def at(self, q: Sequence[float]) -> tuple[tuple[Triple, Matrix], ...]:
+        """Foot in the base and Jacobian of each leg, as tuples.
+
+        Parameters
+        ----------
+        q : sequence of 12 floats
+            Joint angles [rad].
+
+        Returns
+        -------
+        tuple of (foot_in_base, jacobian_in_base)
+            As of :meth:`~dmp_cpg_ros.core.robot_model.kinematics.LegKinematics.foot_and_jacobian`.
+        """
+        if q != self._at:
+            self._at = list(q)
+            self._found = tuple(
+                leg.foot_and_jacobian(q[3 * i : 3 * i + 3])
+                for i, leg in enumerate(self.kinematics)
+            )
+        return self._found

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.parameters import Parameters, parameter, shown
 from dmp_cpg_ros.core.robot_model.world import Blocks, LowFriction, Slope, Steps, World
 
 WORLDS: dict[str, type[World]] = {
@@ -82,14 +82,15 @@ def world_overrides(values: Any, where: str) -> dict[str, Any]:
     """
     if values is None:
         return {}
-    if not isinstance(values, Mapping) or values.get('kind') not in WORLDS:
+    kind = values.get('kind') if isinstance(values, Mapping) else None
+    if not isinstance(kind, str) or kind not in WORLDS:
         raise DataError(
             f'{where}: world must be a mapping with kind, one of {", ".join(WORLDS)}, '
-            f'not {values!r}'
+            f'not {shown(values)}'
         )
     own = {name: value for name, value in values.items() if name != 'kind'}
     try:
-        WORLDS[values['kind']].from_mapping(own, 'world')
+        WORLDS[kind].from_mapping(own, 'world')
     except ParameterError as error:
-        raise DataError(f'{where}: {values["kind"]}: {error}') from error
-    return {'world': values['kind'], **{PREFIX + name: value for name, value in own.items()}}
+        raise DataError(f'{where}: {kind}: {error}') from error
+    return {'world': kind, **{PREFIX + name: value for name, value in own.items()}}

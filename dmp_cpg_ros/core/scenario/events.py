@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.modes.body_requests import REQUESTS
+from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.scenario.parameter_change import read_change
 from dmp_cpg_ros.core.scenario.push import read_push

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
+from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.robot_model.world_choice import world_overrides
 from dmp_cpg_ros.core.scenario.events import LONGEST_S, Event, known
 
@@ -88,6 +89,9 @@ class Scenario:
             raise DataError(
                 f'{where} needs duration (a number of seconds) and events (a list): {error}'
             ) from error
+        parameters = values.get('parameters') or {}
+        if not isinstance(parameters, Mapping):
+            raise DataError(f'{where}: parameters must be a mapping, not {shown(parameters)}')
         if not 0.0 < duration <= LONGEST_S:
             raise DataError(f'{where}: duration = {duration} s must be positive and at most a day')
         events = tuple(
@@ -105,7 +109,7 @@ class Scenario:
             events,
             {
                 **world_overrides(values.get('world'), where),
-                **(values.get('parameters') or {}),
+                **parameters,
             },
         )
 

@@ -7,13 +7,18 @@ frame it follows ṗ = −v − γ ẑ × p exactly, turning included. A round f
 its centre needs only the share ``rolling`` of the way that the contact point makes
 (:func:`rolling_share`). In swing a cubic Hermite curve carries it back with matching velocities at
 both ends, lifted by :func:`swing_height`. The whole path is C¹ in the phase.
+
+When inhibition stops a phase inside the swing, the foot must come down; when the phase moves again
+it must lift. The swing's height is therefore scaled by an amplitude (*activity*) that follows the
+phase speed (notes on the paper: for duty factors below 3/4 no phase has all four feet down),
+through a first-order filter as the paper uses for amplitudes (:func:`activity_step`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, sin
+from math import cos, exp, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,6 +141,49 @@ def swing_height(s: float) -> tuple[float, float]:
     else:
         return 1.0, 0.0
     return u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) * scale
+
+
+def activity_step(
+    activity: float, phase_rate: float, omega: float, rate: float, dt: float
+) -> float:
+    """Advance ȧ = rate · (sat(φ̇/ω) − a) exactly for a held phase rate.
+
+    Parameters
+    ----------
+    activity : float
+        a in [0, 1].
+    phase_rate : float
+        φ̇ [rad/s].
+    omega : float
+        Free-running ω > 0 [rad/s].
+    rate : float
+        Rate of the filter [1/s].
+    dt : float
+        [s]
+
+    Returns
+    -------
+    float
+    """
+    wanted = min(max(phase_rate / omega, 0.0), 1.0)
+    return wanted + (activity - wanted) * exp(-rate * dt)
+
+
+def activities_step(
+    activities: Array,
+    phase_rates: list[float],
+    omegas: list[float],
+    rate: float,
+    dt: float,
+) -> Array:
+    """As :func:`activity_step` for a few legs, (n,), without arithmetic on arrays."""
+    kept, after = exp(-rate * dt), []
+    for activity, phase_rate, omega in zip(
+        activities.tolist(), phase_rates, omegas, strict=True
+    ):
+        wanted = min(max(phase_rate / omega, 0.0), 1.0)
+        after.append(wanted + (activity - wanted) * kept)
+    return np.array(after)
 
 
 def rolling_share(kinematics: LegKinematics, foothold_in_base: Array) -> tuple[float, float]:

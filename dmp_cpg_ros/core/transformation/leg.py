@@ -23,12 +23,20 @@ from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
-from dmp_cpg_ros.core.transformation.foot_path import FootPath, rolling_share, swing_height
-from dmp_cpg_ros.core.transformation.foot_shift import ShiftRates
-from dmp_cpg_ros.core.transformation.foot_way import way_of
+from dmp_cpg_ros.core.transformation.foot_path import (
+    FootPath,
+    activity_step,
+    rolling_share,
+    swing_height,
+)
+from dmp_cpg_ros.core.transformation.foothold_offset import OffsetRates
 from dmp_cpg_ros.core.transformation.joint_system import TransformationState, TransformationSystem
-from dmp_cpg_ros.core.transformation.stumble import Stumble, stumble_step, yielding
-from dmp_cpg_ros.core.transformation.swing_activity import activity_step
+from dmp_cpg_ros.core.transformation.stumble import (
+    Stumble,
+    compliant_offset_rate,
+    stumble_step,
+    swing_progress,
+)
 
 Array = NDArray[np.float64]
 
@@ -52,47 +60,25 @@ class LegParameters(Parameters):
         0.2, 'height of the swing as a fraction of the standing height', minimum=0.0, maximum=0.6
     )
     activity_rate: float = parameter(
-        12.0,
-        'rate at which the swing height follows the phase speed',
-        unit='1/s',
-        minimum=0.1,
-        maximum=1e3,
-    )
+        12.0, 'rate at which the swing height follows the phase speed', unit='1/s', minimum=0.1,
+        maximum=1e3)
     placement_rate: float = parameter(
-        40.0,
-        'rate at which a swinging foot follows its placement shift',
-        unit='1/s',
-        minimum=0.1,
-        maximum=1e3,
-    )
+        40.0, 'rate at which a swinging foot follows its placement shift', unit='1/s', minimum=0.1,
+        maximum=1e3)
     yielding_rate: float = parameter(
-        20.0,
-        'rate at which the target of a standing foot goes to where the foot is',
-        unit='1/s',
-        minimum=0.0,
-        maximum=1e3,
-    )
+        20.0, 'rate at which the target of a standing foot goes to where the foot is',
+        unit='1/s', minimum=0.0, maximum=1e3)
     levelling_rate: float = parameter(
-        10.0,
-        'rate at which a standing foot gives up the height that made up for the tilt',
-        unit='1/s',
-        minimum=0.1,
-        maximum=1e3,
-    )
+        10.0, 'rate at which a standing foot gives up the height that made up for the tilt',
+        unit='1/s', minimum=0.1, maximum=1e3)
     stumble_lift: float = parameter(
         0.13,
         'additional height of a swinging foot that something holds up, as a fraction of the '
-        'standing height; 0: no reflex',
-        minimum=0.0,
-        maximum=0.4,
-    )
+        'standing height; 0: no reflex', minimum=0.0, maximum=0.4)
     stumble_lag: float = parameter(
         0.035,
         'distance from its target at which a swinging foot that stands still has met '
-        'something, as a fraction of the standing height',
-        minimum=0.005,
-        maximum=1.0,
-    )
+        'something, as a fraction of the standing height', minimum=0.005, maximum=1.0)
 
 
 @dataclass(frozen=True)
@@ -169,7 +155,7 @@ class LegPrimitive:
         self.foothold_in_base = nominal_foothold(description, leg)
         self._foothold = triple(self.foothold_in_base.tolist())
         self.rolling = rolling_share(self.kinematics, self.foothold_in_base)
-        self.shift_rates = ShiftRates(
+        self.offset_rates = OffsetRates(
             parameters.placement_rate, parameters.yielding_rate, parameters.levelling_rate)
         self.clearance = parameters.clearance * description.stance_height
         self.stumble_lift = parameters.stumble_lift * description.stance_height
@@ -225,48 +211,56 @@ class LegPrimitive:
         rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
-        swinging = abs(position) < 0.5 * (1.0 - duty)
-        at = self.kinematics.foot(feedback.joint_position)
-        target = self.kinematics.foot(state.joints.position)
-        away = minus(at, target)
-        more_x, more_y, more_gamma = feedback.correction.tolist()
-        path = FootPath(
-            self._foothold,
-            v_x + more_x,
-            v_y + more_y,
-            gamma + more_gamma,
-            omega,
-            duty,
-            activity * (self.clearance + (self.stumble_lift if state.stumble.wary else 0.0)),
-            self.rolling,
-        )
+        path = self._path((v_x, v_y, gamma), omega, duty, activity, state.stumble, feedback)
         foot, slope = path.at(position)
         path_velocity = moved((0.0, 0.0, 0.0), slope, rate / (2.0 * pi))
-        shift, stumble = triple(state.shift_in_base.tolist()), state.stumble
-        if dt <= 0.0:
-            shift_rate = (0.0, 0.0, 0.0)
-        elif swinging:
-            swung = path.swung(position)
-            touches = feedback.foot_force > self.touch_force
-            way = way_of(path, swung, at, target, touches) if self.stumble_lift else None
-            stumble = stumble_step(
-                stumble, way, activity * self.stumble_lift, self.stumble_lag, dt)
-            height, _ = swing_height(swung)
-            shift_rate = self.shift_rates.in_swing(
-                shift, triple(feedback.shift_in_base.tolist()), height, activity, dt)
-            shift_rate = yielding(stumble, shift_rate, path_velocity, away)
-        else:
-            stumble = stumble_step(stumble, None, self.stumble_lift, self.stumble_lag, dt)
-            shift_rate = self.shift_rates.in_stance(
-                shift, pair(feedback.drift_in_base.tolist()), away[:2], activity, dt)
-        shift = moved(shift, shift_rate, dt)
+        offset_rate, stumble = self._offset_rate(
+            state, activity, path, position, path_velocity, feedback, dt)
+        offset = moved(triple(state.shift_in_base.tolist()), offset_rate, dt)
         bounce = gait.bounce(position, duty, omega)
-        foot = plus(plus(foot, shift), (0.0, 0.0, stumble.height - activity * bounce.height))
-        velocity = plus(plus(shift_rate, path_velocity), (0.0, 0.0, stumble.rate))
+        foot = plus(plus(foot, offset), (0.0, 0.0, stumble.height - activity * bounce.height))
+        velocity = plus(plus(offset_rate, path_velocity), (0.0, 0.0, stumble.rate))
         velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
         goal, goal_velocity = self._goal(foot, velocity)
         joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
-        return LegState(joints, activity, np.array(shift), stumble), goal, goal_velocity
+        return LegState(joints, activity, np.array(offset), stumble), goal, goal_velocity
+
+    def _path(
+        self, reference: Triple, omega: float, duty: float, activity: float, stumble: Stumble,
+        feedback: LegFeedback,
+    ) -> FootPath:
+        """Path of the foot for the corrected reference, higher after a stumble."""
+        v_x, v_y, gamma = plus(reference, triple(feedback.correction.tolist()))
+        clearance = self.clearance + (self.stumble_lift if stumble.post_stumble else 0.0)
+        return FootPath(
+            self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
+
+    def _offset_rate(
+        self, state: LegState, activity: float, path: FootPath, position: float,
+        path_velocity: Triple, feedback: LegFeedback, dt: float,
+    ) -> tuple[Triple, Stumble]:
+        """Rate of the foothold offset [m/s]: placement and stumbling reflex in swing, following
+        the ground in stance.
+        """
+        if dt <= 0.0:
+            return (0.0, 0.0, 0.0), state.stumble
+        offset, swung = triple(state.shift_in_base.tolist()), path.swung(position)
+        measured = self.kinematics.foot(feedback.joint_position)
+        target = self.kinematics.foot(state.joints.position)
+        away = minus(measured, target)
+        if abs(position) >= 0.5 * (1.0 - path.duty):
+            stumble = stumble_step(state.stumble, None, self.stumble_lift, self.stumble_lag, dt)
+            drift = pair(feedback.drift_in_base.tolist())
+            return self.offset_rates.in_stance(offset, drift, away[:2], activity, dt), stumble
+        progress = None
+        if self.stumble_lift:
+            touches = feedback.foot_force > self.touch_force
+            progress = swing_progress(path, swung, measured, target, touches)
+        stumble = stumble_step(
+            state.stumble, progress, activity * self.stumble_lift, self.stumble_lag, dt)
+        placement, (height, _) = triple(feedback.shift_in_base.tolist()), swing_height(swung)
+        rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
+        return compliant_offset_rate(stumble, rate, path_velocity, away), stumble
 
     def _goal(self, foot: Triple, velocity: Triple) -> tuple[Array, Array]:
         """g_θ [rad] and g_θ̇ [rad/s] of a foot in the base."""

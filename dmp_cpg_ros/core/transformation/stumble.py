@@ -4,7 +4,7 @@
 
 Cats lift a paw higher when its back touches something while it swings (Forssberg 1979); with
 oscillators as here it took robots over steps blind (Focchi et al. 2013; Ajallooeian et al. 2013).
-The touch is felt by the joints: the foot has fallen behind its target along its way, further than
+The touch is felt by the joints: the foot has fallen behind its target along its path, further than
 targets that act late would leave it, and stands still over the ground. That needs no contact
 sensor. Where a sensor feels a touch as well, lateness is no explanation, and the ground is felt
 from the middle of the swing: otherwise a hind foot that comes down on a step is pushed into it for
@@ -13,7 +13,7 @@ the posture's feedback.
 
 A foot that tripped yields at once, so that it neither pushes the body back nor is wedged by
 friction, rises, and goes on when it is up. What comes too late in a swing to be cleared is cleared
-by the next ones: for ``WARY`` swings the foot steps as high from the start.
+by the next ones: for ``POST_STUMBLE_SWINGS`` swings the foot steps as high from the start.
 
 A foot that comes down on something high stands still as well, above its target. It yields, too,
 and its path comes back to the height of the others over the stance, so that it does not throw the
@@ -23,10 +23,10 @@ body up.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, hypot, pi
 
 from dmp_cpg_ros.core.maths.vec3 import Triple
-from dmp_cpg_ros.core.transformation.foot_way import Way
+from dmp_cpg_ros.core.transformation.foot_path import LOWERING, FootPath
 
 FEELING = (0.3, 0.85)
 """Shares of the swing between which the foot feels what holds it up."""
@@ -63,16 +63,85 @@ QUICKNESS = 60.0
 FOLLOWING = 120.0
 """Rate at which the foot's speed is followed [1/s]."""
 
-YIELDING = 40.0
-"""Rate at which the target of a foot that yields goes to where the foot is [1/s]."""
+COMPLIANCE = 40.0
+"""Rate at which the target of a compliant foot goes to where the foot is [1/s]."""
 
-WARY = 2
+SLOWEST = 0.02
+"""Speed of the body over a foot below which the foot feels nothing [m/s]."""
+
+POST_STUMBLE_SWINGS = 2
 """Swings after a stumble in which the foot steps higher from the start."""
 
 
 @dataclass(frozen=True)
+class SwingProgress:
+    """How far a swinging foot has come, along the direction in which the body moves over it.
+
+    Attributes
+    ----------
+    swung : float
+        Share of the swing that has passed, in [0, 1).
+    place, level : float
+        Measured position along that direction, and height, in the base [m].
+    target_place, target_level : float
+        The same of its target [m].
+    body_speed : float
+        Speed of the body over this foot [m/s].
+    swing_speed, sinking_speed : float
+        Mean speed of the swing over the ground, and mean speed with which it comes down [m/s].
+    touches : bool
+        Whether a contact sensor in the foot feels something.
+    """
+
+    swung: float
+    place: float
+    level: float
+    target_place: float
+    target_level: float
+    body_speed: float
+    swing_speed: float
+    sinking_speed: float
+    touches: bool = False
+
+
+def swing_progress(
+    path: FootPath, swung: float, foot: Triple, target: Triple, touches: bool = False
+) -> SwingProgress | None:
+    """Swing progress of a foot; None where the body hardly moves over it.
+
+    Parameters
+    ----------
+    path : FootPath
+        Of the foot.
+    swung : float
+        Share of the swing that has passed.
+    foot, target : tuple of float
+        Measured and wanted position in the base [m].
+    touches : bool
+        Whether a contact sensor in the foot feels something.
+    """
+    x, y, _ = path.foothold_in_base
+    along, across = path.v_x - path.gamma * y, path.v_y + path.gamma * x
+    body_speed = hypot(along, across)
+    if body_speed < SLOWEST:
+        return None
+    along, across, swing = along / body_speed, across / body_speed, 1.0 - path.duty
+    return SwingProgress(
+        swung,
+        along * foot[0] + across * foot[1],
+        foot[2],
+        along * target[0] + across * target[1],
+        target[2],
+        body_speed,
+        body_speed / swing,
+        path.clearance * path.omega / (2.0 * pi * swing * LOWERING),
+        touches,
+    )
+
+
+@dataclass(frozen=True)
 class Stumble:
-    """What the reflex does to one foot.
+    """State of the stumbling reflex of one foot.
 
     Attributes
     ----------
@@ -80,9 +149,9 @@ class Stumble:
         Whether something held the foot up in this swing.
     landed : bool
         Whether it came down early in this swing.
-    yields : bool
+    compliant : bool
         Whether the foot yields now instead of following its path.
-    wary : int
+    post_stumble : int
         Number of swings, with the present one, in which the foot steps higher from the start.
     up : bool
         Whether the foot that tripped has been raised.
@@ -90,7 +159,7 @@ class Stumble:
         Additional height that acts now [m].
     rate : float
         Its mean rate over the last tick [m/s].
-    way : Way or None
+    progress : SwingProgress or None
         Of the swinging foot at the last tick; None in stance.
     speed, sinking : float
         Its speed over the ground, and downwards in the base, followed [m/s].
@@ -98,18 +167,18 @@ class Stumble:
 
     tripped: bool = False
     landed: bool = False
-    yields: bool = False
-    wary: int = 0
+    compliant: bool = False
+    post_stumble: int = 0
     up: bool = False
     height: float = 0.0
     rate: float = 0.0
-    way: Way | None = None
+    progress: SwingProgress | None = None
     speed: float = 0.0
     sinking: float = 0.0
 
 
 def stumble_step(
-    before: Stumble, way: Way | None, lift: float, threshold: float, dt: float
+    before: Stumble, progress: SwingProgress | None, lift: float, threshold: float, dt: float
 ) -> Stumble:
     """Advance the reflex of one foot.
 
@@ -117,7 +186,7 @@ def stumble_step(
     ----------
     before : Stumble
         One tick before.
-    way : Way or None
+    progress : SwingProgress or None
         Of a swinging foot; None in stance.
     lift : float
         Additional height of a foot that has tripped [m].
@@ -132,64 +201,67 @@ def stumble_step(
     """
     if dt <= 0.0:
         return before
-    if way is None:
+    if progress is None:
         return _in_stance(before, lift, dt)
-    last = before.way
+    last = before.progress
     if last is None:  # the foot has time to set off
-        return Stumble(wary=before.wary, height=before.height, way=way, speed=way.swing_speed)
+        return Stumble(post_stumble=before.post_stumble, height=before.height,
+                       progress=progress, speed=progress.swing_speed)
     share = 1.0 - exp(-FOLLOWING * dt)
-    moved = (way.place - last.place) / dt + way.body_speed
+    moved = (progress.place - last.place) / dt + progress.body_speed
     speed = before.speed + share * (moved - before.speed)
-    sinking = before.sinking + share * ((last.level - way.level) / dt - before.sinking)
-    above, late = way.level - way.target_level, 0.0 if way.touches else LATENCY / dt
+    sinking = before.sinking + share * ((last.level - progress.level) / dt - before.sinking)
+    above, late = progress.level - progress.target_level, 0.0 if progress.touches else LATENCY / dt
     tripped = before.tripped or (
         not before.landed
-        and FEELING[0] < way.swung < FEELING[1]
-        and speed < STANDSTILL * way.swing_speed
-        and way.target_place - way.place > max(
-            threshold + late * max(0.0, way.target_place - last.target_place), 2.0 * above)
+        and FEELING[0] < progress.swung < FEELING[1]
+        and speed < STANDSTILL * progress.swing_speed
+        and progress.target_place - progress.place > max(
+            threshold + late * max(0.0, progress.target_place - last.target_place), 2.0 * above)
     )
     landed = before.landed or (
-        way.swung > (TOUCHED if way.touches else TOUCHING)
-        and sinking < SETTLED * way.sinking_speed
-        and above > threshold + late * max(0.0, last.target_level - way.target_level)
+        progress.swung > (TOUCHED if progress.touches else TOUCHING)
+        and sinking < SETTLED * progress.sinking_speed
+        and above > threshold + late * max(0.0, last.target_level - progress.target_level)
     )
     height, up = before.height, before.up or before.height >= RISEN * lift
-    if tripped and not landed and (not up or way.swung < HIGH):
+    if tripped and not landed and (not up or progress.swung < HIGH):
         height = lift + (height - lift) * exp(-QUICKNESS * dt)
     elif not landed:
         height = max(0.0, height - GENTLENESS * lift * dt)
-    yields = landed or (tripped and not up)
-    return Stumble(tripped, landed, yields, before.wary, up, height,
-                   (height - before.height) / dt, way, speed, sinking)
+    compliant = landed or (tripped and not up)
+    return Stumble(tripped, landed, compliant, before.post_stumble, up, height,
+                   (height - before.height) / dt, progress, speed, sinking)
 
 
 def _in_stance(before: Stumble, lift: float, dt: float) -> Stumble:
-    """What is left of a swing: wariness, and a height that is given back gently."""
-    if before.way is None and before.rate == 0.0:
+    """What is left of a swing: the swings to step higher in, and a height given back gently."""
+    if before.progress is None and before.rate == 0.0:
         return before
     height = max(0.0, before.height - GENTLENESS * lift * dt)
-    wary = before.wary
-    if before.way is not None:
-        wary = WARY if before.tripped else max(0, wary - 1)
-    return Stumble(wary=wary, height=height, rate=(height - before.height) / dt)
+    post_stumble = before.post_stumble
+    if before.progress is not None:
+        post_stumble = POST_STUMBLE_SWINGS if before.tripped else max(0, post_stumble - 1)
+    return Stumble(post_stumble=post_stumble, height=height, rate=(height - before.height) / dt)
 
 
-def yielding(stumble: Stumble, shift_rate: Triple, velocity: Triple, away: Triple) -> Triple:
-    """Rate of the shift of a swinging foot's path [m/s].
+def compliant_offset_rate(
+    stumble: Stumble, offset_rate: Triple, velocity: Triple, away: Triple
+) -> Triple:
+    """Rate of the foothold offset of a swinging foot's path [m/s].
 
     Parameters
     ----------
     stumble : Stumble
         What the reflex does.
-    shift_rate : tuple of float
+    offset_rate : tuple of float
         Rate without it [m/s].
     velocity : tuple of float
-        Of the foot's path, against which the shift of a foot that yields works [m/s].
+        Of the foot's path, against which the shift of a compliant foot works [m/s].
     away : tuple of float
         Where the foot is relative to its target [m].
     """
-    if not stumble.yields:
-        return shift_rate
-    x, y, z = (YIELDING * a - v for a, v in zip(away, velocity, strict=True))
-    return x, y, z if stumble.landed else shift_rate[2]
+    if not stumble.compliant:
+        return offset_rate
+    x, y, z = (COMPLIANCE * a - v for a, v in zip(away, velocity, strict=True))
+    return x, y, z if stumble.landed else offset_rate[2]

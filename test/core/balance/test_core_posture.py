@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
-from dmp_cpg_ros.core.balance.force_distribution import REGULARISATION, distribute
+from dmp_cpg_ros.core.balance.virtual_model import REGULARISATION, distribute
 from dmp_cpg_ros.core.estimation.terrain_plane import normal_in_world
 from dmp_cpg_ros.core.maths.levelling import level_from_base
 from dmp_cpg_ros.core.maths.rotations import rotation_matrix, turned

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from core_examples import quadruped, standing_state
 
-from dmp_cpg_ros.core.balance.ground_frame import SLIGHT, ground_from_base, lean
+from dmp_cpg_ros.core.balance.footholds import SLIGHT, ground_from_base, lean
 from dmp_cpg_ros.core.estimation.terrain_plane import normal_in_world
 from dmp_cpg_ros.core.maths.rotations import rotation_matrix, turned
 from dmp_cpg_ros.core.robot_model.state import RobotState

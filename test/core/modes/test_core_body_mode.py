@@ -13,11 +13,16 @@ from core_examples import TICK, TICK_NS, quadruped, standing_state
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.gait import GRAVITY
-from dmp_cpg_ros.core.modes.body_command import MODES, MOVING, BodyCommand
-from dmp_cpg_ros.core.modes.body_condition import BodyCondition, BodySense
-from dmp_cpg_ros.core.modes.body_mode import BodyModes, ModeParameters, ModeState
-from dmp_cpg_ros.core.modes.body_requests import REQUESTS, request
-from dmp_cpg_ros.core.modes.fall_detection import FallDetector, FallParameters, FallState
+from dmp_cpg_ros.core.modes.command import MODES, MOVING, BodyCommand
+from dmp_cpg_ros.core.modes.falls import (
+    BodyCondition,
+    BodySense,
+    FallDetector,
+    FallParameters,
+    FallState,
+)
+from dmp_cpg_ros.core.modes.manager import ModeManager, ModeParameters, ModeState
+from dmp_cpg_ros.core.modes.requests import REQUESTS, request
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
@@ -33,7 +38,7 @@ class Machine:
     """A state machine tick by tick, under conditions of the test's choice."""
 
     def __init__(self, start_mode: str = 'standing', **changes: object) -> None:
-        self.modes = BodyModes(ROBOT, ModeParameters(start_mode=start_mode, **changes))
+        self.modes = ModeManager(ROBOT, ModeParameters(start_mode=start_mode, **changes))
         self.state: ModeState = self.modes.initial_state()
         self.time_ns = 0
         self.seen = [self.state.mode]
@@ -41,7 +46,7 @@ class Machine:
     def go(self, seconds: float, condition: BodyCondition = UPRIGHT,
            at_rest: bool = True) -> Machine:
         for _ in range(max(1, round(seconds / TICK))):
-            self.state = self.modes.step(self.state, condition, self.time_ns, at_rest)
+            self.state = self.modes.advance(self.state, condition, self.time_ns, at_rest)
             self.time_ns += TICK_NS
             if self.state.mode != self.seen[-1]:
                 self.seen.append(self.state.mode)
@@ -108,7 +113,7 @@ def test_the_phase_of_a_movement_falls_from_one_by_the_canonical_system() -> Non
 def test_what_cannot_be_is_refused_with_the_reason(
         mode: str, condition: BodyCondition, what: str, accepted: bool) -> None:
     machine = Machine(mode)
-    machine.state = machine.modes.step(machine.state, condition, 0, True)
+    machine.state = machine.modes.advance(machine.state, condition, 0, True)
     before = machine.state.mode
     done, text = machine.ask(what)
     assert done == accepted and len(text) > 10

@@ -11,13 +11,14 @@ import pytest
 from core_examples import GAITS, geometry, quadruped
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.modes.body_command import BodyCommand
+from dmp_cpg_ros.core.modes.command import BodyCommand
 from dmp_cpg_ros.core.modes.motion import LegMotion, phase_at
-from dmp_cpg_ros.core.modes.movements import Movements, minimum_jerk
-from dmp_cpg_ros.core.modes.postures import (
+from dmp_cpg_ros.core.modes.motion_library import (
+    Movements,
     folded_length,
     leg_angles,
     lying_posture,
+    minimum_jerk,
     raised_posture,
     standing_posture,
 )

@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 from core_examples import quadruped
 
-from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics, RobotLegs
 
 ROBOT = quadruped()
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.transformation.foot_path import activity_step
 from dmp_cpg_ros.core.transformation.joint_system import TransformationState, TransformationSystem
-from dmp_cpg_ros.core.transformation.swing_activity import activity_step
 
 vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
 durations = st.floats(1e-4, 0.1)

@@ -11,15 +11,15 @@ import pytest
 
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
-from dmp_cpg_ros.core.transformation.foot_way import way_of
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, LegParameters, LegPrimitive, LegState
 from dmp_cpg_ros.core.transformation.stumble import (
     GENTLENESS,
     LATENCY,
-    WARY,
+    POST_STUMBLE_SWINGS,
     Stumble,
+    compliant_offset_rate,
     stumble_step,
-    yielding,
+    swing_progress,
 )
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.suite import load_gait, load_suite
@@ -53,14 +53,15 @@ def walked(swing: float, met: Met, speed: float = 0.5, late: float = 0.0,
     for k in range(round(swings * period / TICK)):
         t = k * TICK
         into = t % period
-        way = None
+        progress = None
         if into < swing:
             body = np.array((speed * into, 0.0, 0.0))
             alone = foot_at(t - late) + body
             foot = met(into, alone)
             touches = feels and bool((foot != alone).any())
-            way = way_of(path, into / swing, tuple(foot - body), tuple(foot_at(t)), touches)
-        states.append(stumble_step(states[-1], way, LIFT, THRESHOLD, TICK))
+            progress = swing_progress(
+                path, into / swing, tuple(foot - body), tuple(foot_at(t)), touches)
+        states.append(stumble_step(states[-1], progress, LIFT, THRESHOLD, TICK))
     return states
 
 
@@ -107,40 +108,40 @@ def test_the_swings_after_a_stumble_step_higher_and_then_no_more() -> None:
         tripping.append(t == 0.0)
         return riser(0.2)(t, foot) if sum(tripping) == 1 else foot
 
-    states = walked(swing, once, 1.0, swings=WARY + 3)
+    states = walked(swing, once, 1.0, swings=POST_STUMBLE_SWINGS + 3)
     period = round(first / TICK)
-    wary = [states[(i + 1) * period - 2].wary for i in range(WARY + 2)]
-    assert wary == [*range(WARY, -1, -1), 0]
+    counts = [states[(i + 1) * period - 2].post_stumble for i in range(POST_STUMBLE_SWINGS + 2)]
+    assert counts == [*range(POST_STUMBLE_SWINGS, -1, -1), 0]
 
 
 @pytest.mark.parametrize('height', (0.025, 0.04))
 @pytest.mark.parametrize('late', (0.0, 0.01))
 def test_a_foot_that_lands_early_yields_and_is_not_lifted(height: float, late: float) -> None:
     states = walked(0.3, ground(height), 0.3, late)
-    assert any(s.landed and s.yields for s in states)
+    assert any(s.landed and s.compliant for s in states)
     assert not any(s.tripped or s.height for s in states)
 
 
 @pytest.mark.parametrize('met', (riser(0.2), ground(0.025)))
 def test_a_foot_that_feels_the_touch_reacts_sooner(met: Met) -> None:
     without, feeling = walked(0.3, met, 0.5), walked(0.3, met, 0.5, feels=True)
-    first = [next(k for k, s in enumerate(states) if s.yields) for states in (without, feeling)]
+    first = [next(k for k, s in enumerate(states) if s.compliant) for states in (without, feeling)]
     assert first[1] < first[0]
 
 
 def test_a_foot_that_yields_brings_its_target_to_where_it_is() -> None:
-    stumble, velocity = Stumble(tripped=True, yields=True), (1.5, 0.2, -0.5)
+    stumble, velocity = Stumble(tripped=True, compliant=True), (1.5, 0.2, -0.5)
     foot, target = np.array((0.1, 0.0, 0.0)), np.array((0.15, 0.01, -0.02))
     wanted = (0.0, 0.0, 0.3)
     for landed, axes in ((False, 2), (True, 3)):
-        held, at = Stumble(landed=landed, tripped=not landed, yields=True), target.copy()
+        held, at = Stumble(landed=landed, tripped=not landed, compliant=True), target.copy()
         for _ in range(50):
             away = tuple(foot - at)
-            rate = np.array(yielding(held, wanted, velocity, away))
+            rate = np.array(compliant_offset_rate(held, wanted, velocity, away))
             at = at + (rate + velocity) * TICK
         np.testing.assert_allclose(at[:axes], foot[:axes], atol=1e-4)
-    assert yielding(stumble, wanted, velocity, (0.0, 0.0, 0.0))[2] == wanted[2]
-    assert yielding(Stumble(), wanted, velocity, (1.0, 1.0, 1.0)) == wanted
+    assert compliant_offset_rate(stumble, wanted, velocity, (0.0, 0.0, 0.0))[2] == wanted[2]
+    assert compliant_offset_rate(Stumble(), wanted, velocity, (1.0, 1.0, 1.0)) == wanted
 
 
 def test_a_standing_foot_feels_nothing() -> None:

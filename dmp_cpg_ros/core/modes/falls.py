@@ -1,6 +1,9 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the body is, from orientation, joint angles and joint torques alone; and how to carry it."""
+"""Support state of the body and fall detection, from orientation, joints and foot forces alone.
+
+A robot has fallen when it is tilted, low, or carries nothing on its feet, for too long.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.vec3 import upward
+from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.legs import RobotLegs
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
 Array = NDArray[np.float64]
@@ -23,7 +28,7 @@ CERTAIN_SUPPORT = 0.5
 
 @dataclass(frozen=True, eq=False)
 class BodyCondition:
-    """Condition of the body at one tick.
+    """Support state of the body at one tick.
 
     Attributes
     ----------
@@ -45,7 +50,7 @@ class BodyCondition:
 
 
 class BodySense:
-    """Reads the condition of one robot's body.
+    """Support state of one robot from its measured states, and the torques that carry its weight.
 
     Parameters
     ----------
@@ -65,9 +70,7 @@ class BodySense:
 
     def condition(self, state: RobotState) -> BodyCondition:
         """Condition in a measured state."""
-        x, y, z, w = state.base_quaternion.tolist()
-        down_x, down_y = 2.0 * (w * y - x * z), -2.0 * (y * z + w * x)
-        down_z = 2.0 * (x * x + y * y) - 1.0
+        down_x, down_y, down_z = (-part for part in upward(state.base_quaternion.tolist()))
         legs, height = self._legs.at(state.joint_position.tolist()), -inf
         for ((foot_x, foot_y, foot_z), _), radius in zip(legs, self._radius, strict=True):
             height = max(height, down_x * foot_x + down_y * foot_y + down_z * foot_z + radius)
@@ -96,10 +99,7 @@ class BodySense:
         """
         if share <= 0.0:
             return np.zeros(12)
-        x, y, z, w = state.base_quaternion.tolist()
-        up = np.array(
-            (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
-        )
+        up = np.array(upward(state.base_quaternion.tolist()))
         feet = np.array([foot for foot, _ in self._legs.at(state.joint_position.tolist())])
         arms = feet - self._com_in_base
         arms -= np.outer(arms @ up, up)
@@ -112,3 +112,89 @@ class BodySense:
 
     def _jacobians(self, state: RobotState) -> Array:
         return np.array([J for _, J in self._legs.at(state.joint_position.tolist())])
+
+
+@dataclass(frozen=True)
+class FallParameters(Parameters):
+    """Limits beyond which the robot counts as fallen."""
+
+    fall_tilt: float = parameter(
+        0.9, 'tilt beyond which the robot has fallen', unit='rad', minimum=0.1, maximum=3.2
+    )
+    fall_height: float = parameter(
+        0.5,
+        'height over its feet below which a robot that should stand has fallen, as a fraction of '
+        'the standing height',
+        minimum=0.0,
+        maximum=0.95,
+    )
+    fall_delay: float = parameter(
+        0.1, 'time after which a tilted or low robot has fallen', unit='s', minimum=0.0,
+        maximum=5.0,
+    )
+    fall_support: float = parameter(
+        0.08,
+        'share of the weight on the legs below which a robot that should stand has lost the '
+        'ground; 0: never',
+        minimum=0.0,
+        maximum=0.9,
+    )
+    fall_support_delay: float = parameter(
+        0.6, 'time after which a robot without ground under its feet has fallen', unit='s',
+        minimum=0.05, maximum=10.0,
+    )
+
+
+@dataclass(frozen=True)
+class FallState:
+    """Since when the robot has been tilted, low and unsupported [ns]; −1 while it is not."""
+
+    since_ns: tuple[int, ...] = (-1, -1, -1)
+
+
+class FallDetector:
+    """Fall detector; state in, state out.
+
+    Parameters
+    ----------
+    parameters : FallParameters
+        Limits.
+    stance_height : float
+        Height of ``base_link`` when standing [m].
+    """
+
+    def __init__(self, parameters: FallParameters, stance_height: float) -> None:
+        """Keep the limits."""
+        self.parameters, self._stance_height = parameters, stance_height
+
+    def step(
+        self, state: FallState, condition: BodyCondition, time_ns: int, standing: bool
+    ) -> tuple[FallState, str]:
+        """Advance to the condition at a stamp; returns what says that the robot has fallen, empty
+        while it has not. Unless it should stand on its feet, only its tilt is watched.
+        """
+        p, height = self.parameters, condition.height / self._stance_height
+        signs = (
+            condition.tilt > p.fall_tilt,
+            standing and height < p.fall_height,
+            standing and condition.support < p.fall_support,
+        )
+        since = [
+            (before if before >= 0 else time_ns) if present else -1
+            for before, present in zip(state.since_ns, signs, strict=True)
+        ]
+        delays = (p.fall_delay, p.fall_delay, p.fall_support_delay)
+        for i, (begun, delay) in enumerate(zip(since, delays, strict=True)):
+            if begun >= 0 and (time_ns - begun) * 1e-9 >= delay:
+                return FallState(tuple(since)), self._sign(i, condition)
+        return FallState(tuple(since)), ''
+
+    def _sign(self, i: int, condition: BodyCondition) -> str:
+        """What says that the robot has fallen, in words."""
+        p = self.parameters
+        return (
+            f'tilted by {condition.tilt:.2f} rad, more than {p.fall_tilt:g} rad',
+            f'{condition.height:.3f} m over its feet, less than {p.fall_height:g} of '
+            f'{self._stance_height:.3f} m',
+            f'no ground under its feet for {p.fall_support_delay:g} s',
+        )[i]

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the joints are told when legs fall silent: the robot looks after itself."""
+"""Command watchdog: the newest joint targets, or the fallback when a leg sends none."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
-from dmp_cpg_ros.robot.refuge import Refuge, Retreat
+from dmp_cpg_ros.robot.fallback import Fallback, FallbackController
 
 CARRIED_NS = 24_000_000
 """Age up to which late targets are carried on by their own velocity [ns]."""
 
 
-class TargetGuard:
-    """The newest targets of the four legs, or a retreat when one of them is too old.
+class CommandWatchdog:
+    """The newest targets of the four legs, or a fallback when one of them is too old.
 
     Targets hold at their stamp. Those that act later are carried on by their own velocity to the
     time at which they act, as the joint would have moved if they had come in time; otherwise every
@@ -23,32 +23,32 @@ class TargetGuard:
 
     Parameters
     ----------
-    refuge : Refuge
-        What the robot does by itself.
+    controller : FallbackController
+        What takes over.
     timeout_ns : int
-        Age of a leg's targets from which the robot retreats [ns].
+        Age of a leg's targets from which the robot falls back [ns].
     """
 
-    def __init__(self, refuge: Refuge, timeout_ns: int) -> None:
+    def __init__(self, controller: FallbackController, timeout_ns: int) -> None:
         """Start without targets."""
-        self._refuge, self._timeout_ns = refuge, timeout_ns
+        self._controller, self._timeout_ns = controller, timeout_ns
         self._position, self._velocity, self._effort = (np.zeros(12) for _ in range(3))
         self.stamps: list[int | None] = [None] * len(LEGS)
-        self._retreat: Retreat | None = None
+        self._fallback: Fallback | None = None
 
     @property
-    def retreat(self) -> str:
-        """``stand``, ``lie`` or ``damp`` while the robot retreats; else empty."""
-        return '' if self._retreat is None else self._retreat.what
+    def fallback(self) -> str:
+        """``stand``, ``lie`` or ``damp`` while the robot falls back; else empty."""
+        return '' if self._fallback is None else self._fallback.what
 
     def accept(self, leg: str, stamp_ns: int, targets: JointTargets) -> None:
         """Take a leg's targets; older ones than the newest are ignored."""
-        place = LEGS.index(leg)
-        newest = self.stamps[place]
+        i = LEGS.index(leg)
+        newest = self.stamps[i]
         if newest is not None and stamp_ns < newest:
             return
-        self.stamps[place] = stamp_ns
-        joints = slice(len(JOINTS_OF_LEG) * place, len(JOINTS_OF_LEG) * (place + 1))
+        self.stamps[i] = stamp_ns
+        joints = slice(len(JOINTS_OF_LEG) * i, len(JOINTS_OF_LEG) * (i + 1))
         self._position[joints], self._velocity[joints] = targets.position, targets.velocity
         self._effort[joints] = targets.effort
 
@@ -68,12 +68,12 @@ class TargetGuard:
     def targets(self, state: RobotState) -> JointTargets:
         """Targets of all joints, (12,) each, at a state of the robot."""
         if not self.silent(state.time_ns):
-            self._retreat = None
+            self._fallback = None
             return JointTargets(
                 self._carried(state.time_ns), self._velocity.copy(), self._effort.copy())
-        if self._retreat is None:
-            self._retreat = self._refuge.begin(state)
-        self._retreat, targets = self._refuge.go_on(self._retreat, state)
+        if self._fallback is None:
+            self._fallback = self._controller.begin(state)
+        self._fallback, targets = self._controller.step(self._fallback, state)
         return targets
 
     def _carried(self, now_ns: int) -> NDArray[np.float64]:

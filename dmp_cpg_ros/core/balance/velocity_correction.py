@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A slow loop that keeps speed and heading: it corrects the velocity of the standing feet."""
+"""Integral correction of velocity and heading, applied to the velocity of the standing feet."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from math import atan2, exp, hypot, isnan, pi
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.gait.gait import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import Triple
+from dmp_cpg_ros.core.maths.vec3 import Triple, rotation
 
 SLOWEST = 0.3
 """Froude speed below which the limit of the correction shrinks no more."""
 
 
 @dataclass(frozen=True)
-class SpeedKeeping:
-    """State of the loop.
+class VelocityCorrection:
+    """Integral velocity and heading correction, slow: added to the velocity of the standing feet.
 
     Attributes
     ----------
@@ -34,11 +34,11 @@ class SpeedKeeping:
     heading_error: float
     yaw: float
 
-    def following(
+    def integrated(
         self, p: PostureParameters, leg_length: float, moving: float,
         quaternion: Sequence[float], velocity: Triple, r: Triple, dt: float,
-    ) -> SpeedKeeping:
-        """Integrate the errors of speed and heading while the legs move; forget them at rest.
+    ) -> VelocityCorrection:
+        """Integrate the errors of velocity and heading while the legs move; forget them at rest.
 
         Parameters
         ----------
@@ -57,8 +57,8 @@ class SpeedKeeping:
         dt : float
             [s]
         """
-        x, y, z, w = quaternion
-        yaw = atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+        R = rotation(quaternion)
+        yaw = atan2(R[1][0], R[0][0])
         slowest = SLOWEST * (GRAVITY * leg_length) ** 0.5
         limit = p.speed_correction_limit * max(hypot(r[0], r[1]), slowest)
         gain = p.speed_integral * (GRAVITY / leg_length) ** 0.5 * moving * dt
@@ -67,9 +67,9 @@ class SpeedKeeping:
             min(max(before + gain * (wanted - is_now), -limit), limit) * kept
             for before, wanted, is_now in zip(self.correction, r[:2], velocity[:2], strict=True)
         )
-        turned = 0.0 if isnan(self.yaw) else (yaw - self.yaw + pi) % (2.0 * pi) - pi
-        error = (self.heading_error + r[2] * dt - turned) * moving
-        return SpeedKeeping(
+        turn = 0.0 if isnan(self.yaw) else (yaw - self.yaw + pi) % (2.0 * pi) - pi
+        error = (self.heading_error + r[2] * dt - turn) * moving
+        return VelocityCorrection(
             (along, across), min(max(error, -p.heading_limit), p.heading_limit), yaw
         )
 

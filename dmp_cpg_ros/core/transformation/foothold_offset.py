@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the shift s of a foot's path moves: to its placement in swing, with the ground in stance.
+"""Foothold offset: how the shift s of a foot's path moves, in swing and in stance.
 
 In swing ṡ = h λ_p (s_wanted − s), with h the relative height of the foot: a foot that has not left
 the ground is not dragged along it.
@@ -18,8 +18,8 @@ from dmp_cpg_ros.core.maths.vec3 import Triple
 
 
 @dataclass(frozen=True)
-class ShiftRates:
-    """Rates of the shift.
+class OffsetRates:
+    """Rates of the offset.
 
     Attributes
     ----------

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where swinging feet come down, and how standing feet go along with a push.
+"""Footholds: where swinging feet come down, and how standing feet go along with a push.
 
 A foot comes down at
 
@@ -12,6 +12,11 @@ the foot stands, and beyond it the capture point of the linear inverted pendulum
 2006; there k = 1 brings the body to rest over the foot). d ends at the leg's reach, and on the
 foot's own side of the body. The foot path brings the foot to v_plan T_s / 2, with v_plan the
 velocity of its stance; the rest is the shift.
+
+All this is in the frame of the ground (:func:`ground_from_base`): at the base, with its heading, z
+along the normal of the ground. A controller that works in this frame holds the body parallel to a
+slope, keeps its height along the normal, and its friction cones stand on the ground. On level
+ground, or without an estimate of it, the frame is level; of a slight slope it takes a part only.
 """
 
 from __future__ import annotations
@@ -24,14 +29,29 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.gait.gait import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, dot, triple
+from dmp_cpg_ros.core.maths.levelling import frame_of
+from dmp_cpg_ros.core.maths.vec3 import (
+    Matrix,
+    Triple,
+    dot,
+    rotation,
+    times,
+    transposed_times,
+    triple,
+)
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
+from dmp_cpg_ros.core.robot_model.state import RobotState
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 LARGEST_RAISE = 0.35
 """Largest correction of a swinging foot's height by levelling, in leg lengths."""
+
+SLIGHT = 0.03
+"""Slope of which half is followed, more of steeper ones and little of the few tenths of a degree
+that soft ground and compliant feet feign.
+"""
 
 
 class FootPlacement:
@@ -197,3 +217,57 @@ def _on_own_side(y: float, place: float) -> float:
     """Displacement across the body of a foot from its place, but not beyond the middle."""
     inside = place + y < 0.0 if place > 0.0 else place + y > 0.0
     return -place if inside else y
+
+
+def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Matrix, Triple]:
+    """Rotation from ``base_link`` to the frame of the ground, and the vertical in that frame.
+
+    Parameters
+    ----------
+    state : RobotState
+        Orientation of the base, and the normal of the ground where it is known.
+    following : float
+        Share of a steep slope that the frame takes; 0 is level. Of a slope s it takes this times
+        s²/(s² + ``SLIGHT``²).
+
+    Returns
+    -------
+    R_ground_base : tuple of rows
+        The third is the frame's z axis in the base.
+    upward_in_ground : tuple of float
+        Direction away from gravity.
+    """
+    R_world_base = rotation(state.base_quaternion.tolist())
+    normal, vertical = state.ground_normal_in_world, R_world_base[2]
+    if normal is None or following == 0.0:
+        return frame_of(vertical), (0.0, 0.0, 1.0)
+    x, y, z = normal.tolist()
+    x, y = x / z, y / z
+    squared = x * x + y * y
+    share = following * squared / (squared + SLIGHT**2)
+    length = sqrt(share * share * squared + 1.0)
+    leaning = (share * x / length, share * y / length, 1.0 / length)
+    R_ground_base = frame_of(transposed_times(R_world_base, leaning))
+    return R_ground_base, times(R_ground_base, vertical)
+
+
+def lean(upward_in_ground: Triple, height: float) -> tuple[float, float]:
+    """Where the vertical through a point at a height meets the ground, relative to its foot.
+
+    Feet that stand around this place carry the body evenly: on a slope it lies downhill.
+
+    Parameters
+    ----------
+    upward_in_ground : tuple of float
+        As from :func:`ground_from_base`.
+    height : float
+        Of the centre of mass over the ground, along its normal [m].
+
+    Returns
+    -------
+    tuple of float
+        x and y in the frame of the ground [m].
+    """
+    x, y, z = upward_in_ground
+    depth = -height / max(z, 0.3)
+    return depth * x, depth * y

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.balance.sway import STRAIGHT, planned_sway
+from dmp_cpg_ros.core.balance.com_plan import STRAIGHT, lateral_plan
 from dmp_cpg_ros.core.gait.com_height import GRAVITY
 from dmp_cpg_ros.studies.walking_trials import relative_error, steady
 from dmp_cpg_ros.suite import load_gaits
@@ -25,7 +25,7 @@ def positions(lag: np.ndarray) -> np.ndarray:
 
 def sways(lag: np.ndarray, duty: float) -> np.ndarray:
     return np.array([
-        planned_sway(legs, duty, OMEGA, ACROSS, HEIGHT) for legs in positions(lag).tolist()])
+        lateral_plan(legs, duty, OMEGA, ACROSS, HEIGHT) for legs in positions(lag).tolist()])
 
 
 @pytest.mark.parametrize('lag', LAGS)
@@ -49,8 +49,8 @@ def test_velocity_and_acceleration_are_derivatives(name: str) -> None:
 
 
 def test_the_body_is_over_the_side_that_stands() -> None:
-    left_stands = planned_sway((0.5, 0.0, 0.5, 0.0), 0.6, OMEGA, ACROSS, HEIGHT)
-    right_stands = planned_sway((0.0, 0.5, 0.0, 0.5), 0.6, OMEGA, ACROSS, HEIGHT)
+    left_stands = lateral_plan((0.5, 0.0, 0.5, 0.0), 0.6, OMEGA, ACROSS, HEIGHT)
+    right_stands = lateral_plan((0.0, 0.5, 0.0, 0.5), 0.6, OMEGA, ACROSS, HEIGHT)
     assert left_stands.place > 0.0 > left_stands.acceleration
     assert np.allclose(left_stands, -np.array(right_stands), atol=1e-12)
 
@@ -64,7 +64,7 @@ def test_gaits_that_are_the_same_on_both_sides_go_straight(name: str, duty: floa
 def test_three_feet_on_the_ground_need_none() -> None:
     lag = load_gaits()['walk'].lag
     assert all(
-        planned_sway(legs, 0.76, OMEGA, ACROSS, HEIGHT) is STRAIGHT
+        lateral_plan(legs, 0.76, OMEGA, ACROSS, HEIGHT) is STRAIGHT
         for legs in positions(lag).tolist())
 
 
@@ -73,7 +73,7 @@ def test_it_follows_phases_and_stance_without_a_jump() -> None:
     for apart in (0.0, 0.25, 0.5, 0.75):
         for duty in (0.45, 0.5, 0.75):
             here, there = (
-                planned_sway((0.1, 0.3, 0.2, (0.3 - apart - small) % 1.0 - 0.5), duty,
+                lateral_plan((0.1, 0.3, 0.2, (0.3 - apart - small) % 1.0 - 0.5), duty,
                              OMEGA, ACROSS, HEIGHT)
                 for small in (-1e-6, 1e-6))
             assert np.allclose(here, there, atol=1e-3)

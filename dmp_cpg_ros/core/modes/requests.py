@@ -1,16 +1,13 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Requests of the body's mode: stand up, lie down, recover.
-
-They are taken with what will happen and how long it takes, or refused with the reason.
-"""
+"""Requests to the mode manager: accepted with what will happen, or refused with the reason."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.modes.body_mode import UPRIGHT_TILT, BodyModes, ModeState
+from dmp_cpg_ros.core.modes.manager import UPRIGHT_TILT, ModeManager, ModeState, enter
 
 REQUESTS = ('stand_up', 'lie_down', 'recover')
 """What may be asked for; the services bear these names."""
@@ -32,7 +29,7 @@ class ModeAnswer:
     text: str
 
 
-def request(modes: BodyModes, state: ModeState, what: str) -> tuple[ModeState, ModeAnswer]:
+def request(modes: ModeManager, state: ModeState, what: str) -> tuple[ModeState, ModeAnswer]:
     """Take a request between two ticks; it acts from the next on.
 
     Parameters
@@ -61,11 +58,11 @@ def request(modes: BodyModes, state: ModeState, what: str) -> tuple[ModeState, M
     return _stand_up(modes, state) if what == 'stand_up' else _lie_down(modes, state)
 
 
-def _stand_up(modes: BodyModes, state: ModeState) -> tuple[ModeState, ModeAnswer]:
+def _stand_up(modes: ModeManager, state: ModeState) -> tuple[ModeState, ModeAnswer]:
     if state.mode in ('standing', 'rising'):
         return state, ModeAnswer(True, f'already {state.mode}')
     if state.mode == 'stopping':
-        return modes.enter(state, 'standing', (), 'lying down was called off'), ModeAnswer(
+        return enter(state, 'standing', (), 'lying down was called off'), ModeAnswer(
             True, 'stays standing, the gait inhibited; resume it with the service inhibit'
         )
     refusal = _not_from_here(state, 'stand up')
@@ -75,12 +72,12 @@ def _stand_up(modes: BodyModes, state: ModeState) -> tuple[ModeState, ModeAnswer
     return _begin(modes, state, 'rising', ('rise',) if folded else ('fold', 'rise'), 'standing')
 
 
-def _lie_down(modes: BodyModes, state: ModeState) -> tuple[ModeState, ModeAnswer]:
+def _lie_down(modes: ModeManager, state: ModeState) -> tuple[ModeState, ModeAnswer]:
     if state.mode in ('lying', 'lowering', 'stopping'):
         return state, ModeAnswer(True, f'already {state.mode}')
     if state.mode == 'standing':
         takes = modes.movements.duration(('lower',))
-        return modes.enter(state, 'stopping', (), 'asked to lie down'), ModeAnswer(
+        return enter(state, 'stopping', (), 'asked to lie down'), ModeAnswer(
             True, f'lying {takes:.2f} s after the gait has come to rest; it is inhibited now'
         )
     refusal = _not_from_here(state, 'lie down')
@@ -90,7 +87,7 @@ def _lie_down(modes: BodyModes, state: ModeState) -> tuple[ModeState, ModeAnswer
     return _begin(modes, state, 'lowering', ('lower',) if raised else ('fold',), 'lying')
 
 
-def _recover(modes: BodyModes, state: ModeState) -> tuple[ModeState, ModeAnswer]:
+def _recover(modes: ModeManager, state: ModeState) -> tuple[ModeState, ModeAnswer]:
     if state.mode == 'recovering':
         return state, ModeAnswer(True, f'already recovering, try {state.tries}')
     if state.mode != 'damped':
@@ -102,7 +99,7 @@ def _recover(modes: BodyModes, state: ModeState) -> tuple[ModeState, ModeAnswer]
     once = duration(('tuck', *modes.rolls(state.condition)))
     rise = duration(('fold', 'rise'))
     upright = state.condition.tilt <= UPRIGHT_TILT
-    new = replace(modes.enter(state, 'recovering', ('tuck',), 'asked to recover'), tries=0)
+    new = replace(enter(state, 'recovering', ('tuck',), 'asked to recover'), tries=0)
     after = '' if upright else f'{once:.2f} s for every try to roll over, then '
     return new, ModeAnswer(
         True,
@@ -126,8 +123,8 @@ def _not_from_here(state: ModeState, what: str) -> ModeAnswer | None:
 
 
 def _begin(
-    modes: BodyModes, state: ModeState, mode: str, movements: tuple[str, ...], end: str
+    modes: ModeManager, state: ModeState, mode: str, movements: tuple[str, ...], end: str
 ) -> tuple[ModeState, ModeAnswer]:
     takes = modes.movements.duration(movements)
-    new = modes.enter(state, mode, movements, f'asked for {end}')
+    new = enter(state, mode, movements, f'asked for {end}')
     return new, ModeAnswer(True, f'{mode}, {end} in {takes:.2f} s')

@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the body sways from side to side in a gait that at times stands on one side only.
+"""Plan of the centre of mass: contact schedule weights, and lateral motion over the cycle.
+
+In a gait that at times stands on one side only the body sways from side to side.
 
 While all feet that stand are on one side, at y_s from the middle, the ground's force passes level
 through the centre of mass only if it leans inward by y_s / h: the body must swing like the linear
@@ -42,8 +44,8 @@ LEFT, RIGHT = (
     tuple(LEGS.index(leg) for leg in side) for side in (('fl', 'rl'), ('fr', 'rr')))
 
 
-class Sway(NamedTuple):
-    """Planned motion of the body across its way, about the middle.
+class LateralPlan(NamedTuple):
+    """Planned lateral motion of the centre of mass, about the middle.
 
     Attributes
     ----------
@@ -63,15 +65,15 @@ class Sway(NamedTuple):
 SIDEWAYS = 0.3
 """Speed sideways from which no sway is planned, in √(g l)."""
 
-STRAIGHT = Sway(0.0, 0.0, 0.0)
+STRAIGHT = LateralPlan(0.0, 0.0, 0.0)
 """Of a gait that never stands on one side only."""
 
 
-def planned_sway(
+def lateral_plan(
     cycle_position: Sequence[float], duty: float, omega: float, across: Sequence[float],
     height: float,
-) -> Sway:
-    """Sway of the body, from where its legs are in their cycles.
+) -> LateralPlan:
+    """Lateral plan, from where its legs are in their cycles.
 
     Parameters
     ----------
@@ -88,7 +90,7 @@ def planned_sway(
 
     Returns
     -------
-    Sway
+    LateralPlan
     """
     along = quadrature = 0.0
     for swinging, standing in ((RIGHT, LEFT), (LEFT, RIGHT)):
@@ -103,7 +105,7 @@ def planned_sway(
     pendulum = GRAVITY / height
     share = pendulum / (omega * omega + pendulum)
     y = share * along
-    return Sway(y, -omega * share * quadrature, -omega * omega * y)
+    return LateralPlan(y, -omega * share * quadrature, -omega * omega * y)
 
 
 def _both_swing(front: float, hind: float, swing: float) -> tuple[float, float]:
@@ -114,3 +116,31 @@ def _both_swing(front: float, hind: float, swing: float) -> tuple[float, float]:
     together = max(0.0, swing - abs(apart))
     opposite = max(0.0, swing - 1.0 + abs(apart))
     return 2.0 / pi * (sin(pi * together) - sin(pi * opposite)), hind + 0.5 * apart
+
+
+def contact_weights(
+    cycle_position: Sequence[float], duty: float, activity: Sequence[float], transfer: float
+) -> list[float]:
+    """Contact schedule weights: how much load each foot may take, a trapezoid over its stance.
+
+    Parameters
+    ----------
+    cycle_position : sequence of n floats
+        0 at mid-swing, in [−1/2, 1/2).
+    duty : float
+        Duty factor β.
+    activity : sequence of n floats
+        Swing activity; a leg that does not swing carries.
+    transfer : float
+        Fraction of the cycle over which a foot takes and gives load.
+
+    Returns
+    -------
+    list of n floats
+        In [0, 1].
+    """
+    lift_off = 0.5 * (1.0 - duty)
+    return [
+        max(min(max((abs(position) - lift_off) / transfer, 0.0), 1.0), 1.0 - swings)
+        for position, swings in zip(cycle_position, activity, strict=True)
+    ]

@@ -10,7 +10,7 @@ from core_examples import GRAVITY, quadruped
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.balance.foot_placement import FootPlacement
+from dmp_cpg_ros.core.balance.footholds import FootPlacement
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.maths.levelling import level_from_base
 from dmp_cpg_ros.core.maths.vec3 import Triple, pair

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Standing up, lying down, falling and getting up again: one state machine on the robot's clock.
+"""Mode manager: standing, lying down, falling and getting up as one finite state machine.
 
 - ``standing``: the gait may run.
 - ``stopping``: it is to lie down; the gait is inhibited, and lying down begins once it rests.
@@ -13,14 +13,30 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.balance.controller import PostureFeedback
+from dmp_cpg_ros.core.canonical.phase import phase_rate
+from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE, REST_SPEED
 from dmp_cpg_ros.core.maths.updated import updated
-from dmp_cpg_ros.core.modes.body_command import BALANCED, BodyCommand
-from dmp_cpg_ros.core.modes.body_condition import BodyCondition
-from dmp_cpg_ros.core.modes.fall_detection import FallDetector, FallParameters, FallState
+from dmp_cpg_ros.core.modes.command import BALANCED, BodyCommand
+from dmp_cpg_ros.core.modes.falls import (
+    BodyCondition,
+    BodySense,
+    FallDetector,
+    FallParameters,
+    FallState,
+)
 from dmp_cpg_ros.core.modes.motion import phase_at
-from dmp_cpg_ros.core.modes.movements import SIDES, Movements
+from dmp_cpg_ros.core.modes.motion_library import SIDES, Movements
 from dmp_cpg_ros.core.parameters import parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
+from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.transformation.leg import body_scale
+
+Array = NDArray[np.float64]
 
 UPRIGHT_TILT = 0.5
 """Tilt up to which a robot on the ground can rise without rolling over [rad]."""
@@ -87,8 +103,8 @@ class ModeState:
     fall: FallState = field(default_factory=FallState)
 
 
-class BodyModes:
-    """The state machine of one robot; state in, state out.
+class ModeManager:
+    """Finite state machine of one robot's modes; state in, state out.
 
     Parameters
     ----------
@@ -96,10 +112,16 @@ class BodyModes:
         The robot.
     parameters : ModeParameters
         Start, fall detection, tries.
+    legs : RobotLegs, optional
+        The robot's legs, where others ask them too.
     """
 
-    def __init__(self, description: RobotDescription, parameters: ModeParameters) -> None:
+    def __init__(
+        self, description: RobotDescription, parameters: ModeParameters,
+        legs: RobotLegs | None = None,
+    ) -> None:
         """Derive the movements and their durations."""
+        self._sense, self._scale = BodySense(description, legs), body_scale(description)
         self.movements = Movements(description)
         self._stance_height = description.stance_height
         self._detector = FallDetector(parameters, description.stance_height)
@@ -116,7 +138,15 @@ class BodyModes:
         share = self._share(state)
         return BodyCommand(state.mode, state.movements[0], state.count, phase_at(share))
 
-    def carried(self, state: ModeState) -> float:
+    def feedback(self, mode: ModeState, state: RobotState) -> PostureFeedback:
+        """What the legs get while the balance controller does not act."""
+        torque = self._sense.carrying_torque(state, self._carried(mode))
+        return PostureFeedback(
+            torque, np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3), self.command(mode).text,
+            state.joint_position.copy(),
+        )
+
+    def _carried(self, state: ModeState) -> float:
         """Share of the weight that the legs are to carry by feed-forward in a movement."""
         if not state.movements:
             return 0.0
@@ -126,24 +156,37 @@ class BodyModes:
         return max(begin, end) * min(rest / 0.3, 1.0)
 
     def step(
-        self, state: ModeState, condition: BodyCondition, time_ns: int, at_rest: bool
+        self, mode: ModeState, state: RobotState, x: Array, x_dot: Array, r: Array,
+        activity: Array,
     ) -> ModeState:
-        """Advance by one tick.
+        """Advance the mode to the tick of a measured state.
 
         Parameters
         ----------
-        state : ModeState
-            State after the last tick, requests included.
-        condition : BodyCondition
-            Measured at this tick.
-        time_ns : int
-            Stamp of this tick [ns].
-        at_rest : bool
-            Whether the gait rests: phases, reference and swings.
+        mode : ModeState
+            After the last tick, requests included.
+        state : RobotState
+            Measured.
+        x, x_dot : ndarray (4, 2)
+            Canonical states and rates.
+        r : ndarray (3,)
+            Reference.
+        activity : ndarray (4,)
+            Swing activity of the legs at the tick before.
+        """
+        at_rest = (
+            mode.mode == 'stopping'
+            and self._scale.foot_speed(float(r[0]), float(r[1]), float(r[2])) <= REST_SPEED
+            and float(np.abs(phase_rate(x, x_dot)).max()) <= REST_PHASE_RATE
+            and float(activity.max()) <= REST_ACTIVITY
+        )
+        return self.advance(mode, self._sense.condition(state), state.time_ns, at_rest)
 
-        Returns
-        -------
-        ModeState
+    def advance(
+        self, state: ModeState, condition: BodyCondition, time_ns: int, at_rest: bool
+    ) -> ModeState:
+        """Advance by one tick to the body's condition at a stamp; `at_rest` says whether phases,
+        reference and swings of the gait rest.
         """
         begun = time_ns if state.begun_ns < 0 else state.begun_ns
         fall, sign = state.fall, ''
@@ -160,9 +203,9 @@ class BodyModes:
 
     def _stopped(self, state: ModeState, at_rest: bool) -> ModeState:
         if at_rest:
-            return self._enter_now(state, 'lowering', ('lower',), state.reason)
+            return _enter_now(state, 'lowering', ('lower',), state.reason)
         if self._elapsed(state) > STOPPING_PATIENCE_S:
-            return self._enter_now(
+            return _enter_now(
                 state, 'standing', (),
                 f'lying down was given up: the gait did not rest within {STOPPING_PATIENCE_S:g} s',
             )
@@ -173,14 +216,15 @@ class BodyModes:
         assert state.condition is not None
         following = state.movements[1:]
         if following:
-            return self._enter_now(state, state.mode, following, state.reason)
+            return _enter_now(state, state.mode, following, state.reason)
         if state.mode == 'lowering':
-            return self._enter_now(state, 'lying', (), state.reason)
+            return _enter_now(state, 'lying', (), state.reason)
         if state.mode == 'recovering':
             return self._rolled(state, state.condition)
         if state.condition.height >= RISEN_HEIGHT * self._stance_height:
-            return self._enter_now(state, 'standing', (), 'risen')
-        if self._elapsed(state) < self._time_of('rise') + RISING_PATIENCE * self._unit:
+            return _enter_now(state, 'standing', (), 'risen')
+        patience = RISING_PATIENCE * self.movements.time_unit
+        if self._elapsed(state) < self._time_of('rise') + patience:
             return state
         return self._fallen(
             state, f'did not rise by {state.time_ns * 1e-9:.3f} s: {state.condition.height:.3f} m '
@@ -190,14 +234,14 @@ class BodyModes:
     def _rolled(self, state: ModeState, condition: BodyCondition) -> ModeState:
         """Rise when the belly is down; else roll, or give up."""
         if condition.tilt <= UPRIGHT_TILT:
-            return self._enter_now(state, 'rising', ('fold', 'rise'), state.reason)
+            return _enter_now(state, 'rising', ('fold', 'rise'), state.reason)
         if state.tries >= self.parameters.recovery_tries:
             return self._fallen(
                 state, f'still tilted by {condition.tilt:.2f} rad after {state.tries} tries'
             )
         rolls = (*self.rolls(condition), 'tuck')
         return replace(
-            self._enter_now(state, 'recovering', rolls, state.reason), tries=state.tries + 1
+            _enter_now(state, 'recovering', rolls, state.reason), tries=state.tries + 1
         )
 
     @staticmethod
@@ -210,28 +254,8 @@ class BodyModes:
         names = ('turn', 'tip', 'over') if on_its_back else ('push', 'over')
         return tuple(f'{name}_{side}' for name in names)
 
-    # Inside ------------------------------------------------------------------------------------
-
     def _fallen(self, state: ModeState, reason: str) -> ModeState:
-        return replace(self._enter_now(state, 'damped', (), reason), fall=FallState())
-
-    def enter(
-        self, state: ModeState, mode: str, movements: tuple[str, ...], reason: str
-    ) -> ModeState:
-        """Enter a mode at the next tick, whose stamp is not known yet."""
-        return replace(
-            state, mode=mode, movements=movements, reason=reason, begun_ns=-1,
-            count=state.count + bool(movements), fall=FallState(),
-        )
-
-    def _enter_now(
-        self, state: ModeState, mode: str, movements: tuple[str, ...], reason: str
-    ) -> ModeState:
-        return replace(self.enter(state, mode, movements, reason), begun_ns=state.time_ns)
-
-    @property
-    def _unit(self) -> float:
-        return self.movements.time_unit
+        return _enter_now(state, 'damped', (), reason)
 
     def _elapsed(self, state: ModeState) -> float:
         return max(state.time_ns - state.begun_ns, 0) * 1e-9 if state.begun_ns >= 0 else 0.0
@@ -242,3 +266,17 @@ class BodyModes:
 
     def _time_of(self, movement: str) -> float:
         return self.movements.named(movement).duration + self.movements.pause
+
+
+def enter(state: ModeState, mode: str, movements: tuple[str, ...], reason: str) -> ModeState:
+    """Enter a mode at the next tick, whose stamp is not known yet."""
+    return replace(
+        state, mode=mode, movements=movements, reason=reason, begun_ns=-1,
+        count=state.count + bool(movements), fall=FallState(),
+    )
+
+
+def _enter_now(
+    state: ModeState, mode: str, movements: tuple[str, ...], reason: str
+) -> ModeState:
+    return replace(enter(state, mode, movements, reason), begun_ns=state.time_ns)

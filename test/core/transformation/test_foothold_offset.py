@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.phase import phase_generator, state_at
-from dmp_cpg_ros.core.transformation.foot_shift import ShiftRates
+from dmp_cpg_ros.core.transformation.foothold_offset import OffsetRates
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, LegParameters, LegPrimitive
 
-RATES = ShiftRates(40.0, 20.0, 10.0)
+RATES = OffsetRates(40.0, 20.0, 10.0)
 lengths = st.floats(-0.3, 0.3)
 vectors = st.tuples(lengths, lengths, lengths).map(np.array)
 
