@@ -11,23 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
-from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
-from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.gait.network import CanonicalParameters
-from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
-from dmp_cpg_ros.core.modes.body_mode import ModeParameters
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
 from dmp_cpg_ros.core.suite_parameters import (
     NODE_PARAMETERS,
+    PART_OF,
     GaitParameters,
     RobotFileParameters,
     RobotParameters,
@@ -35,7 +27,6 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
     chosen_world,
 )
-from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""
@@ -137,19 +128,8 @@ def load_suite(
             )
     sets = {kind: node_sets(path, kind, overrides) for kind in NODE_PARAMETERS}
     canonical, robot = sets['canonical_oscillators'], sets['mujoco_robot']
-    parameters = SuiteParameters(
-        sets['reference_filter'][ReferenceParameters],
-        canonical[CanonicalParameters],
-        sets['inhibition'][InhibitionParameters],
-        sets['leg_transformation'][LegParameters],
-        sets['posture_control'][PostureParameters],
-        sets['posture_control'][EstimationParameters],
-        sets['posture_control'][StateSourceParameters],
-        sets['inhibition'][VoteSourceParameters],
-        sets['posture_control'][ModeParameters],
-        canonical[GaitChangeParameters],
-        canonical[GaitChoiceParameters],
-    )
+    parameters = SuiteParameters.of(
+        {part: sets[node][part] for node, parts in PART_OF.items() for part in parts})
     gait = canonical[GaitParameters]
     return Suite(
         parameters,

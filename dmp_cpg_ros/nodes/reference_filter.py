@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
@@ -33,7 +34,7 @@ class ReferenceFilter(CertifiedNode):
         self.prepare_certificate()
         self._gate = self.new_gate()
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
-        self._r, self._last_ns, self._requested = np.zeros(3), -1, False
+        self._r, self._clock, self._requested = np.zeros(3), TickClock(), False
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
         self._ticks = self.match(
             ('joint_states',),
@@ -58,12 +59,11 @@ class ReferenceFilter(CertifiedNode):
     def on_parameters(self) -> None:
         """Take over limits and rates."""
         self.limit(self._gate)
-        self._system.parameters = self.parameters_of(ReferenceParameters)
+        self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
-        dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
-        self._last_ns = stamp_ns
+        dt = self._clock.step(stamp_ns)
         command, self._requested = self._gate.at(stamp_ns), bool(values['inhibition_state'])
         r_ext = np.zeros(3) if self._requested else np.array(command)
         self._r = self._system.step(self._r, r_ext, dt)

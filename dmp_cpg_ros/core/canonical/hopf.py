@@ -30,7 +30,9 @@ class Oscillators(Protocol):
     """
 
     @property
-    def radius(self) -> float | Array: ...
+    def radius(self) -> float | Array:
+        """Radius of the limit cycle."""
+        ...
 
     def field(self, x: Array, omega: float | Array) -> Array:
         """ẋ of uncoupled oscillators, ndarray (N, 2) → (N, 2) [1/s], at frequencies ω [rad/s]."""

@@ -191,6 +191,22 @@ class Gait:
         return gait_word(self.name, self.cadence_scale)
 
     @property
+    def moving_phases(self) -> None:
+        """Offsets that move: none, other than while gaits change."""
+        return None
+
+    def following(self, omega: float, change_rate: float, pauses: bool, dt: float
+                  ) -> tuple[Gait, float]:
+        """Gait a time step later, and what the oscillators gain on ω meanwhile [rad]: the same
+        and nothing, other than while gaits change.
+        """
+        return self, 0.0
+
+    def oscillator_omegas(self, omega: float) -> float:
+        """Frequency of the oscillators when the gait's is ω: the same [rad/s]."""
+        return omega
+
+    @property
     def rest_rate(self) -> float:
         """Rate of the rest phase: 0, other than while gaits change [rad/s]."""
         return 0.0

@@ -21,12 +21,13 @@ during a transition as outside of it.
 weight w = s²(3 − 2s) blends offsets, rest phase, cadence and duty factor. n is the number of
 cycles for which no leg's frequency differs from ω by more than the fraction ``gait_change_rate``.
 While a stop is requested ṡ goes to 0 and the blend stays as it is; at rest the new gait takes
-force at once (:mod:`~dmp_cpg_ros.core.gait.gait_networks`).
+force at once (:mod:`~dmp_cpg_ros.core.gait.running`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import exp
 
 import numpy as np
 from numpy.typing import NDArray
@@ -183,6 +184,53 @@ class BlendedGait:
         """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
         transition = self.transition
         return transition.before.phases + (2.0 * np.pi * self.weight) * transition.offset_arcs
+
+    @property
+    def moving_phases(self) -> Array:
+        """Offsets that move: the present :attr:`phases`."""
+        return self.phases
+
+    def following(self, omega: float, change_rate: float, pauses: bool, dt: float
+                  ) -> tuple[GaitInForce, float]:
+        """Blend a time step later, or the new gait at the end of the way.
+
+        Parameters
+        ----------
+        omega : float
+            The gait's frequency [rad/s].
+        change_rate : float
+            Largest change of a leg's frequency, as a fraction.
+        pauses : bool
+            Whether the share is to stay as it is.
+        dt : float
+            Time step [s].
+
+        Returns
+        -------
+        gait : BlendedGait or Gait
+        gained : float
+            By how much the oscillators run ahead of ω meanwhile [rad].
+        """
+        transition = self.transition
+        cycles = transition.cycles(change_rate)
+        wanted = 0.0 if pauses else omega / (2.0 * np.pi * cycles)
+        rate = wanted + (self.rate - wanted) * exp(-SETTLING_RATE * dt)
+        if pauses and rate * 2.0 * np.pi * cycles < STANDING * omega:
+            rate = 0.0
+        share = self.share + rate * dt
+        following: GaitInForce = (
+            transition.after.scaled(self.cadence_scale) if share >= 1.0
+            else replace(self, share=share, rate=rate)
+        )
+        weight = following.weight if isinstance(following, BlendedGait) else 1.0
+        return following, 2.0 * np.pi * transition.common_arc * (weight - self.weight)
+
+    def oscillator_omegas(self, omega: float) -> Array:
+        """Frequencies of the oscillators when the gait's is ω, with what moves the offsets
+        [rad/s].
+        """
+        omega = omega + self.turning * self.transition.common_arc
+        return omega + self.turning * self.transition.offset_arcs
 
     @property
     def rest_rate(self) -> float:

@@ -95,9 +95,11 @@ def test_without_load_there_are_no_forces() -> None:
     forces = shared(wrench, FEET, np.zeros(4), 0.6)
     assert not forces.any()
 
+AMBLE = GAITS['amble']
 
-def controller(gait: str = 'amble', **changes: object) -> PostureController:
-    return PostureController(ROBOT, GAITS[gait], PostureParameters(**changes))  # type: ignore[arg-type]
+
+def controller(**changes: object) -> PostureController:
+    return PostureController(ROBOT, PostureParameters(**changes))  # type: ignore[arg-type]
 
 
 def forces_of(torque: np.ndarray) -> np.ndarray:
@@ -109,9 +111,9 @@ def forces_of(torque: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize('gait', GAITS)
 def test_standing_still_the_feet_carry_the_weight_and_nothing_else(gait: str) -> None:
-    of, x = controller(gait), network(gait).locked_state()
+    of, x = controller(), network(gait).locked_state()
     _, feedback = of.step(
-        of.initial_state(), standing_state(ROBOT), x, 0.0 * x, np.zeros(3), TICK)
+        of.initial_state(), standing_state(ROBOT), GAITS[gait], x, 0.0 * x, np.zeros(3), TICK)
     wrench = wrench_of(forces_of(feedback.torque), FEET)
     assert np.allclose(wrench, [0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0], atol=0.01 * WEIGHT)
     assert not feedback.shift_in_base.any() and not feedback.correction.any()
@@ -131,9 +133,10 @@ def test_errors_are_answered_by_the_opposite_wrench(
         change: dict[str, np.ndarray], component: int, sign: float) -> None:
     of, x = controller(), network().locked_state()
     at_rest = wrench_of(forces_of(of.step(
-        of.initial_state(), standing_state(ROBOT), x, 0.0 * x, np.zeros(3), TICK)[1].torque), FEET)
+        of.initial_state(), standing_state(ROBOT), AMBLE, x, 0.0 * x, np.zeros(3),
+        TICK)[1].torque), FEET)
     state = standing_state(ROBOT, **change)
-    feedback = of.step(of.initial_state(), state, x, 0.0 * x, np.zeros(3), TICK)[1]
+    feedback = of.step(of.initial_state(), state, AMBLE, x, 0.0 * x, np.zeros(3), TICK)[1]
     R = np.array(level_from_base(state.base_quaternion.tolist()))
     wrench = wrench_of(forces_of(feedback.torque) @ R.T, FEET @ R.T)
     assert sign * (wrench - at_rest)[component] > 0.1
@@ -148,7 +151,7 @@ def test_on_a_slope_parallel_to_it_the_feet_carry_the_weight(slope: tuple[float,
     turn = axis / np.linalg.norm(axis) * np.arccos(normal[2])
     state = standing_state(ROBOT, base_quaternion=turned(np.array([0.0, 0.0, 0.0, 1.0]), turn),
                            ground_normal_in_world=normal)
-    feedback = of.step(of.initial_state(), state, x, 0.0 * x, np.zeros(3), TICK)[1]
+    feedback = of.step(of.initial_state(), state, AMBLE, x, 0.0 * x, np.zeros(3), TICK)[1]
     R_world_base = rotation_matrix(state.base_quaternion)
     forces = forces_of(feedback.torque)
     weight = ROBOT.mass * GRAVITY
@@ -165,7 +168,7 @@ def test_on_a_slope_parallel_to_it_the_feet_carry_the_weight(slope: tuple[float,
 @given(seed=st.integers(0, 10_000), size=st.floats(0.0, 20.0), gait=st.sampled_from(list(GAITS)))
 def test_torques_and_shifts_are_finite_and_within_limits_in_any_state(
         seed: int, size: float, gait: str) -> None:
-    rng, of = np.random.default_rng(seed), controller(gait)
+    rng, of = np.random.default_rng(seed), controller()
     quaternion = rng.normal(size=4)
     state = standing_state(
         ROBOT, joint_position=rng.uniform(-3.0, 3.0, 12),
@@ -175,7 +178,8 @@ def test_torques_and_shifts_are_finite_and_within_limits_in_any_state(
     x, x_dot = rng.normal(size=(4, 2)), 20.0 * rng.normal(size=(4, 2))
     memory = of.initial_state()
     for _ in range(3):
-        memory, feedback = of.step(memory, state, x, x_dot, rng.normal(size=3), TICK)
+        memory, feedback = of.step(
+            memory, state, GAITS[gait], x, x_dot, rng.normal(size=3), TICK)
     limit = np.concatenate([leg.torque_limit for leg in ROBOT.legs])
     p = of.parameters
     assert np.all(np.abs(feedback.torque) <= limit)
@@ -208,9 +212,9 @@ def test_a_correction_grows_while_walking_and_is_forgotten_at_rest() -> None:
     x_dot = at.omega(r) * (x @ np.array([[0.0, -1.0], [1.0, 0.0]]))
     memory, slow = of.initial_state(), standing_state(ROBOT)
     for _ in range(500):
-        memory, feedback = of.step(memory, slow, x, x_dot, r, TICK)
+        memory, feedback = of.step(memory, slow, AMBLE, x, x_dot, r, TICK)
     assert feedback.correction[0] > 0.05
     assert feedback.correction[0] <= of.parameters.speed_correction_limit * 0.5 + 1e-9
     for _ in range(500):
-        memory, feedback = of.step(memory, slow, x, 0.0 * x, np.zeros(3), TICK)
+        memory, feedback = of.step(memory, slow, AMBLE, x, 0.0 * x, np.zeros(3), TICK)
     assert np.abs(feedback.correction).max() < 1e-3

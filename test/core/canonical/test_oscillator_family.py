@@ -8,13 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from core_examples import differences
+from core_examples import GAITS, differences, quadruped
 
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at, wrapped
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.running import RunningGait
+from dmp_cpg_ros.core.transformation.leg import body_scale
 
 PHASES, OMEGA, TICK = -2.0 * np.pi * np.array([0.0, 0.5, 0.75, 0.25]), 9.0, 0.004
 
@@ -105,3 +109,27 @@ def test_inhibition_of_one_brings_all_to_rest(family: Conical | VanDerPol) -> No
 def test_a_certificate_says_that_it_knows_no_bound() -> None:
     with pytest.raises(ParameterError, match='no bounds are known of Conical'):
         _ = system(Conical()).rho
+
+
+@dataclass(frozen=True)
+class ConicalParameters(CanonicalParameters):
+    """Canonical parameters of a robot that walks on the family above."""
+
+    @property
+    def oscillators(self) -> Conical:
+        return Conical(self.rho, self.radius)
+
+
+def test_a_gait_runs_changes_and_stops_on_it() -> None:
+    block = RunningGait(ConicalParameters(), body_scale(quadruped()), GaitReader(GAITS))
+    state = block.initial_state(GAITS['amble'], InhibitionParameters(start_inhibited=False))
+    free, r = Inhibition(False, np.zeros(4), 0.3), np.array([0.4, 0.0, 0.0])
+    state = block.want(state, 'trot')
+    for _ in range(1500):
+        state = block.step(state, r, free, TICK)
+    assert state.gait is GAITS['trot']
+    assert np.abs(block.network(state.gait).phase_errors(state.x)).max() < 1e-6
+    held = Inhibition(True, InhibitionParameters().armed_gains, 0.3)
+    for _ in range(1500):
+        state = block.step(state, np.zeros(3), held, TICK)
+    assert np.abs(state.x_dot).max() < 1e-6
