@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.estimation.parameters import ESTIMATE
 from dmp_cpg_ros.core.gait.choice import highest_speed
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
-from dmp_cpg_ros.core.gait.gait import GRAVITY, Gait
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.gait_reader import GaitReader
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
@@ -35,6 +35,7 @@ from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorSta
 from dmp_cpg_ros.core.inhibition.voters import vote_sensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.body_mode import ModeState

@@ -60,7 +60,7 @@ class CanonicalOscillators(CertifiedNode):
             self._without_certificate(self.certificate.explained())
         self._canonical = self.new_running(quarter_weight(description_of(self)))
         self._state = self._canonical.initial_state(self.gaits.named(gait_name(self)), inhibition)
-        self._clock = TickClock()
+        self._tick_clock = TickClock()
         self._inhibition = initial_inhibition(inhibition)
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
@@ -112,7 +112,7 @@ class CanonicalOscillators(CertifiedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the oscillators to the stamp of the reference."""
-        dt = self._clock.step(stamp_ns)
+        dt = self._tick_clock.step(stamp_ns)
         self._inhibition = values['inhibition_state'] or self._inhibition
         r = values['reference']
         self._state = state = self._canonical.step(

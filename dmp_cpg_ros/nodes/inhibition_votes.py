@@ -11,13 +11,13 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.votes import vote_bound
-from dmp_cpg_ros.core.gait.gait import GRAVITY
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
 from dmp_cpg_ros.core.inhibition.votes import Tally, VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting
 from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS

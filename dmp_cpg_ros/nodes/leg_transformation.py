@@ -54,7 +54,7 @@ class LegTransformation(ManagedNode):
         leg, parameters = self.parameters_of(LegChoice).leg, self.parameters_of(LegParameters)
         gaits, description = gait_reader(self), description_of(self)
         self._leg = LegControl(leg, description, parameters, Movements(description))
-        self._state, self._clock = self._leg.initial_state(), TickClock()
+        self._state, self._tick_clock = self._leg.initial_state(), TickClock()
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
         inputs = ['canonical_state', 'reference', 'posture_feedback']
         canonical, feedback = CanonicalStateReader(), PostureFeedbackReader()
@@ -93,7 +93,7 @@ class LegTransformation(ManagedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the leg to the stamp of the canonical state."""
-        dt = self._clock.step(stamp_ns)
+        dt = self._tick_clock.step(stamp_ns)
         x, x_dot, gait = values['canonical_state']
         position, velocity, _ = values.get('joint_states', NO_JOINTS)
         self._state, targets = self._leg.step(

@@ -53,7 +53,7 @@ class PostureControl(ManagedNode):
         self._control = BodyControl(
             description, self.parameters_of(PostureParameters),
             self.parameters_of(ModeParameters), legs)
-        self._state, self._clock, self._told = self._control.initial_state(), TickClock(), ''
+        self._state, self._tick_clock, self._told = self._control.initial_state(), TickClock(), ''
         self._mode_writer, self._mode_publisher = BodyModeWriter(), self.publisher('body_mode')
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
@@ -91,7 +91,7 @@ class PostureControl(ManagedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Compute the feedback for the stamp of the canonical state."""
-        dt = self._clock.step(stamp_ns)
+        dt = self._tick_clock.step(stamp_ns)
         state = self._body.state(stamp_ns, values)
         x, x_dot, gait = values['canonical_state']
         self._state, feedback = self._control.step(

@@ -34,7 +34,7 @@ class ReferenceFilter(CertifiedNode):
         self.prepare_certificate()
         self._gate = self.new_gate()
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
-        self._r, self._clock, self._requested = np.zeros(3), TickClock(), False
+        self._r, self._tick_clock, self._requested = np.zeros(3), TickClock(), False
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
         self._ticks = self.match(
             ('joint_states',),
@@ -63,7 +63,7 @@ class ReferenceFilter(CertifiedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
-        dt = self._clock.step(stamp_ns)
+        dt = self._tick_clock.step(stamp_ns)
         command, self._requested = self._gate.at(stamp_ns), bool(values['inhibition_state'])
         r_ext = np.zeros(3) if self._requested else np.array(command)
         self._r = self._system.step(self._r, r_ext, dt)

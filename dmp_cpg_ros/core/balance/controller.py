@@ -31,8 +31,8 @@ from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
 from dmp_cpg_ros.core.gait.foot_contact import believed
-from dmp_cpg_ros.core.gait.gait import GRAVITY
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import (
     Matrix,
     Triple,

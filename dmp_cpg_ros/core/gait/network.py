@@ -25,8 +25,9 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned, wrapped
 from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
-from dmp_cpg_ros.core.gait.gait import GRAVITY, BodyScale
+from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
 

@@ -19,8 +19,8 @@ from math import acos, cos, exp, pi, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.gait.gait import GRAVITY
 from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import cross, triple
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 

@@ -221,7 +221,7 @@ class LegPrimitive:
         v_x, v_y, gamma = gait.limited(r.tolist(), self.scale)
         speed = self.scale.foot_speed(v_x, v_y, gamma)
         duty = gait.duty(speed, self.scale)
-        omega = gait.own_omega(self.place, gait.omega(speed, self.scale))
+        omega = gait.own_omegas(gait.omega(speed, self.scale))[self.place]
         x_1, x_2 = x.tolist()
         rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.balance.force_distribution import REGULARISATION, distribute
 from dmp_cpg_ros.core.estimation.terrain_plane import normal_in_world
-from dmp_cpg_ros.core.maths.levelling import level_from_base
-from dmp_cpg_ros.core.maths.rotations import rotation_matrix, turned
-from dmp_cpg_ros.core.maths.vec3 import Triple, triple
+from dmp_cpg_ros.core.maths.rotations import turned
+from dmp_cpg_ros.core.maths.vec3 import Triple, heading_frame, rotation, triple, upward
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.transformation.leg import nominal_foothold
 
@@ -137,7 +136,7 @@ def test_errors_are_answered_by_the_opposite_wrench(
         TICK)[1].torque), FEET)
     state = standing_state(ROBOT, **change)
     feedback = of.step(of.initial_state(), state, AMBLE, x, 0.0 * x, np.zeros(3), TICK)[1]
-    R = np.array(level_from_base(state.base_quaternion.tolist()))
+    R = np.array(heading_frame(upward(state.base_quaternion.tolist())))
     wrench = wrench_of(forces_of(feedback.torque) @ R.T, FEET @ R.T)
     assert sign * (wrench - at_rest)[component] > 0.1
 
@@ -152,7 +151,7 @@ def test_on_a_slope_parallel_to_it_the_feet_carry_the_weight(slope: tuple[float,
     state = standing_state(ROBOT, base_quaternion=turned(np.array([0.0, 0.0, 0.0, 1.0]), turn),
                            ground_normal_in_world=normal)
     feedback = of.step(of.initial_state(), state, AMBLE, x, 0.0 * x, np.zeros(3), TICK)[1]
-    R_world_base = rotation_matrix(state.base_quaternion)
+    R_world_base = np.array(rotation(state.base_quaternion.tolist()))
     forces = forces_of(feedback.torque)
     weight = ROBOT.mass * GRAVITY
     np.testing.assert_allclose(
@@ -198,7 +197,7 @@ def test_levelling_keeps_the_heading_and_removes_the_tilt(seed: int) -> None:
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
-    R_level_base = np.array(level_from_base((x, y, z, w)))
+    R_level_base = np.array(heading_frame(upward((x, y, z, w))))
     assert np.allclose(R_level_base @ R_level_base.T, np.eye(3), atol=1e-6)
     R_world_level = R_world_base @ R_level_base.T
     assert np.allclose(R_world_level[2], [0.0, 0.0, 1.0], atol=1e-6)

@@ -15,10 +15,10 @@ from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, chosen_gait
-from dmp_cpg_ros.core.gait.gait import GRAVITY
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale

@@ -18,10 +18,11 @@ from dmp_cpg_ros.core.balance.controller import PostureController, PostureParame
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
-from dmp_cpg_ros.core.gait.gait import GRAVITY, BodyScale, Gait, limited
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait, limited
 from dmp_cpg_ros.core.gait.running import HASTE
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
 from dmp_cpg_ros.core.gait.transition import GaitTransition
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
 from dmp_cpg_ros.core.transformation.leg import (
     LegFeedback,
