@@ -103,10 +103,7 @@ class WalkingLoop:
     """
 
     def __init__(
-        self,
-        description: RobotDescription,
-        gait: Gait,
-        parameters: SuiteParameters | None = None,
+        self, description: RobotDescription, gait: Gait, parameters: SuiteParameters | None = None,
         gaits: Mapping[str, Gait] | None = None,
     ) -> None:
         """Build the parts at rest (or free, with ``start_inhibited`` false)."""
@@ -177,7 +174,7 @@ class WalkingLoop:
             state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait.word)
 
     def _joint_targets(
-        self, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float
+        self, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
     ) -> JointTargets:
         """Targets of all legs."""
         legs = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
@@ -186,7 +183,7 @@ class WalkingLoop:
             for name in ('position', 'velocity', 'effort')))
 
     def _leg(
-        self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float
+        self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
     ) -> JointTargets:
         self.leg_states[i], targets = self.legs[i].step(
             self.leg_states[i], self.canon.gait, self.x, x_dot, self.r, feedback,

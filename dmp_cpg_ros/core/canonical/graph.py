@@ -107,7 +107,7 @@ class CouplingGraph:
 
 
 def graph_from_edges(
-    size: int, edges: Edges, gain: float | Array, phases: Array | None = None
+    size: int, edges: Edges, gain: float | Array, phases: Array | None = None,
 ) -> CouplingGraph:
     """Graph in which every edge has the same gain.
 

@@ -43,7 +43,7 @@ class CanonicalSystem:
     """
 
     def __init__(
-        self, graph: CouplingGraph, oscillators: Oscillators, target: Array | None = None
+        self, graph: CouplingGraph, oscillators: Oscillators, target: Array | None = None,
     ) -> None:
         """Collect the constant matrices."""
         self.graph, self.oscillators = graph, oscillators

@@ -62,7 +62,7 @@ class GaitChoiceParameters(Parameters):
 
 
 def highest_speed(
-    parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait]
+    parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
 ) -> float:
     """Dimensionless foot speed up to which commands are followed.
 
@@ -84,9 +84,7 @@ def highest_speed(
     return max(named(each).highest_speed for each in names)
 
 
-def chosen_gait(
-    parameters: GaitChoiceParameters, present: str, r: Array, scale: BodyScale
-) -> str:
+def chosen_gait(parameters: GaitChoiceParameters, present: str, r: Array, scale: BodyScale) -> str:
     """Gait for a reference.
 
     Parameters

@@ -86,15 +86,8 @@ class ContactState:
 
 
 def contact_feedback(
-    state: ContactState,
-    force: Array,
-    quarter: float,
-    limits: ContactLimits | None,
-    network: GaitNetwork,
-    x: Array,
-    r: Array,
-    inhibition: Inhibition,
-    dt: float,
+    state: ContactState, force: Array, quarter: float, limits: ContactLimits | None,
+    network: GaitNetwork, x: Array, r: Array, inhibition: Inhibition, dt: float,
 ) -> tuple[ContactState, Array]:
     """Frequency offsets of one tick from the contacts of the feet.
 

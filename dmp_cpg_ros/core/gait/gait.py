@@ -285,7 +285,7 @@ class Gait(CycleOfLegs):
 
 
 def limited(
-    velocity: Triple, scale: BodyScale, highest_speed: float, largest_curve: float = inf
+    velocity: Triple, scale: BodyScale, highest_speed: float, largest_curve: float = inf,
 ) -> Triple:
     """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
     share of g, that goes with it [m/s], [rad/s].

@@ -192,12 +192,7 @@ class GaitNetwork:
         return self.gait.omega(self.scale.foot_speed(*r.tolist()), self.scale)
 
     def advance(
-        self,
-        x: Array,
-        r: Array,
-        inhibition: Inhibition,
-        dt: float,
-        feedback: Array | float = 0.0,
+        self, x: Array, r: Array, inhibition: Inhibition, dt: float, feedback: Array | float = 0.0,
     ) -> tuple[GaitNetwork, Array]:
         """Advance the states and, while gaits change, the blend.
 
@@ -238,18 +233,13 @@ class GaitNetwork:
         return self.of(gait), _turned(y, None if moving is None else gait.phases)
 
     def step(
-        self,
-        x: Array,
-        r: Array,
-        inhibition: Inhibition,
-        dt: float,
-        feedback: Array | float = 0.0,
+        self, x: Array, r: Array, inhibition: Inhibition, dt: float, feedback: Array | float = 0.0,
     ) -> Array:
         """Advance the states (4, 2) as :meth:`advance`."""
         return self.advance(x, r, inhibition, dt, feedback)[1]
 
     def rate(
-        self, x: Array, r: Array, inhibition: Inhibition, feedback: Array | float = 0.0
+        self, x: Array, r: Array, inhibition: Inhibition, feedback: Array | float = 0.0,
     ) -> Array:
         """Rate of the states, ẋ (4, 2) [1/s], with feedback as in :meth:`advance`: that of the
         held blend and what moves its offsets.
@@ -267,7 +257,7 @@ class GaitNetwork:
         return state_at(phi + self.gait.phases, self.parameters.radius)
 
     def rest_state(
-        self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0
+        self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0,
     ) -> Array:
         """Equilibrium (4, 2) that is reached from the locked state under inhibition at zero
         reference.

@@ -110,12 +110,8 @@ class RunningGait:
     """
 
     def __init__(
-        self,
-        parameters: CanonicalParameters,
-        scale: BodyScale,
-        gaits: GaitReader,
-        change: GaitChangeParameters | None = None,
-        choice: GaitChoiceParameters | None = None,
+        self, parameters: CanonicalParameters, scale: BodyScale, gaits: GaitReader,
+        change: GaitChangeParameters | None = None, choice: GaitChoiceParameters | None = None,
         quarter: float = float('nan'),
     ) -> None:
         """Keep the parts; networks are built when they are needed."""
@@ -158,13 +154,8 @@ class RunningGait:
         return updated(state, wanted=self.gaits.named(name))
 
     def step(
-        self,
-        state: CanonicalState,
-        r: Array,
-        inhibition: Inhibition,
-        dt: float,
-        foot_force: Array | None = None,
-        limits: ContactLimits | None = None,
+        self, state: CanonicalState, r: Array, inhibition: Inhibition, dt: float,
+        foot_force: Array | None = None, limits: ContactLimits | None = None,
     ) -> CanonicalState:
         """Advance by one tick.
 

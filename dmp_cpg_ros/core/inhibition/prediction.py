@@ -23,16 +23,9 @@ Array = NDArray[np.float64]
 
 
 def predict(
-    supervisor: GaitSupervisor,
-    reference: ReferenceSystem,
-    state: SupervisorState,
-    published: Inhibition,
-    network: GaitNetwork,
-    x: Array,
-    r: Array,
-    command: tuple[float, float, float],
-    dt: float,
-    horizon: float = 10.0,
+    supervisor: GaitSupervisor, reference: ReferenceSystem, state: SupervisorState,
+    published: Inhibition, network: GaitNetwork, x: Array, r: Array,
+    command: tuple[float, float, float], dt: float, horizon: float = 10.0,
     body_mode: str = 'standing',
 ) -> float:
     """Time from now to rest (of a requested stop) or to phase lock (of a start).

@@ -115,7 +115,7 @@ class GaitSupervisor:
     """
 
     def __init__(
-        self, parameters: InhibitionParameters, voting: VotingParameters, activity_rate: float
+        self, parameters: InhibitionParameters, voting: VotingParameters, activity_rate: float,
     ) -> None:
         """Keep the parts."""
         self.parameters, self.voting, self.activity_rate = parameters, voting, activity_rate
@@ -152,7 +152,7 @@ class GaitSupervisor:
         return np.maximum(gains, state.vote_gains) if armed and state.voted else gains
 
     def request(
-        self, state: SupervisorState, stop: bool, automatic: bool = False
+        self, state: SupervisorState, stop: bool, automatic: bool = False,
     ) -> SupervisorState:
         """Ask for a stop or a start; asking for what is already asked changes nothing but its
         origin.
@@ -163,15 +163,8 @@ class GaitSupervisor:
         return self._turned(updated(state, asked=stop, automatic=automatic, voted=voted))
 
     def step(
-        self,
-        state: SupervisorState,
-        time_ns: int,
-        network: GaitNetwork,
-        x: Array,
-        x_dot: Array,
-        r: Array,
-        command: tuple[float, float, float],
-        tally: Tally | None = None,
+        self, state: SupervisorState, time_ns: int, network: GaitNetwork, x: Array, x_dot: Array,
+        r: Array, command: tuple[float, float, float], tally: Tally | None = None,
         body_mode: str = 'standing',
     ) -> SupervisorState:
         """Advance by one tick.
@@ -221,7 +214,7 @@ class GaitSupervisor:
         return self._running(state, network.phase_errors(x), speed)
 
     def _automatic(
-        self, state: SupervisorState, command: tuple[float, float, float]
+        self, state: SupervisorState, command: tuple[float, float, float],
     ) -> SupervisorState:
         """Stop after a time of zero command, and start at a command, when ``auto_inhibit`` is
         on.
@@ -277,7 +270,7 @@ class GaitSupervisor:
         return updated(state, automatic=state.automatic and automatic, idle_ns=-1)
 
     def _stopping(
-        self, state: SupervisorState, target: Array, x: Array, rates: list[float], speed: float
+        self, state: SupervisorState, target: Array, x: Array, rates: list[float], speed: float,
     ) -> SupervisorState:
         armed = state.armed or speed <= self.parameters.capture_speed
         inhibition = Inhibition(True, self._gains(state, armed), self.parameters.region_radius)

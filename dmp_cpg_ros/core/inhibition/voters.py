@@ -132,14 +132,8 @@ class FootWatch:
 
 
 def watch_feet(
-    state: FootWatch,
-    parameters: VoteSourceParameters,
-    time_ns: int,
-    walking: bool,
-    position: Array,
-    duty: float,
-    omega: float,
-    load: Array,
+    state: FootWatch, parameters: VoteSourceParameters, time_ns: int, walking: bool,
+    position: Array, duty: float, omega: float, load: Array,
 ) -> tuple[FootWatch, Mask, Mask]:
     """Compare what the feet feel with where their legs are in the cycle.
 
