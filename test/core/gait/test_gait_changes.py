@@ -236,6 +236,7 @@ def test_the_gait_follows_the_speed() -> None:
 def test_a_blend_takes_the_place_of_a_gait() -> None:
     """Whoever reads phases asks both the same questions."""
     public = {name for name in dir(BlendedGait) if not name.startswith('_')}
-    for name in ('omega', 'duty', 'own_omega', 'own_omegas', 'rest_rate', 'phases', 'word',
+    for name in ('omega', 'duty', 'own_omegas', 'oscillator_omegas', 'following', 'moving_phases',
+                 'rest_rate', 'phases', 'word', 'limited',
                  'cycle_position', 'scalar_cycle_position', 'scaled', 'name'):
         assert name in public and hasattr(GAITS['trot'], name)
