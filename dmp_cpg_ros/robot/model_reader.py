@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.leg_reader import (
@@ -28,7 +29,6 @@ from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 Vector = NDArray[np.float64]
 
-GRAVITY = 9.81  # [m/s^2]
 STANCE_LEG_SHARE = 0.7  # distance hip-foot over leg length when the model has no usable home pose
 USUAL_VELOCITY_LIMIT = 30.0  # [rad/s] Unitree Go1's published figure, for models that say nothing
 GAIN_OVER_WEIGHT = 1.7  # kp / (m g L); gives 60 N m/rad for 9 kg and legs of 0.4 m

@@ -13,7 +13,7 @@ from math import acos, inf
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import upward
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.transformation.leg import body_scale, nominal_foothold

@@ -15,7 +15,8 @@ from core_examples import GRAVITY, TICK
 from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
-from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw, rotation_matrix, turned
+from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw, turned
+from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -49,7 +50,7 @@ def errors(estimates: list[BodyEstimate], sway: Sway = SWAY) -> np.ndarray:
     for k, estimate in enumerate(estimates):
         _, R = sway.pose(k * TICK)
         velocity, _ = sway.velocity(k * TICK)
-        E = R.T @ rotation_matrix(estimate.quaternion)
+        E = R.T @ np.array(rotation(estimate.quaternion.tolist()))
         turn = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
         rows.append(np.concatenate((estimate.velocity_in_base - R.T @ velocity, turn)))
     return np.array(rows)
