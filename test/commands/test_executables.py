@@ -13,13 +13,14 @@ import pytest
 pytest.importorskip('rclpy')
 
 import ros_processes
+from entry_names import ENTRY_NAMES
 from rcl_interfaces.srv import GetParameters
 from ros_processes import Processes, Ros
 from std_srvs.srv import SetBool
 
-from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
-from dmp_cpg_ros.nodes.conversions import CANONICAL_NAMES, CORRECTION_NAMES, SHIFT_NAMES
+from dmp_cpg_ros.__main__ import COMMANDS, STUDIES
 from dmp_cpg_ros.nodes.interfaces import INTERFACES, published_by, read_by
+from dmp_cpg_ros.suite_table import KINDS
 
 processes, ros, ros_domain = (
     ros_processes.processes,
@@ -27,34 +28,6 @@ processes, ros, ros_domain = (
     ros_processes.ros_domain,
 )
 
-NODES = (
-    'reference_filter',
-    'canonical_oscillators',
-    'leg_transformation',
-    'inhibition',
-    'posture_control',
-    'mujoco_robot',
-    'bag_recorder',
-)
-COMMANDS = (
-    'walk',
-    'certify',
-    'analyze',
-    'learn',
-    'inspect_robot',
-    'robot_client',
-    'study_stops',
-    'benchmark_walking',
-    'study_recovery',
-)
-
-NAMES = {
-    'joint_states': JOINT_NAMES,
-    'canonical_state': CANONICAL_NAMES,
-    'posture_feedback': JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES,
-    'joint_targets': tuple(f'fl_{joint}' for joint in JOINTS_OF_LEG),
-    'foot_contacts': tuple(f'{leg}_foot' for leg in LEGS),
-}
 OUTPUTS = (
     'reference',
     'canonical_state',
@@ -65,18 +38,17 @@ OUTPUTS = (
 )
 
 
-@pytest.mark.parametrize('name', NODES + COMMANDS)
+@pytest.mark.parametrize('name', (*KINDS, *COMMANDS, *STUDIES))
 def test_help_names_what_there_is(processes: Processes, name: str) -> None:
-    folder = 'nodes' if name in NODES else 'commands'
-    process = processes.python('-m', f'dmp_cpg_ros.{folder}.{name}', '--help')
+    process = processes.python('-m', 'dmp_cpg_ros', name, '--help')
     assert process.wait() == 0
     assert name in process.output
-    if name in NODES and name != 'bag_recorder':
+    if name in KINDS and name != 'bag_recorder':
         for topic in (*published_by(name), *read_by(name)):
             assert topic.name in process.output
 
 
-@pytest.mark.parametrize('name', NODES)
+@pytest.mark.parametrize('name', KINDS)
 def test_a_bad_parameter_is_named_with_what_is_valid(processes: Processes, name: str) -> None:
     bad = {
         'reference_filter': ('alpha_r', -1.0, '0.05'),
@@ -97,7 +69,7 @@ def test_a_bad_parameter_is_named_with_what_is_valid(processes: Processes, name:
     assert 'Traceback' not in process.output
 
 
-@pytest.mark.parametrize('name', NODES)
+@pytest.mark.parametrize('name', KINDS)
 def test_not_a_number_neither_ends_a_node_nor_leaves_it(
     processes: Processes, ros: Ros, tmp_path: Path, name: str
 ) -> None:
@@ -138,8 +110,8 @@ def poisoned(kind: type, name: str, round_: int) -> Any:
     message = kind()
     if hasattr(message, 'header'):
         message.header.stamp.sec = round_ + 1
-    if name in NAMES:
-        message.name = list(NAMES[name])
+    if name in ENTRY_NAMES:
+        message.name = list(ENTRY_NAMES[name])
         for field in ('position', 'velocity', 'effort'):
             setattr(message, field, [bad] * len(message.name))
     elif name in ('reference', 'odom', 'cmd_vel'):
@@ -164,4 +136,4 @@ def numbers_of(message: Any) -> list[float]:
 
 def test_every_node_of_the_contract_is_here() -> None:
     kinds = {kind for topic in INTERFACES.values() for kind in topic.publishers}
-    assert kinds - {'user'} <= set(NODES)
+    assert kinds - {'user'} <= set(KINDS)

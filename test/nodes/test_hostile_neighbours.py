@@ -18,6 +18,7 @@ pytest.importorskip('rclpy')
 import ros_processes
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from entry_names import ENTRY_NAMES
 from geometry_msgs.msg import Twist, WrenchStamped
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetAvailableTransitions, GetState
@@ -33,7 +34,6 @@ from ros_processes import NodeProcess, Processes, Ros
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool, Trigger
-from test_executables import NAMES, NODES
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
@@ -48,6 +48,7 @@ from dmp_cpg_ros.nodes.message_values import set_stamp
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.robot_state_messages import read_imu
 from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
+from dmp_cpg_ros.suite_table import KINDS
 
 processes, ros, ros_domain = (
     ros_processes.processes,
@@ -57,7 +58,7 @@ processes, ros, ros_domain = (
 
 RCLError = rclpy_implementation.RCLError
 
-CONTROLLERS = tuple(name for name in NODES if name != 'bag_recorder')
+CONTROLLERS = tuple(name for name in KINDS if name != 'bag_recorder')
 FOLLOWERS = ('reference_filter', 'canonical_oscillators', 'inhibition')
 GARBAGE = (
     b'\x00\x00\x00\x00\x01\x02\x03',  # big-endian, cut short
@@ -144,8 +145,8 @@ def test_false_stamps_do_not_end_a_node(
 def still(topic: Interface, stamp_ns: int) -> Any:
     """Message of a robot that stands, with a stamp."""
     message = topic.type()
-    if topic.name in NAMES:
-        message.name = list(NAMES[topic.name])
+    if topic.name in ENTRY_NAMES:
+        message.name = list(ENTRY_NAMES[topic.name])
         for field in ('position', 'velocity', 'effort'):
             setattr(message, field, [0.0] * len(message.name))
     if hasattr(message, 'header'):
@@ -185,7 +186,7 @@ def test_false_news_of_parameters_are_refused(
     ended(process)
 
 
-@pytest.mark.parametrize('kind', NODES)
+@pytest.mark.parametrize('kind', KINDS)
 def test_transitions_that_are_not_possible_are_refused(
     processes: Processes, ros: Ros, tmp_path: Path, kind: str
 ) -> None:
@@ -219,7 +220,7 @@ def test_transitions_that_are_not_possible_are_refused(
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize('kind', NODES)
+@pytest.mark.parametrize('kind', KINDS)
 def test_an_interrupt_ends_a_lone_node_without_complaint(
     processes: Processes, ros: Ros, tmp_path: Path, kind: str, number: int
 ) -> None:
