@@ -44,13 +44,13 @@ from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.body_mode import ModeState
 from dmp_cpg_ros.core.modes.body_requests import REQUESTS
 from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
+from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.legs import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState
 from dmp_cpg_ros.core.transformation.leg import LegPrimitive, LegState, body_scale
 
 Array = NDArray[np.float64]
@@ -420,7 +420,7 @@ class WalkingLoop:
         leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
         measured = None
         if leg.parameters.reading == 'torque':
-            measured = TransformationState(
+            measured = SpringState(
                 state.joint_position[joints], state.joint_velocity[joints]
             )
         return leg.targets(

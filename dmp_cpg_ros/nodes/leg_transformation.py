@@ -12,9 +12,9 @@ from typing import Any
 from dmp_cpg_ros.core.modes.body_command import BodyCommand
 from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
 from dmp_cpg_ros.core.modes.movements import Movements
+from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS, LegChoice
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive
 from dmp_cpg_ros.nodes.conversions import (
     CanonicalStateReader,
@@ -112,7 +112,7 @@ class LegTransformation(ManagedNode):
         measured = None
         if 'joint_states' in values:
             position, velocity, _ = values['joint_states']
-            measured = TransformationState(position[joints], velocity[joints])
+            measured = SpringState(position[joints], velocity[joints])
         targets = self._primitive.targets(
             self._state, goal, goal_velocity, feedback.torque[joints], measured
         )

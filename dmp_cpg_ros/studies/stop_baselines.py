@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
+from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState
 
 Array = NDArray[np.float64]
 
@@ -77,10 +77,10 @@ class FreezingLoop(WalkingLoop):
             return super()._leg(i, state, x_dot, feedback, dt)
         leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
         position, zero = self.leg_states[i].joints.position, np.zeros(3)
-        held = TransformationState(position, zero)
+        held = SpringState(position, zero)
         self.leg_states[i] = replace(self.leg_states[i], joints=held)
         measured = None
         if leg.parameters.reading == 'torque':
-            measured = TransformationState(state.joint_position[joints],
+            measured = SpringState(state.joint_position[joints],
                                            state.joint_velocity[joints])
         return leg.targets(self.leg_states[i], position, zero, feedback.torque[joints], measured)

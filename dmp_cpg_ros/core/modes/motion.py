@@ -26,8 +26,8 @@ from dmp_cpg_ros.core.modes.body_command import BodyCommand
 from dmp_cpg_ros.core.modes.movements import Movement, Movements, minimum_jerk
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.primitives.states import DiscreteInput, DiscreteState
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState, TransformationSystem
 from dmp_cpg_ros.core.transformation.leg import LegState
 
 Array = NDArray[np.float64]
@@ -67,12 +67,12 @@ class LegMotion:
         Which of the twelve joints are the leg's.
     movements : Movements
         The robot's movements.
-    transformation : TransformationSystem
+    transformation : SpringDamper
         The leg's; it follows the primitive.
     """
 
     def __init__(
-        self, joints: slice, movements: Movements, transformation: TransformationSystem
+        self, joints: slice, movements: Movements, transformation: SpringDamper
     ) -> None:
         """Learn the paths."""
         self._joints, self._movements = joints, movements
@@ -116,7 +116,7 @@ class LegMotion:
         """
         joints = leg.joints
         if command.mode == 'damped' or dt <= 0.0:
-            joints = TransformationState(measured.copy(), np.zeros(len(measured)))
+            joints = SpringState(measured.copy(), np.zeros(len(measured)))
         goal, goal_velocity = joints.position, np.zeros(len(measured))
         if command.movement:
             motion = self._moved(motion, joints, command, dt)
@@ -124,11 +124,11 @@ class LegMotion:
         else:
             motion = None
         if command.mode != 'damped' and dt > 0.0:
-            joints = self._transformation.step(joints, goal, goal_velocity, dt)
+            joints = self._transformation.follow(joints, goal, goal_velocity, dt)
         return motion, LegState(joints, 0.0, np.zeros(3)), goal, goal_velocity
 
     def _moved(
-        self, motion: MotionState | None, joints: TransformationState, command: BodyCommand,
+        self, motion: MotionState | None, joints: SpringState, command: BodyCommand,
         dt: float,
     ) -> MotionState:
         """Begin the command's movement, or advance it to the command's phase."""
@@ -140,7 +140,7 @@ class LegMotion:
         state = motion.primitive.step(motion.state, held, dt)
         return replace(motion, state=replace(state, x=command.x))
 
-    def _begun(self, joints: TransformationState, command: BodyCommand) -> MotionState:
+    def _begun(self, joints: SpringState, command: BodyCommand) -> MotionState:
         movement, unit = self._movements.named(command.movement), unit_movement()
         goal = movement.goal[self._joints]
         weights, begin = np.zeros((BASES, len(goal))), goal

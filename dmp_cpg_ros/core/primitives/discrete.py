@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.basis import GaussianBases
 from dmp_cpg_ros.core.primitives.demonstration import Trajectory, columns, vector
-from dmp_cpg_ros.core.primitives.goal_filter import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.primitives.states import DiscreteInput, DiscreteState
 from dmp_cpg_ros.core.primitives.time_scaling import Form, TimeScaling

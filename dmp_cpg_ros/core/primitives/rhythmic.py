@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase, state_at
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.basis import VonMisesBases
 from dmp_cpg_ros.core.primitives.demonstration import Trajectory, vector
-from dmp_cpg_ros.core.primitives.goal_filter import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.hopf_flow import hopf_flow
 from dmp_cpg_ros.core.primitives.responses import periodic_responses
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper

@@ -20,13 +20,13 @@ from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, minus, moved, pair, plus, triple
 from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.transformation.foot_path import FootPath, rolling_share, swing_height
 from dmp_cpg_ros.core.transformation.foot_shift import ShiftRates
 from dmp_cpg_ros.core.transformation.foot_way import way_of
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState, TransformationSystem
 from dmp_cpg_ros.core.transformation.stumble import Stumble, stumble_step, yielding
 from dmp_cpg_ros.core.transformation.swing_activity import activity_step
 
@@ -101,7 +101,7 @@ class LegState:
 
     Attributes
     ----------
-    joints : TransformationState
+    joints : SpringState
         θ, θ̇ of the kinematic reading, (3,) each.
     activity : float
         Swing activity a in [0, 1].
@@ -111,7 +111,7 @@ class LegState:
         What the stumbling reflex does.
     """
 
-    joints: TransformationState
+    joints: SpringState
     activity: float
     shift_in_base: Array
     stumble: Stumble = Stumble()
@@ -175,16 +175,14 @@ class LegPrimitive:
         self.stumble_lift = parameters.stumble_lift * description.stance_height
         self.stumble_lag = parameters.stumble_lag * description.stance_height
         self.touch_force = LOADED * quarter_weight(description)
-        self.transformation = TransformationSystem(
-            parameters.stiffness,
-            parameters.damping,
-            np.asarray(geometry.rotor_inertia, dtype=float),
-        )
+        self.inertia = np.asarray(geometry.rotor_inertia, dtype=float)
+        self.transformation = SpringDamper(
+            np.full(3, parameters.stiffness), np.full(3, parameters.damping))
 
     def initial_state(self) -> LegState:
         """State of a leg that stands at its foothold."""
         q = self.kinematics.inverse(self.foothold_in_base)
-        return LegState(TransformationState(q, np.zeros(3)), 0.0, np.zeros(3))
+        return LegState(SpringState(q, np.zeros(3)), 0.0, np.zeros(3))
 
     def step(
         self,
@@ -265,7 +263,7 @@ class LegPrimitive:
         velocity = plus(plus(shift_rate, path_velocity), (0.0, 0.0, stumble.rate))
         velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
         goal, goal_velocity = self._goal(foot, velocity)
-        joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
+        joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, np.array(shift), stumble), goal, goal_velocity
 
     def _goal(self, foot: Triple, velocity: Triple) -> tuple[Array, Array]:
@@ -280,7 +278,7 @@ class LegPrimitive:
         goal: Array,
         goal_velocity: Array,
         feedback: Array,
-        measured: TransformationState | None = None,
+        measured: SpringState | None = None,
     ) -> JointTargets:
         """Joint targets of the parameters' reading.
 
@@ -292,7 +290,7 @@ class LegPrimitive:
             Goals from :meth:`step`.
         feedback : ndarray (3,)
             τ_fb [N m].
-        measured : TransformationState, optional
+        measured : SpringState, optional
             Measured angles and velocities, needed for the torque reading.
 
         Returns
@@ -301,10 +299,10 @@ class LegPrimitive:
         """
         joints = state.joints if measured is None else measured
         acceleration = self.transformation.acceleration(
-            joints.position, joints.velocity, goal, goal_velocity
+            joints.position, joints.velocity - goal_velocity, goal, np.zeros(3)
         )
         return JointTargets(
-            joints.position, joints.velocity, self.transformation.torque(acceleration, feedback)
+            joints.position, joints.velocity, self.inertia * acceleration + feedback
         )
 
 
