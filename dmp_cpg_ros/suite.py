@@ -36,6 +36,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     chosen_world,
 )
 from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.primitive_files import load_motion
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""
@@ -149,6 +150,7 @@ def load_suite(
         sets['posture_control'][ModeParameters],
         canonical[GaitChangeParameters],
         canonical[GaitChoiceParameters],
+        load_motion(sets['leg_transformation'][LegParameters].motion),
     )
     gait = canonical[GaitParameters]
     return Suite(

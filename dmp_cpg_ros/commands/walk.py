@@ -22,6 +22,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.core.transformation.leg import body_scale
+from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.suite import Suite, load_suite
 
@@ -37,7 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     begin = time.monotonic()
     try:
         scenario = load_scenario(options.scenario)
-        overrides = {**scenario.parameters, **_pairs(options.set)}
+        motion = motion_overrides(options.motion or '')
+        overrides = {**scenario.parameters, **motion, **_pairs(options.set)}
         if options.robot is not None:
             overrides['robot'] = str(find_config(options.robot).resolve())
         if options.rate is not None:
@@ -252,6 +254,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--robot', metavar='FILE', help='robot file (default: the one of the parameter file)'
+    )
+    parser.add_argument(
+        '--motion', metavar='FILE', help='motion of the feet, from learn --motion'
     )
     parser.add_argument(
         '--parameters', metavar='FILE', help='parameter file (default: config/suite.yaml)'

@@ -129,7 +129,9 @@ class WalkingLoop:
         known_legs = RobotLegs(description)
         self.posture = PostureController(description, self.network.gait, p.posture, known_legs)
         self.body = BodyControl(description, p.mode, known_legs)
-        self.legs = [LegPrimitive(leg, description, self.network.gait, p.leg) for leg in LEGS]
+        self.legs = [
+            LegPrimitive(leg, description, self.network.gait, p.leg, p.motion) for leg in LEGS
+        ]
         self.motions = [
             LegMotion(slice(3 * i, 3 * i + 3), self.body.modes.movements, leg.transformation)
             for i, leg in enumerate(self.legs)

@@ -25,12 +25,15 @@ from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.transformation.foot_motion import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 
 @dataclass(frozen=True)
 class SuiteParameters:
-    """Parameters of all parts of the suite."""
+    """Parameters of all parts of the suite, and the motion of the feet where it is not the foot
+    path of the package.
+    """
 
     reference: ReferenceParameters = field(default_factory=ReferenceParameters)
     canonical: CanonicalParameters = field(default_factory=CanonicalParameters)
@@ -43,6 +46,13 @@ class SuiteParameters:
     mode: ModeParameters = field(default_factory=ModeParameters)
     gait_change: GaitChangeParameters = field(default_factory=GaitChangeParameters)
     gait_choice: GaitChoiceParameters = field(default_factory=GaitChoiceParameters)
+    motion: Motion | None = None
+
+    @property
+    def sets(self) -> dict[str, Parameters]:
+        """Parameter sets by the name of their part."""
+        return {name: value for name, value in vars(self).items()
+                if isinstance(value, Parameters)}
 
 
 @dataclass(frozen=True)

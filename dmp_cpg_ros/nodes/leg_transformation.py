@@ -28,6 +28,7 @@ from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import Array, frame_of, header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.primitive_files import load_motion
 
 
 class LegTransformation(ManagedNode):
@@ -53,7 +54,8 @@ class LegTransformation(ManagedNode):
             len(JOINTS_OF_LEG) * self._place, len(JOINTS_OF_LEG) * (self._place + 1)
         )
         gaits, description = gait_reader(self), description_of(self)
-        self._primitive = LegPrimitive(leg, description, gaits.read(''), parameters)
+        self._primitive = LegPrimitive(
+            leg, description, gaits.read(''), parameters, load_motion(parameters.motion))
         self._motion = LegMotion(
             self._joints, Movements(description), self._primitive.transformation
         )

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -86,6 +87,27 @@ class RhythmicPrimitive:
             raise ParameterError(f'{len(self.names)} names do not match {dofs} degrees of freedom')
         AndronovHopf(self.rho)
         self._filters  # noqa: B018  (checks the rates)
+
+    def part(self, dofs: slice) -> RhythmicPrimitive:
+        """Return the primitive of some of the degrees of freedom."""
+        spring = self.transformation
+        return replace(
+            self, weights=self.weights[:, dofs], centre=self.centre[dofs], names=self.names[dofs],
+            transformation=replace(
+                spring, stiffness=spring.stiffness[dofs], damping=spring.damping[dofs]))
+
+    @classmethod
+    def joined(
+        cls, parts: Sequence[RhythmicPrimitive], names: tuple[str, ...] = ()
+    ) -> RhythmicPrimitive:
+        """Primitive of the degrees of freedom of several that share bases and oscillator."""
+        springs = [part.transformation for part in parts]
+        return replace(
+            parts[0], weights=np.concatenate([part.weights for part in parts], axis=1),
+            centre=np.concatenate([part.centre for part in parts]), names=names,
+            transformation=replace(
+                springs[0], stiffness=np.concatenate([spring.stiffness for spring in springs]),
+                damping=np.concatenate([spring.damping for spring in springs])))
 
     @cached_property
     def _filters(self) -> tuple[FirstOrderFilter, FirstOrderFilter, TimeScaling]:

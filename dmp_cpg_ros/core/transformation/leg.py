@@ -9,7 +9,7 @@ Jacobian.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.transformation.foot_motion import FootMotion, HermiteMotion, Motion
 from dmp_cpg_ros.core.transformation.foot_path import FootPath, rolling_share, swing_height
 from dmp_cpg_ros.core.transformation.foot_shift import ShiftRates
 from dmp_cpg_ros.core.transformation.foot_way import way_of
@@ -50,6 +51,10 @@ class LegParameters(Parameters):
     )
     clearance: float = parameter(
         0.2, 'height of the swing as a fraction of the standing height', minimum=0.0, maximum=0.6
+    )
+    motion: str = parameter(
+        '', 'file of a learned motion that the feet play, scaled to the clearance; empty: the '
+        'foot path of the package'
     )
     activity_rate: float = parameter(
         12.0,
@@ -109,12 +114,15 @@ class LegState:
         Shift of the foot's path that acts now [m].
     stumble : Stumble
         What the stumbling reflex does.
+    motion : object
+        State of the foot's motion.
     """
 
     joints: SpringState
     activity: float
     shift_in_base: Array
     stumble: Stumble = Stumble()
+    motion: Any = None
 
 
 @dataclass(frozen=True)
@@ -156,12 +164,18 @@ class LegPrimitive:
         The gait in force; the attribute is set when it changes.
     parameters : LegParameters
         Gains and swing.
+    motion : Motion, optional
+        Where the path of the foot comes from; the
+        :class:`~dmp_cpg_ros.core.transformation.foot_path.FootPath` itself without.
     """
 
     def __init__(
-        self, leg: str, description: RobotDescription, gait: GaitInForce, parameters: LegParameters
+        self, leg: str, description: RobotDescription, gait: GaitInForce,
+        parameters: LegParameters, motion: Motion | None = None,
     ) -> None:
         """Derive foothold and scale from the description."""
+        self._motion: FootMotion = (
+            HermiteMotion() if motion is None else motion.of_leg(leg, description))
         self.parameters, self.gait, self.place = parameters, gait, LEGS.index(leg)
         geometry = description.legs[self.place]
         self.kinematics = LegKinematics(geometry)
@@ -238,8 +252,8 @@ class LegPrimitive:
             activity * (self.clearance + (self.stumble_lift if state.stumble.wary else 0.0)),
             self.rolling,
         )
-        foot, slope = path.at(position)
-        path_velocity = moved((0.0, 0.0, 0.0), slope, rate / (2.0 * pi))
+        motion, foot, path_velocity = self._motion.step(
+            state.motion, path, position, rate, dt)
         shift, stumble = triple(state.shift_in_base.tolist()), state.stumble
         if dt <= 0.0:
             shift_rate = (0.0, 0.0, 0.0)
@@ -264,7 +278,7 @@ class LegPrimitive:
         velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
         goal, goal_velocity = self._goal(foot, velocity)
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
-        return LegState(joints, activity, np.array(shift), stumble), goal, goal_velocity
+        return LegState(joints, activity, np.array(shift), stumble, motion), goal, goal_velocity
 
     def _goal(self, foot: Triple, velocity: Triple) -> tuple[Array, Array]:
         """g_θ [rad] and g_θ̇ [rad/s] of a foot in the base."""
