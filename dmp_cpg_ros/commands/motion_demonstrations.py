@@ -4,24 +4,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.bag import bag_folder
+from dmp_cpg_ros.analysis.context import find_parameter
 from dmp_cpg_ros.analysis.foot_motion import feet_in_base
 from dmp_cpg_ros.analysis.gait_in_force import gait_rows
 from dmp_cpg_ros.analysis.loading import load_recording
-from dmp_cpg_ros.analysis.motion import common_rows, held, stretches
+from dmp_cpg_ros.analysis.motion import common_rows, held, rotations, stretches
 from dmp_cpg_ros.commands.analyze import read_json
 from dmp_cpg_ros.commands.run_knowledge import run_context
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.core.transformation.learned_motion import FootSamples
-from dmp_cpg_ros.core.transformation.leg import body_scale, nominal_foothold
+from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale, nominal_foothold
+
+Array = NDArray[np.float64]
 
 SLOWEST = 0.1
 """Speed of the reference from which the robot walks [m/s]."""
@@ -70,9 +77,9 @@ def read_motion(
     walked = next((frame for frame in canonical.frame if frame and '>' not in frame), 'amble')
     parameters = read_json(run / 'manifest.json').get('parameters') or {'gait': walked}
     context, _ = run_context(parameters, robot_file)
-    rows, at = common_rows(joints.time, canonical.time)
+    rows, at, attitude = common_rows(joints.time, canonical.time, recording.imu.time)
     if not len(rows):
-        raise DataError(f"'{path}': no stamp has both {topic} and canonical_state")
+        raise DataError(f"'{path}': no stamp has all of {topic}, canonical_state and imu")
     missing = [JOINT_NAMES[j] for j in np.flatnonzero(np.isnan(joints.position[rows]).any(axis=0))]
     if missing:
         raise DataError(f"'{path}': {topic} lacks the joints {', '.join(missing)}")
@@ -105,18 +112,34 @@ def read_motion(
         & (np.abs(r - before).max(axis=1) < STEADY * speed)
         & (np.abs(phi_rate - omega[:, None]).max(axis=1) < STEADY * omega)
     )
+    angles = joints.position[rows]
+    if topic == 'joint_targets':
+        angles = _goals(times, angles, joints.velocity[rows], parameters)
+    up = rotations(recording.imu.quaternion[attitude])[:, 2]
     feet: list[list[FootSamples]] = [[] for _ in context.robot.legs]
     for first, past in stretches(steady):
         part = slice(int(np.searchsorted(times, times[first] + SETTLING)), past)
         if times[past - 1] - times[first] < SETTLING + SHORTEST:
             continue
         for i, leg in enumerate(context.robot.legs):
-            q = joints.position[rows[part], 3 * i : 3 * i + 3]
-            away = feet_in_base(leg, q) - nominal_foothold(context.robot, leg.name)
-            away[:, 2] += bounce[part, i]
+            foot = feet_in_base(leg, angles[part, 3 * i : 3 * i + 3])
+            away = foot - nominal_foothold(context.robot, leg.name)
+            away[:, 2] = np.sum(up[part] * foot, axis=1) + bounce[part, i]
             feet[i].append(FootSamples(c[part, i], duty[part], 2.0 * np.pi / omega[part], away))
     if not feet[0]:
         raise DataError(
             f"'{path}': the robot nowhere walks straight on for {SETTLING + SHORTEST:g} s at one "
             f'speed of at least {SLOWEST:g} m/s')
     return feet, context.robot
+
+
+def _goals(times: Array, angles: Array, rates: Array, parameters: Mapping[str, Any]) -> Array:
+    """Goals that the targets of the joints followed: targets lag behind, and a goal that is
+    learned shall not be filtered twice.
+    """
+    usual = LegParameters()
+    stiffness, damping = (
+        np.full(len(JOINT_NAMES), find_parameter(parameters, name, getattr(usual, name)))
+        for name in ('stiffness', 'damping'))
+    goals = SpringDamper(stiffness, damping).goals(angles, rates, np.diff(times))
+    return np.vstack([angles[:1], goals])

@@ -11,7 +11,8 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
-from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.maths.vec3 import upward
+from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.learned_motion import FootSamples, LearnedMotion, learn_motion
 from dmp_cpg_ros.core.transformation.leg import nominal_foothold
@@ -42,12 +43,14 @@ class Walk:
         self.robot = MujocoRobot(suite.robot_file, suite.tick_ns, sensors=suite.sensors)
         self.loop = WalkingLoop(
             self.robot.description, suite.gait, suite.parameters, load_gaits())
-        self.state, self.ticks = self.robot.reset(), list[Tick]()
+        self.state = self.robot.reset()
+        self.states, self.ticks = list[RobotState](), list[Tick]()
 
     def go(self, duration: float) -> float:
         """Walk on; returns the mean forward speed [m/s]."""
         speeds = []
         for _ in range(round(duration / 0.004)):
+            self.states.append(self.state)
             self.ticks.append(self.loop.tick(self.state))
             self.state = self.robot.step(self.ticks[-1].targets)
             assert not self.robot.fallen, f'fell at {self.state.time_ns * 1e-9:.2f} s'
@@ -60,15 +63,24 @@ class Walk:
             self.robot.description, self.loop.network.gait, self.loop.network.scale)
         feet = []
         for i, leg in enumerate(self.loop.legs):
-            rows = []
-            for tick in self.ticks[-round(seconds / 0.004) :]:
+            rows, last = [], -round(seconds / 0.004)
+            joints = slice(3 * i, 3 * i + 3)
+            targets = [tick.targets for tick in self.ticks[last - 1 :]]
+            goals = leg.transformation.goals(
+                np.array([target.position[joints] for target in targets]),
+                np.array([target.velocity[joints] for target in targets]),
+                np.full(-last, 0.004))
+            for tick, state, goal in zip(
+                self.ticks[last:], self.states[last:], goals, strict=True
+            ):
                 speed = scale.foot_speed(*tick.r.tolist())
                 duty, omega = gait.duty(speed, scale), gait.omega(speed, scale)
                 c = float(gait.cycle_position(phase(tick.x[i])))
-                foot = leg.kinematics.foot_in_base(tick.targets.position[3 * i : 3 * i + 3])
-                foot[2] += gait.bounce(c, duty, omega).height
-                rows.append((c, duty, 2.0 * np.pi / omega,
-                             *(foot - nominal_foothold(description, LEGS[i]))))
+                foot = leg.kinematics.foot_in_base(goal)
+                away = foot - nominal_foothold(description, LEGS[i])
+                up = np.array(upward(state.base_quaternion.tolist()))
+                away[2] = up @ foot + gait.bounce(c, duty, omega).height
+                rows.append((c, duty, 2.0 * np.pi / omega, *away))
             c, duty, cycle, *foot = np.array(rows).T
             feet.append([FootSamples(c, duty, cycle, np.transpose(foot))])
         return LearnedMotion(learn_motion(feet, description.stance_height)[0])

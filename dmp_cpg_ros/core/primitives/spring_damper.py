@@ -255,6 +255,28 @@ class SpringDamper:
             velocity.append(rate + c * error + d * error_rate)
         return SpringState(np.array(position), np.array(velocity))
 
+    def goals(self, position: Array, velocity: Array, dt: Array) -> Array:
+        """Goals that states one after the other have followed, the inverse of :meth:`follow`.
+
+        Parameters
+        ----------
+        position, velocity : ndarray (m + 1, n)
+            States.
+        dt : ndarray (m,)
+            Times between them [s].
+
+        Returns
+        -------
+        ndarray (m, n)
+            Goals at the ends of the steps.
+        """
+        h = dt[:, None]
+        (a, b), (c, d) = spring_exponential(self.stiffness, self.damping, h)  # (m, n) each
+        y = position[1:] - a * position[:-1] - b * velocity[:-1]  # (1 − a) g + (a h − b) ġ
+        v = velocity[1:] - c * position[:-1] - d * velocity[:-1]  # −c g + (1 − d + c h) ġ
+        A, B, C, D = 1.0 - a, a * h - b, -c, 1.0 - d + c * h
+        return np.asarray((D * y - B * v) / (A * D - B * C))
+
     def propagator(self, length: float) -> Array:
         """Exponential exp(A s), A = [[0, 1], [−k, −b]], for a length s [s]: (2, 2, n)."""
         E = self._propagators.get(length)

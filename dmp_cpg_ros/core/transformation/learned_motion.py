@@ -199,7 +199,8 @@ class FootSamples:
     cycle : ndarray (m,)
         Period of the gait [s].
     foot : ndarray (m, 3)
-        From its foothold, in the base; z without the bounce of the body [m].
+        From its foothold, in the base; z upwards instead, without the planned bounce of the body,
+        from anywhere [m].
     """
 
     cycle_position: Array

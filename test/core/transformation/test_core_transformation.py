@@ -51,6 +51,20 @@ def test_the_step_starts_with_the_acceleration_of_the_paper(
     assert np.allclose(rate, expected, rtol=1e-3, atol=1e-3 * k)
 
 
+@given(k=st.floats(100.0, 1e4), ratio=st.floats(0.3, 3.0), dt=st.floats(1e-3, 0.02),
+       seed=st.integers(0, 99))
+def test_goals_are_found_again_in_what_followed_them(
+        k: float, ratio: float, dt: float, seed: int) -> None:
+    of, rng = spring(k, 2.0 * ratio * np.sqrt(k)), np.random.default_rng(seed)
+    goals, rates = rng.normal(size=(2, 20, 3))
+    states = [SpringState(*rng.normal(size=(2, 3)))]
+    for goal, rate in zip(goals, rates, strict=True):
+        states.append(of.follow(states[-1], goal, rate, dt))
+    found = of.goals(np.array([s.position for s in states]),
+                     np.array([s.velocity for s in states]), np.full(20, dt))
+    np.testing.assert_allclose(found, goals, rtol=1e-6, atol=1e-6)
+
+
 def test_two_states_under_the_same_goals_converge_to_one_another() -> None:
     of, rng = spring(6400.0, 160.0), np.random.default_rng(0)
     a = SpringState(np.ones(3), np.zeros(3))
