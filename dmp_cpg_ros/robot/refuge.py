@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.modes.body_condition import BodySense
 from dmp_cpg_ros.core.modes.fall_detection import FallParameters
-from dmp_cpg_ros.core.modes.movements import RISE, Movements, minimum_jerk
+from dmp_cpg_ros.core.modes.movements import RISE, Movements
 from dmp_cpg_ros.core.modes.postures import lying_posture
+from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.home_pose import home_joint_position

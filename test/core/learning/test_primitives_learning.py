@@ -24,14 +24,14 @@ from dmp_cpg_ros.paper.demonstrations import (
     LETTERS,
     handwriting,
     joint_angles,
-    minimum_jerk,
+    straight_reach,
     walking_joints,
 )
 from dmp_cpg_ros.paper.homogeneous import Homogeneous
 
 DISCRETE = {
     **{f'letter {letter}': handwriting(letter) for letter in LETTERS},
-    'minimum jerk': minimum_jerk([0.0, 1.0, -0.5], [1.0, -1.0, 0.0]),
+    'minimum jerk': straight_reach([0.0, 1.0, -0.5], [1.0, -1.0, 0.0]),
     'joint angles': joint_angles(),
 }
 
@@ -75,7 +75,7 @@ def test_local_regression_improves_with_more_bases():
 @given(st.integers(0, 1000), st.sampled_from(['scaled', 'printed']))
 def test_known_weights_of_a_discrete_primitive_come_back(seed, form):
     rng = np.random.default_rng(seed)
-    template = learn_discrete(minimum_jerk([0.0, 0.0], [1.0, 2.0], 1.0), 10, form=form)
+    template = learn_discrete(straight_reach([0.0, 0.0], [1.0, 2.0], 1.0), 10, form=form)
     true = replace(
         template,
         weights=template.weights + rng.normal(0.0, 300.0, (10, 2)),
@@ -234,7 +234,7 @@ def test_uneven_sampling_does_not_matter():
 
 
 def test_the_chosen_number_of_bases_grows_with_detail_and_falls_with_noise():
-    smooth = learn_discrete(minimum_jerk([0.0], [1.0]), None).bases.count
+    smooth = learn_discrete(straight_reach([0.0], [1.0]), None).bases.count
     detailed = learn_discrete(positions_only(handwriting('e')), None).bases.count
     clean, rng = handwriting('e'), np.random.default_rng(4)
     noisy = Demonstration(
@@ -245,7 +245,7 @@ def test_the_chosen_number_of_bases_grows_with_detail_and_falls_with_noise():
 
 
 def test_held_out_error_sees_what_the_fit_does_not():
-    rng, clean = np.random.default_rng(6), minimum_jerk([0.0], [1.0], dt=0.02)
+    rng, clean = np.random.default_rng(6), straight_reach([0.0], [1.0], dt=0.02)
     noisy = [
         Demonstration(clean.times, clean.positions + rng.normal(0.0, 0.05, clean.positions.shape))
         for _ in range(2)
@@ -324,7 +324,7 @@ def test_a_learned_primitive_takes_another_goal_and_amplitude():
     ('arguments', 'error', 'text'),
     [
         (([],), DataError, 'at least one'),
-        (([handwriting('a'), minimum_jerk([0.0], [1.0])],), DataError, 'same degrees'),
+        (([handwriting('a'), straight_reach([0.0], [1.0])],), DataError, 'same degrees'),
         ((handwriting('a'), 0), ParameterError, 'at least 1'),
     ],
 )

@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.learning.period import (
     spread_between_cycles,
 )
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.paper.demonstrations import minimum_jerk, walking_joints
+from dmp_cpg_ros.paper.demonstrations import straight_reach, walking_joints
 
 SHAPES = {
     'sine': lambda u: np.sin(u),
@@ -70,7 +70,7 @@ def test_what_has_no_period_is_refused():
     with pytest.raises(DataError, match='half of the variance'):
         find_period(Demonstration(times, np.random.default_rng(0).normal(size=100)))
     with pytest.raises(DataError, match='none to look for'):
-        find_period(minimum_jerk([0.0], [1.0]), shortest=2.0, longest=1.0)
+        find_period(straight_reach([0.0], [1.0]), shortest=2.0, longest=1.0)
 
 
 @given(st.floats(-3.1, 3.1), st.integers(0, 99))

@@ -13,7 +13,7 @@ from core_examples import GAITS, geometry, quadruped
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.modes.body_command import BodyCommand
 from dmp_cpg_ros.core.modes.motion import LegMotion, phase_at
-from dmp_cpg_ros.core.modes.movements import Movements, minimum_jerk
+from dmp_cpg_ros.core.modes.movements import Movements
 from dmp_cpg_ros.core.modes.postures import (
     folded_length,
     leg_angles,
@@ -21,6 +21,7 @@ from dmp_cpg_ros.core.modes.postures import (
     raised_posture,
     standing_posture,
 )
+from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
 from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
