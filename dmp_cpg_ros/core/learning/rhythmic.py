@@ -14,6 +14,8 @@ from dmp_cpg_ros.core.learning.learning import (
     BASIS_CANDIDATES,
     FitOptions,
     as_demonstrations,
+    check_bases,
+    check_reproduction,
     chosen_gains,
     ranges,
     smallest_good,
@@ -88,10 +90,11 @@ def learn_rhythmic(
         If an argument is out of range.
     """
     task = _task(demonstrations, period, leads, centres, stiffness, damping, form, options)
+    check_bases(bases, task.demonstrations)
     if bases is None:
         bases = smallest_good({n: held_out_error(task, task.bases(n)) for n in BASIS_CANDIDATES})
     made, omega = task.bases(bases), 2.0 * np.pi / task.period
-    return RhythmicPrimitive(
+    primitive = RhythmicPrimitive(
         fit_weights(task, made),
         made,
         omega,
@@ -100,6 +103,14 @@ def learn_rhythmic(
         np.mean(task.centres, axis=0),
         names=task.demonstrations[0].names,
     )
+    if task.options.method != 'response':
+        errors = [
+            np.abs(primitive.on_cycle(task.phases(i), task.tau(i))[0] + task.centres[i]
+                   - movement.positions).max(axis=0)
+            for i, movement in enumerate(task.demonstrations)
+        ]
+        check_reproduction(np.max(errors, axis=0) / ranges(task.demonstrations), task.options)
+    return primitive
 
 
 def held_out_errors(

@@ -238,7 +238,7 @@ class RhythmicPrimitive:
         Raises
         ------
         ParameterError
-            If amplitude, τ or dt is not positive.
+            If amplitude, τ or dt is not positive or the centre does not fit.
         """
         self._check(command)
         grid = self._filters[2].grid(state.tau, command.tau, dt, 5, self.form)
@@ -280,7 +280,8 @@ class RhythmicPrimitive:
         nodes = StepGrid(
             grid.elapsed[::2], grid.scaled[::2], grid.tau[::2], grid.length, grid.density[::2]
         )
-        centres = self._filters[0].at(state.centre, command.centre, nodes.elapsed)
+        centre = vector(command.centre, self.dofs, 'centre')
+        centres = self._filters[0].at(state.centre, centre, nodes.elapsed)
         position, velocity = self.transformation.step(
             state.position, state.velocity, centres, self.forcing(x), nodes
         )
