@@ -60,9 +60,7 @@ class AndronovHopf:
         ndarray (..., 2)
             ẋ [1/s].
         """
-        turned = x @ phase_generator().T
-        growth = self.rho * (self.radius**2 - np.sum(x * x, axis=-1))
-        return np.asarray(omega)[..., None] * turned + growth[..., None] * x
+        return hopf_field(x, omega, self.rho, self.radius)
 
     def jacobian(self, x: Array, omega: float | Array) -> Array:
         """Jacobian A = ∂f/∂x = ω S + ρ (r² − |x|²) I − 2ρ x xᵀ.
@@ -78,12 +76,7 @@ class AndronovHopf:
         -------
         ndarray (..., 2, 2)
         """
-        growth = self.rho * (self.radius**2 - np.sum(x * x, axis=-1))
-        return (
-            np.asarray(omega)[..., None, None] * phase_generator()
-            + growth[..., None, None] * np.eye(2)
-            - 2.0 * self.rho * x[..., :, None] * x[..., None, :]
-        )
+        return hopf_jacobian(x, omega, self.rho, self.radius)
 
     def symmetric_eigenvalues(self, x: Array) -> Array:
         """Eigenvalues of A_s: ρ(r² − |x|²) along the flow and ρ(r² − 3|x|²) along the radius.
@@ -98,3 +91,24 @@ class AndronovHopf:
             [self.rho * (self.radius**2 - squared), self.rho * (self.radius**2 - 3.0 * squared)],
             axis=-1,
         )
+
+
+def hopf_field(
+    x: Array, omega: float | Array, rho: float | Array, radius: float | Array
+) -> Array:
+    """Field of :class:`AndronovHopf` with parameters for each of the states (..., 2)."""
+    turned = x @ phase_generator().T
+    growth = rho * (radius**2 - np.sum(x * x, axis=-1))
+    return np.asarray(np.asarray(omega)[..., None] * turned + growth[..., None] * x)
+
+
+def hopf_jacobian(
+    x: Array, omega: float | Array, rho: float | Array, radius: float | Array
+) -> Array:
+    """Jacobian of :func:`hopf_field`, (..., 2, 2)."""
+    growth = rho * (radius**2 - np.sum(x * x, axis=-1))
+    return np.asarray(
+        np.asarray(omega)[..., None, None] * phase_generator()
+        + growth[..., None, None] * np.eye(2)
+        - np.asarray(2.0 * rho)[..., None, None] * x[..., :, None] * x[..., None, :]
+    )
