@@ -104,6 +104,7 @@ setup(
     # Makefile installs when no ROS 2 is there.
     install_requires=[
         'numpy>=1.26',
+        'scipy>=1.11',
         'mujoco>=3.2.7',
         'rosbags>=0.10',
         'mcap>=1.1',

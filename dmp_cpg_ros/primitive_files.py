@@ -4,19 +4,22 @@
 
 from __future__ import annotations
 
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
-from dmp_cpg_ros.configuration import load_yaml
-from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.configuration import find_config, load_yaml
+from dmp_cpg_ros.core.errors import DataError, MissingFileError, ParameterError
 from dmp_cpg_ros.core.parameters import check_names, shown
 from dmp_cpg_ros.core.primitives.basis import GaussianBases, VonMisesBases
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
+from dmp_cpg_ros.core.transformation.foot_motion import Motion
+from dmp_cpg_ros.core.transformation.learned_motion import LearnedMotion
 
 _FORMAT = 1
 
@@ -126,6 +129,55 @@ def load_primitive(path: str | Path) -> DiscretePrimitive | RhythmicPrimitive:
     keys = (*_COMMON, *_SCALARS[kind], *_VECTORS[kind])
     check_names(content, keys, keys, str(path))
     return _built(content, path)
+
+
+MOTIONS = 'dmp_cpg_ros.motions'
+"""Group of entry points by which other packages offer motions of the feet."""
+
+
+def load_motion(name: str) -> Motion | None:
+    """Motion of the feet that the parameter ``motion`` names.
+
+    Parameters
+    ----------
+    name : str
+        An entry point of the group ``MOTIONS``, which is called without arguments, or a file that
+        ``learn --motion`` wrote, by its path or in the config folder. Empty for none.
+
+    Returns
+    -------
+    Motion or None
+
+    Raises
+    ------
+    MissingFileError
+        If there is neither.
+    DataError
+        If the file holds no motion; the text says what is wrong.
+    """
+    if not name:
+        return None
+    for offered in entry_points(group=MOTIONS, name=name):
+        motion: Motion = offered.load()()
+        return motion
+    path = find_config(name)
+    try:
+        primitive = load_primitive(path)
+        if not isinstance(primitive, RhythmicPrimitive):
+            raise DataError('a motion is a rhythmic primitive, and this one is discrete')
+        return LearnedMotion(primitive)
+    except (DataError, ParameterError) as error:
+        told = str(error)
+        raise DataError(told if str(path) in told else f'{path}: {told}') from error
+
+
+def motion_overrides(name: str) -> dict[str, Any]:
+    """Parameters with which a suite plays a motion at its own height: motion and clearance."""
+    motion = load_motion(name)
+    if motion is None:
+        return {}
+    known = name if Path(name).suffix == '' and not Path(name).exists() else find_config(name)
+    return {'motion': str(known), 'clearance': motion.clearance}
 
 
 def _built(content: dict[str, Any], path: Path) -> DiscretePrimitive | RhythmicPrimitive:

@@ -27,7 +27,9 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
     chosen_world,
 )
-from dmp_cpg_ros.suite_table import KINDS, ROBOT, WALKING
+from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.primitive_files import load_motion
+from dmp_cpg_ros.suite_table import KINDS, LEG, ROBOT, WALKING
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""
@@ -135,8 +137,10 @@ def load_suite(
     sets = {kind.name: _node_sets(content, path, kind.name, overrides, namespace)
             for kind in WALKING}
     canonical, robot = sets[CANONICAL], sets[ROBOT]
-    parameters = SuiteParameters.of(
-        {part: sets[node][part] for node, parts in PART_OF.items() for part in parts})
+    parameters = dataclasses.replace(
+        SuiteParameters.of(
+            {part: sets[node][part] for node, parts in PART_OF.items() for part in parts}),
+        motion=load_motion(sets[LEG][LegParameters].motion))
     gait = canonical[GaitParameters]
     return Suite(
         parameters,

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.paper.networks.coupling import EdgeCoupling
-from dmp_cpg_ros.paper.networks.hopf_oscillators import HopfOscillators
-from dmp_cpg_ros.paper.networks.network import OscillatorNetwork
-from dmp_cpg_ros.paper.networks.van_der_pol import VanDerPolOscillators
+from dmp_cpg_ros.paper.coupling import EdgeCoupling
+from dmp_cpg_ros.paper.network import OscillatorNetwork
+from dmp_cpg_ros.paper.oscillators import HopfOscillators, VanDerPolOscillators
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,9 @@ from time import perf_counter
 import numpy as np
 
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
+from dmp_cpg_ros.commands.motion_demonstrations import read_motion
 from dmp_cpg_ros.commands.ros_arguments import parse_arguments
-from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.learning import discrete as learning_discrete
 from dmp_cpg_ros.core.learning import rhythmic as learning_rhythmic
 from dmp_cpg_ros.core.learning.learning import METHODS, FitOptions, ranges
@@ -23,6 +24,7 @@ from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import FORMS
+from dmp_cpg_ros.core.transformation.learned_motion import LearnedMotion, learn_motion
 from dmp_cpg_ros.primitive_files import save_primitive
 
 BAD_INPUT = 2
@@ -38,6 +40,7 @@ files:
 examples:
   learn reach.csv --out reach.yaml
   learn first.csv second.csv --bases auto --out reach.yaml
+  learn runs/latest --motion my_walk.yaml
   learn runs/latest --kind rhythmic --joints fl_hip,fl_knee --start 5 --end 9 --out trot.yaml
 """
 
@@ -46,6 +49,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     options, _ = parse_arguments(_parser(), arguments)
     try:
+        if options.motion is not None:
+            return _motion(options)
+        if options.out is None:
+            raise ParameterError('name the file to write, with --out FILE or --motion FILE')
         demonstrations = [_read(path, options) for path in options.demonstrations]
         began = perf_counter()
         primitive, errors = _learn(demonstrations, options)
@@ -58,8 +65,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _motion(options: argparse.Namespace) -> int:
+    """Learn what all feet do in recorded walks; returns the exit status."""
+    read = [read_motion(path, options.topic or 'joint_targets', options.robot)
+            for path in options.demonstrations]
+    feet = [[part for leg in legs for part in leg]
+            for legs in zip(*(feet for feet, _ in read), strict=True)]
+    heights = {robot.stance_height for _, robot in read}
+    if len(heights) > 1:
+        raise DataError('a motion is learned from walks of one robot')
+    bases = 25 if options.bases == 'auto' else options.bases
+    gains = {'stiffness': options.stiffness, 'damping': options.damping}
+    primitive, errors = learn_motion(
+        feet, heights.pop(), bases, **{k: v for k, v in gains.items() if v is not None})
+    motion = LearnedMotion(primitive)
+    save_primitive(primitive, options.motion)
+    stride, side, lift = errors.reshape(-1, 3).max(axis=0)
+    print(f'motion of {len(feet)} feet, {bases} bases, from {len(feet[0])} stretch(es) of '
+          f'steady walking; lift {motion.clearance:.3g} of the standing height')
+    print(f'left unexplained (root mean square): stride {100.0 * stride:.2g} % of a stride, '
+          f'side {100.0 * side:.2g} % and lift {100.0 * lift:.2g} % of the standing height')
+    print(f'wrote {options.motion}')
+    return 0
+
+
 def _read(path: Path, options: argparse.Namespace) -> Demonstration:
-    read = read_demonstration(path, options.joints, options.topic, options.start, options.end)
+    topic = options.topic or 'joint_states'
+    read = read_demonstration(path, options.joints, topic, options.start, options.end)
     if options.positions_only:
         return Demonstration(read.times, read.positions, names=read.names)
     return read
@@ -123,7 +155,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add('demonstrations', metavar='DEMO', nargs='+', type=Path, help='CSV or NumPy file, or bag')
-    add('--out', metavar='FILE', type=Path, required=True, help='YAML file to write')
+    add('--out', metavar='FILE', type=Path, help='YAML file to write')
+    add('--motion', metavar='FILE', type=Path,
+        help='YAML file to write with what all feet do in a recorded walk, for walk --motion')
+    add('--robot', metavar='FILE', type=Path,
+        help='robot that walked, for --motion (default: the one of the run)')
     add('--kind', choices=('discrete', 'rhythmic'), default='discrete', help='default: discrete')
     add(
         '--bases',
@@ -133,7 +169,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add('--period', metavar='S', type=float, help='period of a rhythm (default: found from data)')
     add('--joints', metavar='A,B', type=_names, default=(), help='joints to take (default: all)')
-    add('--topic', default='joint_states', help='topic of a bag (default: joint_states)')
+    add('--topic', help='topic of a bag (default: joint_states; joint_targets for --motion)')
     add('--start', metavar='S', type=float, help='take samples from here on, after the first [s]')
     add('--end', metavar='S', type=float, help='take samples up to here, after the first [s]')
     add('--positions-only', action='store_true', help='leave recorded derivatives aside')

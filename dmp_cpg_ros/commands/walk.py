@@ -34,6 +34,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.core.transformation.leg import body_scale
+from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.suite import Suite, load_suite
 from dmp_cpg_ros.suite_table import KINDS, WALKING, namespace_rules
@@ -52,7 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         scenario = load_scenario(options.scenario)
         overrides = {
-            **scenario.parameters, **ros.parameters, **dict(map(read_parameter, options.set))}
+            **scenario.parameters, **motion_overrides(options.motion or ''), **ros.parameters,
+            **dict(map(read_parameter, options.set))}
         ros.namespace = checked_namespace(options.namespace or ros.namespace)
         if options.parameters and ros.parameters_file:
             raise ParameterError('give --parameters or --params-file, not both')
@@ -291,6 +293,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--robot', metavar='FILE', help='robot file (default: the one of the parameter file)'
+    )
+    parser.add_argument(
+        '--motion', metavar='FILE', help='motion of the feet, from learn --motion'
     )
     parser.add_argument(
         '--parameters', metavar='FILE', help='parameter file (default: config/suite.yaml)'

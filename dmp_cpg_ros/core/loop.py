@@ -125,7 +125,7 @@ class WalkingLoop:
             else None
         )
         self.body = BodyControl(description, p.posture, p.mode, legs)
-        self.legs = [LegControl(leg, description, p.leg, self.body.modes.movements)
+        self.legs = [LegControl(leg, description, p.leg, self.body.modes.movements, p.motion)
                      for leg in LEGS]
         self._clock, self._dt = TickClock(), 0.004
         self.r = np.zeros(3)

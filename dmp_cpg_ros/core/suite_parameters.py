@@ -28,12 +28,15 @@ from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.transformation.foot_motion import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 
 @dataclass(frozen=True)
 class SuiteParameters:
-    """Parameters of all parts of the suite."""
+    """Parameters of all parts of the suite, and the motion of the feet where it is not the foot
+    path of the package.
+    """
 
     reference: ReferenceParameters = field(default_factory=ReferenceParameters)
     canonical: CanonicalParameters = field(default_factory=CanonicalParameters)
@@ -47,6 +50,7 @@ class SuiteParameters:
     gait_change: GaitChangeParameters = field(default_factory=GaitChangeParameters)
     gait_choice: GaitChoiceParameters = field(default_factory=GaitChoiceParameters)
     voting: VotingParameters = field(default_factory=VotingParameters)
+    motion: Motion | None = None
 
     @classmethod
     def of(cls, sets: Mapping[type[Parameters], Any]) -> SuiteParameters:
@@ -55,6 +59,12 @@ class SuiteParameters:
         """
         given = ((part.name, sets.get(cast(Any, part.default_factory))) for part in fields(cls))
         return cls(**{name: value for name, value in given if value is not None})
+
+    @property
+    def sets(self) -> dict[str, Parameters]:
+        """Parameter sets by the name of their part."""
+        return {name: value for name, value in vars(self).items()
+                if isinstance(value, Parameters)}
 
 
 @dataclass(frozen=True)

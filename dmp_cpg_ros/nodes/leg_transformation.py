@@ -27,6 +27,7 @@ from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.primitive_files import load_motion
 from dmp_cpg_ros.suite_table import KINDS, LEG
 
 NO_JOINTS = (np.full(len(JOINT_NAMES), np.nan),) * 3
@@ -52,7 +53,8 @@ class LegTransformation(ManagedNode):
         """Build the leg's primitive and its topics."""
         leg, parameters = self.parameters_of(LegChoice).leg, self.parameters_of(LegParameters)
         gaits, description = gait_reader(self), description_of(self)
-        self._leg = LegControl(leg, description, parameters, Movements(description))
+        self._leg = LegControl(
+            leg, description, parameters, Movements(description), load_motion(parameters.motion))
         self._state = self._leg.initial_state()
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
         inputs = ['canonical_state', 'reference', 'posture_feedback']

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration, minimum_jerk
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ _LEG_CYCLE: dict[str, tuple[float, tuple[float, ...], tuple[float, ...]]] = {
 }
 
 
-def minimum_jerk(
+def straight_reach(
     start: ArrayLike, goal: ArrayLike, duration: float = 1.0, dt: float = 0.005
 ) -> Demonstration:
     """Point-to-point movement of least jerk (Flash & Hogan 1985).
@@ -76,12 +76,10 @@ def minimum_jerk(
         np.atleast_1d(np.asarray(goal, dtype=float)),
     )
     times = _times(duration, dt)
-    u = (times / duration)[:, None]
-    position = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    velocity = 30.0 * u**2 * (1.0 - u) ** 2 / duration
-    acceleration = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / duration**2
-    span = goal - start
-    return Demonstration(times, start + span * position, span * velocity, span * acceleration)
+    u, way = (times / duration)[:, None], goal - start
+    position, velocity, acceleration = (
+        way * minimum_jerk(u, order) / duration**order for order in range(3))
+    return Demonstration(times, start + position, velocity, acceleration)
 
 
 def handwriting(letter: str = 'a', dt: float = 0.002) -> Demonstration:

@@ -11,15 +11,14 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import root
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.numerical_inverse import (
-    complex_step_jacobian,
-    difference_jacobian,
-    newton_inverse,
-)
+from dmp_cpg_ros.paper.jacobians import complex_step_jacobian, difference_jacobian
 
 Array = NDArray[np.float64]
+
+_SMALLEST_PIECE = 2.0**-20
 
 
 class Diffeomorphism(ABC):
@@ -200,3 +199,44 @@ class TangentLift(Diffeomorphism):
         position, velocity = np.split(np.asarray(y_prime, dtype=float), 2)
         y = self.base.inverse(position, None if guess is None else np.split(guess, 2)[0])
         return np.concatenate([y, np.linalg.solve(self.base.jacobian(y), velocity)])
+
+
+def newton_inverse(
+    forward: Callable[[Array], Array], jacobian: Callable[[Array], Array], y_prime: Array,
+    guess: Array,
+) -> Array:
+    """Solve T(y) = y' by SciPy's root finder along the segment from T(guess) to y'.
+
+    The whole way is tried first; where the root finder fails, it is halved. For a diffeomorphism
+    of ℝⁿ the segment has a unique pre-image, so small enough pieces always succeed.
+
+    Parameters
+    ----------
+    forward, jacobian : callable
+        T and J.
+    y_prime : ndarray (n,)
+    guess : ndarray (n,)
+        Where the search starts.
+
+    Returns
+    -------
+    ndarray (n,)
+
+    Raises
+    ------
+    ParameterError
+        If no solution is found: the map is singular on the way, or y' is not in its image.
+    """
+    y = np.array(guess, dtype=float)
+    begin, done, piece = forward(y), 0.0, 1.0
+    tolerance = 1e-10 * (1.0 + float(np.abs(y_prime).max()) + float(np.abs(begin).max()))
+    while done < 1.0:
+        target = begin + min(done + piece, 1.0) * (y_prime - begin)
+        found = root(lambda at, to=target: forward(at) - to, y, jac=jacobian, tol=1e-14)
+        if np.abs(found.fun).max() <= tolerance:
+            y, done, piece = found.x, done + piece, 2.0 * piece
+        elif (piece := 0.5 * piece) < _SMALLEST_PIECE:
+            raise ParameterError(
+                f"T(y) = y' has no solution that is found for y' = {y_prime.tolist()}; give the "
+                'inverse or a guess that is nearer')
+    return y

@@ -15,62 +15,45 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 
 Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
 
 _COMPLEX_STEP = 1e-30
-_DIFFERENCE_STEP = 6e-6  # about the cube root of the machine's precision
+_DIFFERENCE_STEP = 6e-4  # about the fifth root of the machine's precision
 _AGREEMENT = 1e-5
 
 
 def complex_step_jacobian(field: Field, x: ArrayLike) -> Array:
-    """∂f/∂x by the complex step, for fields that are made of analytic operations.
+    """∂f/∂x (m, n) by the complex step, for fields that are made of analytic operations.
 
-    Parameters
-    ----------
-    field : callable
-        f: ndarray (n,) → ndarray (m,); it is called with complex numbers.
-    x : array_like (n,)
-        State.
-
-    Returns
-    -------
-    ndarray (m, n)
+    Raises
+    ------
+    ParameterError
+        If the field returns real numbers for complex ones; what it does then cannot be
+        differentiated so.
     """
     x = np.asarray(x, dtype=float)
     columns = []
-    for k in range(x.size):
-        shifted = x.astype(complex)
-        shifted[k] += 1j * _COMPLEX_STEP
-        columns.append(np.imag(np.asarray(field(shifted))) / _COMPLEX_STEP)
+    for direction in np.eye(x.size):
+        value = np.asarray(field(x + 1j * _COMPLEX_STEP * direction))
+        if not np.iscomplexobj(value):
+            raise ParameterError(
+                "the function drops imaginary parts; use derivative = 'difference'")
+        columns.append(value.imag / _COMPLEX_STEP)
     return np.stack(columns, axis=-1)
 
 
 def difference_jacobian(field: Field, x: ArrayLike) -> Array:
-    """∂f/∂x by central differences, with an error of about 1e-10 of the field's scale.
-
-    Parameters
-    ----------
-    field : callable
-        f: ndarray (n,) → ndarray (m,).
-    x : array_like (n,)
-        State.
-
-    Returns
-    -------
-    ndarray (m, n)
-    """
+    """∂f/∂x (m, n) by five-point central differences, with a relative error of about 1e-11."""
     x = np.asarray(x, dtype=float)
     columns = []
-    for k in range(x.size):
-        step = _DIFFERENCE_STEP * max(1.0, abs(float(x[k])))
-        ahead, behind = x.copy(), x.copy()
-        ahead[k] += step
-        behind[k] -= step
-        columns.append((np.asarray(field(ahead)) - np.asarray(field(behind)))
-                       / (ahead[k] - behind[k]))
+    for k, direction in enumerate(np.eye(x.size)):
+        h = _DIFFERENCE_STEP * max(1.0, abs(float(x[k])))
+        near, far = (np.asarray(field(x + d * direction)) - np.asarray(field(x - d * direction))
+                     for d in (h, 2.0 * h))
+        columns.append((8.0 * near - far) / (12.0 * h))
     return np.stack(columns, axis=-1)
 
 
@@ -98,7 +81,7 @@ def numerical_jacobian(field: Field, x: ArrayLike) -> Array:
         raise DataError(f'the field is not finite around x = {np.asarray(x).tolist()}')
     try:
         exact = complex_step_jacobian(field, x)
-    except TypeError:  # the field has a function that takes real numbers only
+    except (TypeError, ParameterError):  # the field takes, or returns, real numbers only
         return differences
     scale = 1.0 + np.abs(differences).max(initial=0.0)
     return exact if np.abs(exact - differences).max(initial=0.0) < _AGREEMENT * scale \

@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.paper.jacobians import Field
@@ -29,14 +32,6 @@ class Orbit:
 
     states: Array
     period: float
-
-
-def runge_kutta_step(field: Field, x: Array, h: float) -> Array:
-    """One step of the classical fourth-order Runge-Kutta method."""
-    k1 = field(x)
-    k2 = field(x + 0.5 * h * k1)
-    k3 = field(x + 0.5 * h * k2)
-    return x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + field(x + h * k3))
 
 
 def find_orbit(field: Field, start: ArrayLike, transient: float, step: float,
@@ -65,40 +60,38 @@ def find_orbit(field: Field, start: ArrayLike, transient: float, step: float,
     DataError
         If the state does not come back within 100,000 steps or the orbit does not close.
     """
-    x = np.asarray(start, dtype=float)
-    for _ in range(int(np.ceil(transient / step))):
-        x = runge_kutta_step(field, x, step)
+    x = _flow(field, start, transient, step).y[:, -1]
     period = _time_of_return(field, x, step)
-    h = period / count
-    states = [x]
-    for _ in range(count):
-        states.append(runge_kutta_step(field, states[-1], h))
+    states = _flow(field, x, period, step, np.linspace(0.0, period, count + 1)).y.T
     gap = float(np.linalg.norm(states[-1] - x))
-    size = float(np.ptp(np.stack(states), axis=0).max())
+    size = float(np.ptp(states, axis=0).max())
     if not gap <= 1e-4 * size:
         raise DataError(f'the orbit does not close: after {period:.6g} s the state is {gap:.3g} '
                         'away; give a longer transient')
-    return Orbit(np.stack(states[:-1]), period)
+    return Orbit(states[:-1].copy(), period)
+
+
+def _flow(field: Field, start: ArrayLike, duration: float, step: float,
+          times: Array | None = None, events: Callable[[float, Array], float] | None = None
+          ) -> Any:
+    return solve_ivp(lambda _, x: field(x), (0.0, duration), np.asarray(start, dtype=float),
+                     'DOP853', times, events=events, rtol=1e-11, atol=1e-12, max_step=step)
 
 
 def _time_of_return(field: Field, x0: Array, step: float) -> float:
     """Time until the state crosses the plane through x0 across the flow, close to x0."""
-    normal = field(x0)
+    normal, begun, size = field(x0), 0.0, 0.0
 
-    def height(x: Array) -> float:
+    def height(_: float, x: Array) -> float:
         return float((x - x0) @ normal)
 
-    x, farthest = x0, 0.0
-    for k in range(1, 100_000):
-        following = runge_kutta_step(field, x, step)
-        distance = float(np.linalg.norm(following - x0))
-        farthest = max(farthest, distance)
-        if height(x) < 0.0 <= height(following) and distance < 0.1 * farthest:
-            low, high = 0.0, step
-            for _ in range(60):
-                middle = 0.5 * (low + high)
-                low, high = ((middle, high) if height(runge_kutta_step(field, x, middle)) < 0.0
-                             else (low, middle))
-            return (k - 1) * step + high
-        x = following
+    height.direction = 1.0  # type: ignore[attr-defined]
+    x = x0
+    for _ in range(1000):
+        piece = _flow(field, x, 100.0 * step, step, events=height)
+        size = max(size, float(np.linalg.norm(piece.y - x0[:, None], axis=0).max()))
+        for t, at in zip(piece.t_events[0], piece.y_events[0], strict=True):
+            if begun + t > step and np.linalg.norm(at - x0) < 0.1 * size:
+                return float(begun + t)
+        x, begun = piece.y[:, -1], begun + 100.0 * step
     raise DataError('the state did not come back to where it was within 100,000 steps')

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.modes.falls import BodySense, FallParameters
-from dmp_cpg_ros.core.modes.motion_library import RISE, Movements, lying_posture, minimum_jerk
+from dmp_cpg_ros.core.modes.motion_library import RISE, Movements, lying_posture
+from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.start_pose import home_joint_position

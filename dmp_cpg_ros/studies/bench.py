@@ -28,9 +28,9 @@ from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.transformation.leg import LegFeedback
-from dmp_cpg_ros.paper.networks.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
-from dmp_cpg_ros.paper.networks.hopf_oscillators import HopfOscillators
-from dmp_cpg_ros.paper.networks.network import OscillatorNetwork
+from dmp_cpg_ros.paper.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
+from dmp_cpg_ros.paper.network import OscillatorNetwork
+from dmp_cpg_ros.paper.oscillators import HopfOscillators
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.suite import load_suite
 

@@ -33,7 +33,7 @@ from dmp_cpg_ros.paper.demonstrations import (
     LETTERS,
     handwriting,
     joint_angles,
-    minimum_jerk,
+    straight_reach,
     walking_joints,
 )
 
@@ -59,7 +59,7 @@ class LearningResult:
 def demonstrations() -> dict[str, tuple[str, Demonstration]]:
     """Built demonstrations by name, each with its kind, positions only."""
     made = {f'handwriting {letter}': ('discrete', handwriting(letter)) for letter in LETTERS}
-    made['minimum jerk'] = ('discrete', minimum_jerk([0.0, 1.0], [1.0, -1.0]))
+    made['minimum jerk'] = ('discrete', straight_reach([0.0, 1.0], [1.0, -1.0]))
     made['joint angles'] = ('discrete', joint_angles())
     made['walking joints'] = ('rhythmic', walking_joints())
     return {

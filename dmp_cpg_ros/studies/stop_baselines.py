@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
+from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState
 
 Array = NDArray[np.float64]
 
@@ -76,10 +76,10 @@ class FreezingLoop(WalkingLoop):
             return super()._leg(i, state, x_dot, feedback, dt)
         leg, joints = self.legs[i].primitive, self.legs[i].joints
         position, zero = self.leg_states[i].leg.joints.position, np.zeros(3)
-        held = replace(self.leg_states[i].leg, joints=TransformationState(position, zero))
+        held = replace(self.leg_states[i].leg, joints=SpringState(position, zero))
         self.leg_states[i] = replace(self.leg_states[i], leg=held)
         measured = None
         if leg.parameters.reading == 'torque':
-            measured = TransformationState(state.joint_position[joints],
+            measured = SpringState(state.joint_position[joints],
                                            state.joint_velocity[joints])
         return leg.targets(held, position, zero, feedback.torque[joints], measured)

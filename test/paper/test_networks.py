@@ -15,14 +15,21 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.networks.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
-from dmp_cpg_ros.paper.networks.family import OscillatorFamily
-from dmp_cpg_ros.paper.networks.hopf_oscillators import HopfOscillators
-from dmp_cpg_ros.paper.networks.mixed_oscillators import MixedOscillators
-from dmp_cpg_ros.paper.networks.network import OscillatorNetwork
-from dmp_cpg_ros.paper.networks.phase_coupling import PhaseEdgeCoupling, PhaseMeanFieldCoupling
-from dmp_cpg_ros.paper.networks.phase_oscillators import PhaseOscillators
-from dmp_cpg_ros.paper.networks.van_der_pol import VanDerPolOscillators
+from dmp_cpg_ros.paper.coupling import (
+    Coupling,
+    EdgeCoupling,
+    MeanFieldCoupling,
+    PhaseEdgeCoupling,
+    PhaseMeanFieldCoupling,
+)
+from dmp_cpg_ros.paper.network import OscillatorNetwork
+from dmp_cpg_ros.paper.oscillators import (
+    HopfOscillators,
+    MixedOscillators,
+    OscillatorFamily,
+    PhaseOscillators,
+    VanDerPolOscillators,
+)
 
 NAMES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 RNG = np.random.default_rng(0)

@@ -22,10 +22,11 @@ from dmp_cpg_ros.paper.diffeomorphism import (
     Composition,
     FunctionDiffeomorphism,
     TangentLift,
+    newton_inverse,
 )
 from dmp_cpg_ros.paper.homogeneous import Homogeneous
+from dmp_cpg_ros.paper.jacobians import difference_jacobian
 from dmp_cpg_ros.paper.limit_cycle import ClosedCurveDiffeomorphism, canonical_field
-from dmp_cpg_ros.paper.numerical_inverse import difference_jacobian, newton_inverse
 
 SEEDS = st.integers(0, 10_000)
 

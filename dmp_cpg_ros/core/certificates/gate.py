@@ -197,16 +197,14 @@ class CertificateGate:
 
 def _fields(parameters: SuiteParameters) -> Iterator[tuple[str, str, Any]]:
     """Part, name and value of every parameter."""
-    for part in dataclasses.fields(parameters):
-        values = getattr(parameters, part.name)
+    for part, values in parameters.sets.items():
         for entry in dataclasses.fields(values):
-            yield part.name, entry.name, getattr(values, entry.name)
+            yield part, entry.name, getattr(values, entry.name)
 
 
 def _alternatives(running: Running, name: str) -> list[Any]:
     """All values of a parameter that is a choice; for several at once, one up to all of them."""
-    for part in dataclasses.fields(running.parameters):
-        values = getattr(running.parameters, part.name)
+    for values in running.parameters.sets.values():
         for entry in dataclasses.fields(values):
             if entry.name == name:
                 choices = entry.metadata.get('choices', ())

@@ -20,6 +20,8 @@ from dmp_cpg_ros.core.learning.learning import (
     BASIS_CANDIDATES,
     FitOptions,
     as_demonstrations,
+    check_bases,
+    check_reproduction,
     chosen_gains,
     ranges,
     smallest_good,
@@ -74,12 +76,13 @@ def learn_discrete(
         If an argument is out of range.
     """
     task = _task(demonstrations, stiffness, damping, goals, form, options)
+    check_bases(bases, task.demonstrations)
     if bases is None:
         bases = smallest_good({n: held_out_error(task, task.bases(n)) for n in BASIS_CANDIDATES})
     made = task.bases(bases)
     fit = fit_response if task.options.method == 'response' else fit_force
     weights, start, velocity = fit(task, made)
-    return DiscretePrimitive(
+    primitive = DiscretePrimitive(
         weights,
         made,
         task.decay,
@@ -90,6 +93,10 @@ def learn_discrete(
         velocity,
         names=task.demonstrations[0].names,
     )
+    if task.options.method != 'response':
+        errors = reproduction_errors(primitive, task.demonstrations, task.goals)
+        check_reproduction(errors, task.options)
+    return primitive
 
 
 def held_out_errors(

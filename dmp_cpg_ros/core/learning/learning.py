@@ -36,6 +36,8 @@ METHODS: tuple[Method, ...] = ('response', 'joint', 'local')
 BASIS_CANDIDATES = (5, 7, 10, 14, 19, 25, 33, 43)
 """Numbers of bases that are tried when the number is to be chosen."""
 
+LARGEST_ERROR = 1.0
+"""Error of a reproduced position, as a fraction of the range, that is no reproduction."""
 
 _LOCAL_OVERLAP = 0.03
 
@@ -257,3 +259,21 @@ def ranges(demonstrations: Sequence[Demonstration]) -> Array:
     span = high - low
     largest = float(span.max()) or 1.0
     return np.where(span > 1e-9 * largest, span, largest)
+
+
+def check_bases(count: int | None, demonstrations: Sequence[Demonstration]) -> None:
+    """Raise DataError for more bases than samples; nothing would tell their weights apart."""
+    samples = sum(len(d.times) for d in demonstrations)
+    if count is not None and count > samples:
+        raise DataError(f'{count} bases cannot be learned from {samples} samples; valid are at '
+                        f'most as many bases as samples')
+
+
+def check_reproduction(errors: Array, options: FitOptions) -> None:
+    """Raise DataError where a fit of forces, which needs derivatives, reproduces nothing."""
+    worst = float(np.max(errors))
+    if options.method != 'response' and not worst < LARGEST_ERROR:
+        raise DataError(
+            f"method '{options.method}' misses the demonstrations by {100.0 * worst:.0f} % of "
+            "their range: noise or gaps spoil their derivatives; use the method 'response', "
+            'or record velocities and accelerations')

@@ -14,6 +14,11 @@ from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 
 Array = NDArray[np.float64]
 
+WANDERING = 0.03
+"""Share of the variance above which what no period explains must be noise, that is, must not be
+correlated from sample to sample.
+"""
+
 _HARMONICS = 8
 _COARSE_SAMPLES = 500
 
@@ -23,10 +28,10 @@ def find_period(
 ) -> float:
     """Period that explains all degrees of freedom best.
 
-    Peaks of the summed power spectrum and their subharmonics are candidates. Each is refined by
-    the least-squares fit of a Fourier series, which needs neither a whole number of cycles nor
-    even sampling. Of the periods that fit about as well as the best, the shortest is taken:
-    multiples of a period fit as well as it does.
+    Peaks of the summed Lomb-Scargle periodogram and their subharmonics are candidates. Each is
+    refined by the least-squares fit of a Fourier series, which needs neither a whole number of
+    cycles nor even sampling. Of the periods that fit about as well as the best, the shortest is
+    taken: multiples of a period fit as well as it does.
 
     Parameters
     ----------
@@ -43,7 +48,8 @@ def find_period(
     Raises
     ------
     DataError
-        If nothing moves, the limits leave nothing, or no period explains half of the variance.
+        If nothing moves, the limits leave nothing, or no single period explains the movement:
+        it is not periodic, its frequency wanders, or it is shorter than one and a half cycles.
     """
     times, values = demonstration.times - demonstration.times[0], demonstration.positions
     spread = values.std(axis=0)
@@ -64,20 +70,19 @@ def find_period(
         f: some.best_nearby(f, 0.6 / span, low, high)
         for f in _candidates(times, values, low, high)
     }
-    if not coarse:
-        raise DataError(
-            f'no period between {1.0 / high:g} s and {1.0 / low:g} s shows in the demonstration'
-        )
     least = min(error for _, error in coarse.values())
     plausible = [f for f, error in coarse.values() if error < 3.0 * least + 0.01]
     refined = [whole.refined(f, 0.06 / span) for f in plausible]
     least = min(error for _, error in refined)
-    if least > 0.5:
+    frequency = max(f for f, error in refined if error <= 1.1 * least + 1e-6)
+    if least > 0.5 or (least > WANDERING and whole.residual_correlation(frequency) > 0.5):
         raise DataError(
-            f'no period between {1.0 / high:g} s and {1.0 / low:g} s explains half of the '
-            f'variance; the best leaves {100.0 * least:.0f} % unexplained; give the period'
+            f'no period between {1.0 / high:g} s and {1.0 / low:g} s explains the movement; the '
+            f'best, {1.0 / frequency:.4g} s, leaves {100.0 * least:.0f} % of the variance. Valid '
+            'are at least 1.5 cycles of one frequency: take a steadier or longer part, or give '
+            'the period'
         )
-    return float(1.0 / max(f for f, error in refined if error <= 1.1 * least + 1e-6))
+    return float(1.0 / frequency)
 
 
 def fourier_series(times: ArrayLike, values: ArrayLike, omega: float, harmonics: int) -> Array:
@@ -204,17 +209,15 @@ def phase_lead(reference: Array, other: Array) -> float:
 
 
 def _candidates(times: Array, values: Array, low: float, high: float) -> list[float]:
-    """Frequencies of spectral peaks, their fractions and multiples, within the limits [1/s]."""
-    even = np.linspace(0.0, times[-1], len(times))
-    resampled = np.stack([np.interp(even, times, column) for column in values.T], axis=1)
-    window = np.hanning(len(even) + 2)[1:-1, None]
-    size = 8 * len(even)
-    power = np.sum(np.abs(np.fft.rfft(window * resampled, size, axis=0)) ** 2, axis=1)
-    frequency = np.arange(len(power)) * (len(even) - 1) / (size * times[-1])
-    peaks = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
-    peaks = peaks[power[peaks] > 1e-4 * power.max()]
-    strongest = peaks[np.argsort(power[peaks])[::-1][:5]]
-    found: list[float] = [low] if low * times[-1] > 0.9 else []
+    """Frequencies of spectral peaks and their fractions, within the limits [1/s]."""
+    from scipy.signal import find_peaks, lombscargle
+
+    frequency = np.arange(0.5 * low, high, 0.125 / times[-1])
+    power = np.sum([lombscargle(times, column, 2.0 * np.pi * frequency) for column in values.T],
+                   axis=0)
+    peaks, _ = find_peaks(np.concatenate([[0.0], power, [0.0]]), height=1e-4 * power.max())
+    strongest = peaks[np.argsort(power[peaks - 1])[::-1][:5]] - 1
+    found: list[float] = [low]
     for f in (float(frequency[p] / m) for m in range(1, 5) for p in strongest):
         if low <= f <= high and all(abs(f - other) > 0.05 / times[-1] for other in found):
             found.append(f)
@@ -245,15 +248,23 @@ class _Fit:
     values: Array
     highest: float
 
-    def unexplained(self, frequency: float) -> float:
-        """Share of the variance that a Fourier series of this frequency leaves."""
+    def residual(self, frequency: float) -> Array:
+        """What a Fourier series of this frequency leaves (m, n)."""
         most = (len(self.times) - 1) // 4
         harmonics = int(max(1, min(_HARMONICS, self.highest // frequency, most)))
         design = _design(self.times, frequency, harmonics)
         gram = design.T @ design + 1e-10 * len(design) * np.eye(design.shape[1])
-        projected = design.T @ self.values
-        rest = self.values - design @ np.linalg.solve(gram, projected)
-        return float(np.sum(rest**2) / np.sum(self.values**2))
+        return np.asarray(
+            self.values - design @ np.linalg.solve(gram, design.T @ self.values))
+
+    def unexplained(self, frequency: float) -> float:
+        """Share of the variance that a Fourier series of this frequency leaves."""
+        return float(np.sum(self.residual(frequency) ** 2) / np.sum(self.values**2))
+
+    def residual_correlation(self, frequency: float) -> float:
+        """Correlation of what is left from sample to sample: 0 for noise."""
+        rest = self.residual(frequency)
+        return float(np.sum(rest[1:] * rest[:-1]) / np.sum(rest**2))
 
     def best_nearby(
         self, frequency: float, reach: float, low: float, high: float
@@ -265,10 +276,9 @@ class _Fit:
         return float(grid[best]), errors[best]
 
     def refined(self, frequency: float, reach: float) -> tuple[float, float]:
-        """Frequency of the best fit, by parabolas through three frequencies ever closer."""
-        for width in reach * 0.3 ** np.arange(8):
-            low, middle, high = (self.unexplained(frequency + s * width) for s in (-1, 0, 1))
-            bend = low - 2.0 * middle + high
-            shift = 0.5 * (low - high) / bend if bend > 0.0 else float(np.sign(low - high))
-            frequency += width * min(max(shift, -1.0), 1.0)
-        return frequency, self.unexplained(frequency)
+        """Frequency of the best fit nearby, and what it leaves unexplained."""
+        from scipy.optimize import minimize_scalar
+
+        best = minimize_scalar(self.unexplained, bounds=(frequency - reach, frequency + reach),
+                               method='bounded', options={'xatol': 1e-7 * frequency})
+        return float(best.x), float(best.fun)

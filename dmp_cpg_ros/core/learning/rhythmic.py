@@ -14,6 +14,8 @@ from dmp_cpg_ros.core.learning.learning import (
     BASIS_CANDIDATES,
     FitOptions,
     as_demonstrations,
+    check_bases,
+    check_reproduction,
     chosen_gains,
     ranges,
     smallest_good,
@@ -39,6 +41,7 @@ def learn_rhythmic(
     bases: int | None = 25,
     *,
     period: float | Sequence[float] | None = None,
+    leads: Sequence[float] | None = None,
     centres: Sequence[ArrayLike] | None = None,
     stiffness: ArrayLike | None = None,
     damping: ArrayLike | None = None,
@@ -61,6 +64,9 @@ def learn_rhythmic(
         held-out error.
     period : float or sequence of float, optional
         Period of all or of each demonstration [s]; found from the data without.
+    leads : sequence of float, optional
+        Phase of the first sample of each demonstration [rad]; 0 for the first one and found from
+        the data for the others without.
     centres : sequence of array_like (n,), optional
         Centre of each demonstration; the mean of its cycle without.
     stiffness, damping : array_like (n,) or float, optional
@@ -83,11 +89,12 @@ def learn_rhythmic(
     ParameterError
         If an argument is out of range.
     """
-    task = _task(demonstrations, period, centres, stiffness, damping, form, options)
+    task = _task(demonstrations, period, leads, centres, stiffness, damping, form, options)
+    check_bases(bases, task.demonstrations)
     if bases is None:
         bases = smallest_good({n: held_out_error(task, task.bases(n)) for n in BASIS_CANDIDATES})
     made, omega = task.bases(bases), 2.0 * np.pi / task.period
-    return RhythmicPrimitive(
+    primitive = RhythmicPrimitive(
         fit_weights(task, made),
         made,
         omega,
@@ -96,6 +103,14 @@ def learn_rhythmic(
         np.mean(task.centres, axis=0),
         names=task.demonstrations[0].names,
     )
+    if task.options.method != 'response':
+        errors = [
+            np.abs(primitive.on_cycle(task.phases(i), task.tau(i))[0] + task.centres[i]
+                   - movement.positions).max(axis=0)
+            for i, movement in enumerate(task.demonstrations)
+        ]
+        check_reproduction(np.max(errors, axis=0) / ranges(task.demonstrations), task.options)
+    return primitive
 
 
 def held_out_errors(
@@ -124,7 +139,7 @@ def held_out_errors(
         Number of bases → root mean square error of the steady movement over the held-out samples,
         as a fraction of each degree of freedom's range.
     """
-    task = _task(demonstrations, period, centres, stiffness, damping, form, options)
+    task = _task(demonstrations, period, None, centres, stiffness, damping, form, options)
     return {count: held_out_error(task, task.bases(count)) for count in candidates}
 
 
@@ -188,6 +203,7 @@ def reproduction_errors(
 def _task(
     demonstrations: Demonstration | Iterable[Demonstration],
     period: float | Sequence[float] | None,
+    leads: Sequence[float] | None,
     centres: Sequence[ArrayLike] | None,
     stiffness: ArrayLike | None,
     damping: ArrayLike | None,
@@ -208,7 +224,8 @@ def _task(
         for m, p in zip(movements, periods, strict=True)
     ]
     scale = ranges(movements)
-    leads = [0.0] + [phase_lead(series[0] / scale, other / scale) for other in series[1:]]
+    if leads is None:
+        leads = [0.0] + [phase_lead(series[0] / scale, other / scale) for other in series[1:]]
     spring = chosen_gains(float(np.mean(periods)), stiffness, damping, movements[0].dofs, form)
     if centres is None:
         middles = [coefficients[0].real for coefficients in series]
@@ -218,4 +235,5 @@ def _task(
         raise ParameterError(
             f'{len(centres)} centres do not match {len(movements)} demonstrations'
         )
-    return RhythmicTask(movements, periods, leads, middles, spring, options)
+    phases = vector(leads, len(movements), 'leads').tolist()
+    return RhythmicTask(movements, periods, phases, middles, spring, options)

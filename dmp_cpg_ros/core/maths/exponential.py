@@ -42,20 +42,28 @@ def phi_functions(M: Array, highest: int = 3) -> list[Array]:
     block[:n, :n] = M
     for k in range(highest):
         block[k * n : (k + 1) * n, (k + 1) * n : (k + 2) * n] = np.eye(n)
-    exponential = _expm(block)
-    return [exponential[:n, k * n : (k + 1) * n] for k in range(highest + 1)]
+    whole = exponential(block)
+    return [whole[:n, k * n : (k + 1) * n] for k in range(highest + 1)]
 
 
-def _expm(M: Array) -> Array:
+def exponential(M: Array) -> Array:
     """Matrix exponential by scaling and squaring of a Taylor polynomial (norm below 1/2, 18
     terms).
+
+    Parameters
+    ----------
+    M : ndarray (..., n, n)
+        Matrix, or stack of matrices that are scaled alike.
+
+    Returns
+    -------
+    ndarray (..., n, n)
     """
-    norm = np.linalg.norm(M, 1)
+    unit, norm = np.eye(M.shape[-1]), float(np.abs(M).sum(axis=-2).max())
     squarings = max(0, int(np.ceil(np.log2(norm / 0.5)))) if norm > 0.0 else 0
-    scaled = M / 2.0**squarings
-    result = np.eye(len(M))
+    scaled, result = M / 2.0**squarings, unit
     for k in range(18, 0, -1):
-        result = np.eye(len(M)) + scaled @ result / k
+        result = unit + scaled @ result / k
     for _ in range(squarings):
         result = result @ result
     return result

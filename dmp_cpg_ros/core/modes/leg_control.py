@@ -15,9 +15,10 @@ from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.modes.command import STANDING, BodyCommand
 from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
 from dmp_cpg_ros.core.modes.motion_library import Movements
+from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, JointTargets
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState
+from dmp_cpg_ros.core.transformation.foot_motion import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
 
 Array = NDArray[np.float64]
@@ -57,12 +58,14 @@ class LegControl:
         Gains and swing.
     movements : Movements
         The robot's movements.
+    motion : Motion, optional
+        Where the path of the foot comes from; the foot path without.
     """
 
     def __init__(self, leg: str, description: RobotDescription, parameters: LegParameters,
-                 movements: Movements) -> None:
+                 movements: Movements, motion: Motion | None = None) -> None:
         """Build both primitives around one transformation system."""
-        self.primitive = LegPrimitive(leg, description, parameters)
+        self.primitive = LegPrimitive(leg, description, parameters, motion)
         count = len(JOINTS_OF_LEG)
         self.joints = slice(count * self.primitive.place, count * (self.primitive.place + 1))
         self._motion = LegMotion(self.joints, movements, self.primitive.transformation)
@@ -110,7 +113,7 @@ class LegControl:
                 state.motion, state.leg, command, feedback.measured[joints], dt)
         measured = None
         if self.primitive.parameters.reading == 'torque':
-            measured = TransformationState(position[joints], velocity[joints])
+            measured = SpringState(position[joints], velocity[joints])
         targets = self.primitive.targets(
             leg, goal, goal_velocity, feedback.torque[joints], measured)
         return LegControlState(leg, motion, command), targets

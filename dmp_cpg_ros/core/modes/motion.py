@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motion player: a leg's discrete primitives, from wherever its joints are to a configuration.
 
-The discrete transformation system of the paper (eqs. p2p_trans, p2p_phase) makes the goals θ_g(t),
-θ̇_g(t); the leg's joints follow them through the same transformation system that follows the gait,
-so that nothing jumps when one primitive takes over from another. The canonical phase x is common
-to the four legs and comes with the command.
+The joints are the state of the discrete transformation system (eqs. p2p_trans, p2p_phase), which
+begins with the angles and velocities at which another primitive left them; so nothing jumps.
+The canonical phase x is common to the four legs and comes with the command.
 
 One unit movement 0 → 1 of least jerk is learned once, and so is the path of each movement that has
 one. The weights of a movement from θ_0 to θ_g follow by linearity: those of the path from p_0 less
@@ -23,11 +22,11 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.modes.command import BodyCommand
-from dmp_cpg_ros.core.modes.motion_library import Movement, Movements, minimum_jerk
-from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.core.modes.motion_library import Movement, Movements
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration, minimum_jerk
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.primitives.states import DiscreteInput, DiscreteState
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState, TransformationSystem
 from dmp_cpg_ros.core.transformation.leg import LegState
 
 Array = NDArray[np.float64]
@@ -67,12 +66,12 @@ class LegMotion:
         Which of the twelve joints are the leg's.
     movements : Movements
         The robot's movements.
-    transformation : TransformationSystem
-        The leg's; it follows the primitive.
+    transformation : SpringDamper
+        The leg's; it brings the joints to rest after a movement.
     """
 
     def __init__(
-        self, joints: slice, movements: Movements, transformation: TransformationSystem
+        self, joints: slice, movements: Movements, transformation: SpringDamper
     ) -> None:
         """Learn the paths."""
         self._joints, self._movements = joints, movements
@@ -116,31 +115,32 @@ class LegMotion:
         """
         joints = leg.joints
         if command.mode == 'damped' or dt <= 0.0:
-            joints = TransformationState(measured.copy(), np.zeros(len(measured)))
+            joints = SpringState(measured.copy(), np.zeros(len(measured)))
         goal, goal_velocity = joints.position, np.zeros(len(measured))
         if command.movement:
             motion = self._moved(motion, joints, command, dt)
             goal, goal_velocity = motion.state.position, motion.state.velocity
+            joints = SpringState(goal, goal_velocity)
         else:
             motion = None
-        if command.mode != 'damped' and dt > 0.0:
-            joints = self._transformation.step(joints, goal, goal_velocity, dt)
+            if command.mode != 'damped' and dt > 0.0:
+                joints = self._transformation.follow(joints, goal, goal_velocity, dt)
         return motion, LegState(joints, 0.0, np.zeros(3)), goal, goal_velocity
 
     def _moved(
-        self, motion: MotionState | None, joints: TransformationState, command: BodyCommand,
+        self, motion: MotionState | None, joints: SpringState, command: BodyCommand,
         dt: float,
     ) -> MotionState:
         """Begin the command's movement, or advance it to the command's phase."""
         if motion is None or motion.count != command.count:
-            return self._begun(joints, command)
+            motion = self._begun(joints, command)
         if dt <= 0.0:
             return motion
         held = DiscreteInput(motion.state.goal, motion.duration)
         state = motion.primitive.step(motion.state, held, dt)
         return replace(motion, state=replace(state, x=command.x))
 
-    def _begun(self, joints: TransformationState, command: BodyCommand) -> MotionState:
+    def _begun(self, joints: SpringState, command: BodyCommand) -> MotionState:
         movement, unit = self._movements.named(command.movement), unit_movement()
         goal = movement.goal[self._joints]
         weights, begin = np.zeros((BASES, len(goal))), goal

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.transformation.leg import body_scale, nominal_foothold
@@ -143,12 +144,6 @@ class Movements:
     def duration(self, names: tuple[str, ...]) -> float:
         """Time that movements take one after the other, pauses included [s]."""
         return sum(self.named(name).duration + self.pause for name in names)
-
-
-def minimum_jerk(share: Array) -> Array:
-    """Smooth step 10 s³ − 15 s⁴ + 6 s⁵ of least jerk (Flash & Hogan 1985), s clipped to [0, 1]."""
-    s = np.clip(share, 0.0, 1.0)
-    return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
 
 
 def _posture(

@@ -194,7 +194,7 @@ def _check(bases: GaussianBases | VonMisesBases) -> None:
 
 
 def _check_count(count: int, overlap: float) -> None:
-    if count < 1:
-        raise ParameterError(f'number of bases = {count!r} must be at least 1')
+    if not (isinstance(count, (int, np.integer)) and count >= 1):
+        raise ParameterError(f'number of bases = {count!r} must be a whole number of at least 1')
     if not 0.0 < overlap < 1.0:
         raise ParameterError(f'overlap = {overlap!r} must lie between 0 and 1')

@@ -61,7 +61,7 @@ class Demonstration:
 
     def __post_init__(self) -> None:
         """Validate and convert."""
-        times = np.array(self.times, dtype=float)
+        times = _numbers(self.times, 'times')
         if times.ndim != 1 or len(times) < 8:
             raise DataError(
                 f'a demonstration needs one list of at least 8 times, not shape {times.shape}'
@@ -171,6 +171,17 @@ def derivatives(
     return fitted[:, 1] / scale[:, None], 2.0 * fitted[:, 2] / scale[:, None] ** 2
 
 
+def minimum_jerk(share: Array, order: int = 0) -> Array:
+    """Smooth step 10 s³ − 15 s⁴ + 6 s⁵ of least jerk (Flash & Hogan 1985), s clipped to [0, 1], or
+    its first or second derivative.
+    """
+    s = np.clip(share, 0.0, 1.0)
+    if order == 0:
+        return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
+    step = np.polynomial.Polynomial((0.0, 0.0, 0.0, 10.0, -15.0, 6.0))
+    return np.asarray(step.deriv(order)(s))
+
+
 def vector(values: ArrayLike, length: int, name: str) -> Array:
     """Array of the wanted length with finite entries.
 
@@ -193,8 +204,15 @@ def columns(values: ArrayLike, length: int, name: str) -> Array:
     return vector(np.repeat(result, length) if result.shape == (1,) else result, length, name)
 
 
+def _numbers(values: ArrayLike, name: str) -> Array:
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise DataError(f'{name} of a demonstration must be numbers: {error}') from error
+
+
 def _samples(values: ArrayLike, count: int, name: str) -> Array:
-    result = np.array(values, dtype=float)
+    result = _numbers(values, name)
     if result.ndim == 1:
         result = result[:, None]
     if result.ndim != 2 or len(result) != count or not result.shape[1]:

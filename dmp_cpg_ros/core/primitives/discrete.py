@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.basis import GaussianBases
 from dmp_cpg_ros.core.primitives.demonstration import Trajectory, columns, vector
-from dmp_cpg_ros.core.primitives.goal_filter import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.primitives.states import DiscreteInput, DiscreteState
 from dmp_cpg_ros.core.primitives.time_scaling import Form, TimeScaling
@@ -182,12 +182,13 @@ class DiscretePrimitive:
         Raises
         ------
         ParameterError
-            If τ or dt is not positive.
+            If τ or dt is not positive or the goal does not fit.
         """
         goal_filter, scaling = self._filters
         grid = scaling.grid(state.tau, command.tau, dt, 3, self.form)
         x = state.x * np.exp(-self.phase_decay * grid.scaled)  # (3,)
-        goals = goal_filter.at(state.goal, command.goal, grid.elapsed)  # (3, n)
+        goal = vector(command.goal, self.dofs, 'goal')
+        goals = goal_filter.at(state.goal, goal, grid.elapsed)  # (3, n)
         position, velocity = self.transformation.step(
             state.position, state.velocity, goals, self.forcing(x), grid
         )

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.primitives.spring_solution import quadratic_drive_step, spring_exponential
+from dmp_cpg_ros.core.primitives.spring_damper import quadratic_drive_step, spring_exponential
 
 Array = NDArray[np.float64]
 

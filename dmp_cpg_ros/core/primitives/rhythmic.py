@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase, state_at
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.basis import VonMisesBases
 from dmp_cpg_ros.core.primitives.demonstration import Trajectory, vector
-from dmp_cpg_ros.core.primitives.goal_filter import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.hopf_flow import hopf_flow
 from dmp_cpg_ros.core.primitives.responses import periodic_responses
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
@@ -86,6 +87,27 @@ class RhythmicPrimitive:
             raise ParameterError(f'{len(self.names)} names do not match {dofs} degrees of freedom')
         AndronovHopf(self.rho)
         self._filters  # noqa: B018  (checks the rates)
+
+    def part(self, dofs: slice) -> RhythmicPrimitive:
+        """Return the primitive of some of the degrees of freedom."""
+        spring = self.transformation
+        return replace(
+            self, weights=self.weights[:, dofs], centre=self.centre[dofs], names=self.names[dofs],
+            transformation=replace(
+                spring, stiffness=spring.stiffness[dofs], damping=spring.damping[dofs]))
+
+    @classmethod
+    def joined(
+        cls, parts: Sequence[RhythmicPrimitive], names: tuple[str, ...] = ()
+    ) -> RhythmicPrimitive:
+        """Primitive of the degrees of freedom of several that share bases and oscillator."""
+        springs = [part.transformation for part in parts]
+        return replace(
+            parts[0], weights=np.concatenate([part.weights for part in parts], axis=1),
+            centre=np.concatenate([part.centre for part in parts]), names=names,
+            transformation=replace(
+                springs[0], stiffness=np.concatenate([spring.stiffness for spring in springs]),
+                damping=np.concatenate([spring.damping for spring in springs])))
 
     @cached_property
     def _filters(self) -> tuple[FirstOrderFilter, FirstOrderFilter, TimeScaling]:
@@ -216,7 +238,7 @@ class RhythmicPrimitive:
         Raises
         ------
         ParameterError
-            If amplitude, τ or dt is not positive.
+            If amplitude, τ or dt is not positive or the centre does not fit.
         """
         self._check(command)
         grid = self._filters[2].grid(state.tau, command.tau, dt, 5, self.form)
@@ -258,7 +280,8 @@ class RhythmicPrimitive:
         nodes = StepGrid(
             grid.elapsed[::2], grid.scaled[::2], grid.tau[::2], grid.length, grid.density[::2]
         )
-        centres = self._filters[0].at(state.centre, command.centre, nodes.elapsed)
+        centre = vector(command.centre, self.dofs, 'centre')
+        centres = self._filters[0].at(state.centre, centre, nodes.elapsed)
         position, velocity = self.transformation.step(
             state.position, state.velocity, centres, self.forcing(x), nodes
         )

@@ -23,14 +23,22 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.exponential import exponential
 from dmp_cpg_ros.core.primitives.demonstration import columns
-from dmp_cpg_ros.core.primitives.spring_solution import quadratic_drive_step, spring_exponential
 from dmp_cpg_ros.core.primitives.time_scaling import Form, StepGrid
 
 Array = NDArray[np.float64]
 
 FORMS: tuple[Form, ...] = ('scaled', 'printed')
 """The readings of τ that are valid."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpringState:
+    """Positions y and velocities ẏ of n degrees of freedom, ndarray (n,) each."""
+
+    position: Array
+    velocity: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,18 +225,60 @@ class SpringDamper:
         k, b = self.stiffness, self.damping
         return quadratic_drive_step(k, b, self.propagator(length), y, z, drives, length)
 
-    def propagator(self, length: float) -> Array:
-        """Exponential exp(A s) of A = [[0, 1], [−k, −b]], in closed form for every damping ratio.
+    def follow(self, state: SpringState, goal: Array, goal_velocity: Array, dt: float
+               ) -> SpringState:
+        """Advance ÿ = k (g − y) + b (ġ − ẏ) to the time at which the goals hold (eq. 28).
+
+        Exact for goals that move at ``goal_velocity`` during the step.
 
         Parameters
         ----------
-        length : float
-            s [s].
+        state : SpringState
+            State one step before.
+        goal, goal_velocity : ndarray (n,)
+            Goals at the end of the step.
+        dt : float
+            [s]
 
         Returns
         -------
-        ndarray (2, 2, n)
+        SpringState
         """
+        (all_a, all_b), (all_c, all_d) = self.propagator(dt).tolist()
+        position, velocity = [], []
+        for y, y_dot, at, rate, a, b, c, d in zip(
+            state.position.tolist(), state.velocity.tolist(), goal.tolist(),
+            goal_velocity.tolist(), all_a, all_b, all_c, all_d, strict=True,
+        ):  # fmt: skip
+            error, error_rate = y - (at - rate * dt), y_dot - rate
+            position.append(at + a * error + b * error_rate)
+            velocity.append(rate + c * error + d * error_rate)
+        return SpringState(np.array(position), np.array(velocity))
+
+    def goals(self, position: Array, velocity: Array, dt: Array) -> Array:
+        """Goals that states one after the other have followed, the inverse of :meth:`follow`.
+
+        Parameters
+        ----------
+        position, velocity : ndarray (m + 1, n)
+            States.
+        dt : ndarray (m,)
+            Times between them [s].
+
+        Returns
+        -------
+        ndarray (m, n)
+            Goals at the ends of the steps.
+        """
+        h = dt[:, None]
+        (a, b), (c, d) = spring_exponential(self.stiffness, self.damping, h)  # (m, n) each
+        y = position[1:] - a * position[:-1] - b * velocity[:-1]  # (1 − a) g + (a h − b) ġ
+        v = velocity[1:] - c * position[:-1] - d * velocity[:-1]  # −c g + (1 − d + c h) ġ
+        A, B, C, D = 1.0 - a, a * h - b, -c, 1.0 - d + c * h
+        return np.asarray((D * y - B * v) / (A * D - B * C))
+
+    def propagator(self, length: float) -> Array:
+        """Exponential exp(A s), A = [[0, 1], [−k, −b]], for a length s [s]: (2, 2, n)."""
         E = self._propagators.get(length)
         if E is None:
             if len(self._propagators) > 256:
@@ -255,6 +305,54 @@ class SpringDamper:
         return y + h / 6.0 * (v + 2.0 * v_2 + 2.0 * v_3 + v_4), v + h / 6.0 * (
             a_1 + 2.0 * a_2 + 2.0 * a_3 + a_4
         )
+
+
+def quadratic_drive_step(
+    k: float | Array,
+    b: float | Array,
+    propagator: Array,
+    y: Array,
+    z: Array,
+    drives: Array,
+    length: float | Array,
+) -> tuple[Array, Array]:
+    """Exact solution of y' = z, z' = u(s) − k y − b z for a quadratic u; all arguments broadcast.
+
+    Parameters
+    ----------
+    k, b : float or ndarray (...)
+        Stiffness and damping.
+    propagator : ndarray (2, 2, ...)
+        :func:`spring_exponential` of the same k, b and length.
+    y, z : ndarray (...)
+        State at s = 0.
+    drives : ndarray (3, ...)
+        u at 0, length/2 and length.
+    length : float or ndarray (...)
+        Length of the step [s].
+
+    Returns
+    -------
+    y, z : ndarray (...)
+    """
+    first, middle, last = drives
+    u2 = 2.0 * (first - 2.0 * middle + last) / length**2
+    u1 = (4.0 * middle - 3.0 * first - last) / length
+    a2 = u2 / k  # particular solution a0 + a1 s + a2 s²
+    a1 = (u1 - 2.0 * b * a2) / k
+    a0 = (first - b * a1 - 2.0 * a2) / k
+    y, z = y - a0, z - a1
+    return (
+        propagator[0, 0] * y + propagator[0, 1] * z + a0 + length * (a1 + length * a2),
+        propagator[1, 0] * y + propagator[1, 1] * z + a1 + 2.0 * length * a2,
+    )
+
+
+def spring_exponential(k: ArrayLike, b: ArrayLike, length: ArrayLike) -> Array:
+    """Exponential (2, 2, ...) of A s, A = [[0, 1], [−k, −b]], for k, b and s that broadcast."""
+    k, b, length = np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in (k, b, length)))
+    matrices = np.array([[np.zeros(k.shape), length], [-k * length, -b * length]])
+    return np.moveaxis(exponential(np.moveaxis(matrices, (0, 1), (-2, -1))), (-2, -1), (0, 1))
 
 
 def default_gains(duration: float) -> tuple[float, float]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.primitives.goal_filter import FirstOrderFilter
+from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 
 Array = NDArray[np.float64]
 Form = Literal['scaled', 'printed']

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.gait import BodyScale, limited
+from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 
 Array = NDArray[np.float64]
@@ -136,7 +137,7 @@ class CommandGate:
 
 
 class ReferenceSystem:
-    """First-order filters on v_x, v_y and γ, integrated exactly for a command that is held."""
+    """First-order filters on v_x, v_y and γ with a limit on the acceleration."""
 
     def __init__(self, parameters: ReferenceParameters) -> None:
         """Keep the parameters."""
@@ -158,13 +159,13 @@ class ReferenceSystem:
         -------
         ndarray (3,)
         """
-        kept = np.exp(-self.parameters.alpha_r * dt)
-        following = r_ext + (r - r_ext) * kept
+        plain = FirstOrderFilter(self.parameters.alpha_r)
+        following = plain.step(r, r_ext, dt)
         change, most = following[:2] - r[:2], self.parameters.max_acceleration * dt
         if change @ change <= most * most:
             return following
         if following[:2] @ following[:2] <= r[:2] @ r[:2]:
-            most = max(most, (1.0 - kept) * float(np.sqrt(r[:2] @ r[:2])))
+            most = max(most, float(1.0 - plain.kept(dt)) * float(np.sqrt(r[:2] @ r[:2])))
         if change @ change > most * most * (1.0 + 1e-12):
             following[:2] = r[:2] + change * (most / float(np.sqrt(change @ change)))
         return following

@@ -156,9 +156,8 @@ def _change(value: Any, where: str) -> tuple[dict[str, Any], str]:
     if len(owners) > 1:
         raise DataError(f'{where}: {", ".join(value)} belong to {" and ".join(owners)}; make one '
                         'event for each')
-    floats = {field.name for part in fields(SuiteParameters)
-              for field in fields(cast(Any, part.default_factory))
-              if isinstance(field.default, float)}
+    floats = {field.name for part in SuiteParameters().sets.values()
+              for field in fields(cast(Any, part)) if isinstance(field.default, float)}
     values = {
         name: tuple(entry) if isinstance(entry, list)
         else float(entry) if name in floats and type(entry) is int else entry

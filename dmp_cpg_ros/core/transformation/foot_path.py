@@ -84,11 +84,11 @@ class FootPath:
             from_mid_stance = (
                 cycle_position - 0.5 if cycle_position > 0.0 else cycle_position + 0.5
             )
-            x, y, x_dot, y_dot = self._stance(from_mid_stance * period)
+            x, y, x_dot, y_dot = self.stance(from_mid_stance * period)
             return (x, y, height), (x_dot * period, y_dot * period, 0.0)
         half_stance = 0.5 * self.duty * period
-        x0, y0, dx0, dy0 = self._stance(half_stance)
-        x1, y1, dx1, dy1 = self._stance(-half_stance)
+        x0, y0, dx0, dy0 = self.stance(half_stance)
+        x1, y1, dx1, dy1 = self.stance(-half_stance)
         s, scale = cycle_position / swing + 0.5, swing * period
         x, x_slope = _hermite(s, x0, x1, dx0 * scale, dx1 * scale)
         y, y_slope = _hermite(s, y0, y1, dy0 * scale, dy1 * scale)
@@ -102,8 +102,10 @@ class FootPath:
         """Share of the swing that has passed; outside of [0, 1] in stance."""
         return cycle_position / (1.0 - self.duty) + 0.5
 
-    def _stance(self, t: float) -> tuple[float, float, float, float]:
-        """Planar position and velocity of a foot that stands, t seconds after mid-stance."""
+    def stance(self, t: float) -> tuple[float, float, float, float]:
+        """Position (x, y) [m] and velocity [m/s] in the base of a foot that stands, t seconds
+        after mid-stance.
+        """
         angle = self.gamma * t
         s, c = sin(angle), cos(angle)
         if abs(angle) > 1e-6:

@@ -9,7 +9,7 @@ Jacobian.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,11 @@ from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, minus, moved, pair, plus, triple
 from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.transformation.foot_motion import FootMotion, HermiteMotion, Motion
 from dmp_cpg_ros.core.transformation.foot_path import (
     FootPath,
     activity_step,
@@ -30,7 +32,6 @@ from dmp_cpg_ros.core.transformation.foot_path import (
     swing_height,
 )
 from dmp_cpg_ros.core.transformation.foothold_offset import OffsetRates
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState, TransformationSystem
 from dmp_cpg_ros.core.transformation.stumble import (
     Stumble,
     compliant_offset_rate,
@@ -58,6 +59,10 @@ class LegParameters(Parameters):
     )
     clearance: float = parameter(
         0.2, 'height of the swing as a fraction of the standing height', minimum=0.0, maximum=0.6
+    )
+    motion: str = parameter(
+        '', 'file of a learned motion that the feet play, scaled to the clearance; empty: the '
+        'foot path of the package'
     )
     activity_rate: float = parameter(
         12.0, 'rate at which the swing height follows the phase speed', unit='1/s', minimum=0.1,
@@ -87,7 +92,7 @@ class LegState:
 
     Attributes
     ----------
-    joints : TransformationState
+    joints : SpringState
         θ, θ̇ of the kinematic reading, (3,) each.
     activity : float
         Swing activity a in [0, 1].
@@ -95,12 +100,15 @@ class LegState:
         Shift of the foot's path that acts now [m].
     stumble : Stumble
         What the stumbling reflex does.
+    motion : object
+        State of the foot's motion.
     """
 
-    joints: TransformationState
+    joints: SpringState
     activity: float
     shift_in_base: Array
     stumble: Stumble = Stumble()
+    motion: Any = None
 
 
 @dataclass(frozen=True)
@@ -140,12 +148,18 @@ class LegPrimitive:
         The robot.
     parameters : LegParameters
         Gains and swing.
+    motion : Motion, optional
+        Where the path of the foot comes from; the
+        :class:`~dmp_cpg_ros.core.transformation.foot_path.FootPath` itself without.
     """
 
     def __init__(
-        self, leg: str, description: RobotDescription, parameters: LegParameters
+        self, leg: str, description: RobotDescription, parameters: LegParameters,
+        motion: Motion | None = None,
     ) -> None:
         """Derive foothold and scale from the description."""
+        self._motion: FootMotion = (
+            HermiteMotion() if motion is None else motion.of_leg(leg, description))
         self.parameters, self.place = parameters, LEGS.index(leg)
         geometry = description.legs[self.place]
         self.kinematics = LegKinematics(geometry)
@@ -159,16 +173,14 @@ class LegPrimitive:
         self.stumble_lift = parameters.stumble_lift * description.stance_height
         self.stumble_lag = parameters.stumble_lag * description.stance_height
         self.touch_force = LOADED * quarter_weight(description)
-        self.transformation = TransformationSystem(
-            parameters.stiffness,
-            parameters.damping,
-            np.asarray(geometry.rotor_inertia, dtype=float),
-        )
+        self.inertia = np.asarray(geometry.rotor_inertia, dtype=float)
+        self.transformation = SpringDamper(
+            np.full(3, parameters.stiffness), np.full(3, parameters.damping))
 
     def initial_state(self) -> LegState:
         """State of a leg that stands at its foothold."""
         q = self.kinematics.inverse(self.foothold_in_base)
-        return LegState(TransformationState(q, np.zeros(3)), 0.0, np.zeros(3))
+        return LegState(SpringState(q, np.zeros(3)), 0.0, np.zeros(3))
 
     def step(
         self,
@@ -213,8 +225,8 @@ class LegPrimitive:
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
         path = self._path((v_x, v_y, gamma), omega, duty, activity, state.stumble, feedback)
-        foot, slope = path.at(position)
-        path_velocity = moved((0.0, 0.0, 0.0), slope, rate / (2.0 * pi))
+        motion, foot, path_velocity = self._motion.step(
+            state.motion, path, position, rate, dt)
         offset_rate, stumble = self._offset_rate(
             state, activity, path, position, path_velocity, feedback, dt)
         offset = moved(triple(state.shift_in_base.tolist()), offset_rate, dt)
@@ -223,8 +235,8 @@ class LegPrimitive:
         velocity = plus(plus(offset_rate, path_velocity), (0.0, 0.0, stumble.rate))
         velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
         goal, goal_velocity = self._goal(foot, velocity)
-        joints = self.transformation.step(state.joints, goal, goal_velocity, dt)
-        return LegState(joints, activity, np.array(offset), stumble), goal, goal_velocity
+        joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
+        return LegState(joints, activity, np.array(offset), stumble, motion), goal, goal_velocity
 
     def _path(
         self, reference: Triple, omega: float, duty: float, activity: float, stumble: Stumble,
@@ -275,7 +287,7 @@ class LegPrimitive:
         goal: Array,
         goal_velocity: Array,
         feedback: Array,
-        measured: TransformationState | None = None,
+        measured: SpringState | None = None,
     ) -> JointTargets:
         """Joint targets of the parameters' reading.
 
@@ -287,7 +299,7 @@ class LegPrimitive:
             Goals from :meth:`step`.
         feedback : ndarray (3,)
             τ_fb [N m].
-        measured : TransformationState, optional
+        measured : SpringState, optional
             Measured angles and velocities, needed for the torque reading.
 
         Returns
@@ -296,10 +308,10 @@ class LegPrimitive:
         """
         joints = state.joints if measured is None else measured
         acceleration = self.transformation.acceleration(
-            joints.position, joints.velocity, goal, goal_velocity
+            joints.position, joints.velocity - goal_velocity, goal, np.zeros(3)
         )
         return JointTargets(
-            joints.position, joints.velocity, self.transformation.torque(acceleration, feedback)
+            joints.position, joints.velocity, self.inertia * acceleration + feedback
         )
 
 

@@ -24,14 +24,14 @@ from dmp_cpg_ros.paper.demonstrations import (
     LETTERS,
     handwriting,
     joint_angles,
-    minimum_jerk,
+    straight_reach,
     walking_joints,
 )
 from dmp_cpg_ros.paper.homogeneous import Homogeneous
 
 DISCRETE = {
     **{f'letter {letter}': handwriting(letter) for letter in LETTERS},
-    'minimum jerk': minimum_jerk([0.0, 1.0, -0.5], [1.0, -1.0, 0.0]),
+    'minimum jerk': straight_reach([0.0, 1.0, -0.5], [1.0, -1.0, 0.0]),
     'joint angles': joint_angles(),
 }
 
@@ -75,7 +75,7 @@ def test_local_regression_improves_with_more_bases():
 @given(st.integers(0, 1000), st.sampled_from(['scaled', 'printed']))
 def test_known_weights_of_a_discrete_primitive_come_back(seed, form):
     rng = np.random.default_rng(seed)
-    template = learn_discrete(minimum_jerk([0.0, 0.0], [1.0, 2.0], 1.0), 10, form=form)
+    template = learn_discrete(straight_reach([0.0, 0.0], [1.0, 2.0], 1.0), 10, form=form)
     true = replace(
         template,
         weights=template.weights + rng.normal(0.0, 300.0, (10, 2)),
@@ -234,7 +234,7 @@ def test_uneven_sampling_does_not_matter():
 
 
 def test_the_chosen_number_of_bases_grows_with_detail_and_falls_with_noise():
-    smooth = learn_discrete(minimum_jerk([0.0], [1.0]), None).bases.count
+    smooth = learn_discrete(straight_reach([0.0], [1.0]), None).bases.count
     detailed = learn_discrete(positions_only(handwriting('e')), None).bases.count
     clean, rng = handwriting('e'), np.random.default_rng(4)
     noisy = Demonstration(
@@ -245,7 +245,7 @@ def test_the_chosen_number_of_bases_grows_with_detail_and_falls_with_noise():
 
 
 def test_held_out_error_sees_what_the_fit_does_not():
-    rng, clean = np.random.default_rng(6), minimum_jerk([0.0], [1.0], dt=0.02)
+    rng, clean = np.random.default_rng(6), straight_reach([0.0], [1.0], dt=0.02)
     noisy = [
         Demonstration(clean.times, clean.positions + rng.normal(0.0, 0.05, clean.positions.shape))
         for _ in range(2)
@@ -324,13 +324,38 @@ def test_a_learned_primitive_takes_another_goal_and_amplitude():
     ('arguments', 'error', 'text'),
     [
         (([],), DataError, 'at least one'),
-        (([handwriting('a'), minimum_jerk([0.0], [1.0])],), DataError, 'same degrees'),
+        (([handwriting('a'), straight_reach([0.0], [1.0])],), DataError, 'same degrees'),
         ((handwriting('a'), 0), ParameterError, 'at least 1'),
+        ((handwriting('a'), 7.5), ParameterError, 'whole number'),
+        ((handwriting('a'), 10_000), DataError, 'at most as many bases'),
     ],
 )
 def test_what_cannot_be_learned_is_refused(arguments, error, text):
     with pytest.raises(error, match=text):
         learn_discrete(*arguments)
+
+
+@pytest.mark.parametrize('method', ['joint', 'local'])
+def test_forces_of_noisy_samples_with_a_gap_are_refused_and_responses_are_not(method):
+    rng, clean = np.random.default_rng(3), straight_reach([0.0, 1.0], [1.0, -1.0], dt=0.001)
+    kept = np.sort(rng.choice(len(clean.times), 300, replace=False))
+    kept = kept[(clean.times[kept] < 0.35) | (clean.times[kept] > 0.65)]
+    noisy = clean.positions[kept] + 0.01 * rng.normal(size=(len(kept), 2))
+    recorded = Demonstration(clean.times[kept], noisy)
+    with pytest.raises(DataError, match="use the method 'response'"):
+        learn_discrete(recorded, 25, options=FitOptions(method))
+    learned = learn_discrete(recorded, 10, options=FitOptions(ridge=1e-4))
+    assert np.abs(learned.rollout(clean.times).positions - clean.positions).max() < 0.2
+
+
+@pytest.mark.parametrize('goal', [np.full(2, np.nan), np.zeros(5), np.zeros(1)])
+def test_a_goal_that_does_not_fit_is_refused_in_flight(goal):
+    reach = learn_discrete(straight_reach([0.0, 1.0], [1.0, -1.0]), 10)
+    with pytest.raises(ParameterError, match='goal must be 2 finite'):
+        reach.step(reach.initial_state(), DiscreteInput(goal), 0.01)
+    cycle = learn_rhythmic(walking_joints(), 10)
+    with pytest.raises(ParameterError, match='centre must be'):
+        cycle.step(cycle.initial_state(), RhythmicInput(goal), 0.01)
 
 
 @pytest.mark.parametrize('options', [{'method': 'magic'}, {'ridge': -1.0}, {'overlap': 1.0}])
@@ -346,6 +371,7 @@ def test_bad_options_are_refused(options):
         (np.arange(5.0), np.zeros(5), 'at least 8'),
         (np.arange(9.0), np.zeros((8, 1)), 'shape'),
         (np.arange(9.0), np.full(9, np.nan), 'finite'),
+        (np.arange(9.0), ['high'] * 9, 'must be numbers'),
         (np.append(np.arange(8.0), np.nan), np.zeros(9), 'finite'),
     ],
 )

@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.learning.period import (
     spread_between_cycles,
 )
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.paper.demonstrations import minimum_jerk, walking_joints
+from dmp_cpg_ros.paper.demonstrations import straight_reach, walking_joints
 
 SHAPES = {
     'sine': lambda u: np.sin(u),
@@ -67,10 +67,38 @@ def test_what_has_no_period_is_refused():
     times = np.linspace(0.0, 1.0, 100)
     with pytest.raises(DataError, match='nothing moves'):
         find_period(Demonstration(times, np.ones(100)))
-    with pytest.raises(DataError, match='half of the variance'):
+    with pytest.raises(DataError, match='explains the movement'):
         find_period(Demonstration(times, np.random.default_rng(0).normal(size=100)))
     with pytest.raises(DataError, match='none to look for'):
-        find_period(minimum_jerk([0.0], [1.0]), shortest=2.0, longest=1.0)
+        find_period(straight_reach([0.0], [1.0]), shortest=2.0, longest=1.0)
+
+
+@pytest.mark.parametrize('seed', range(3))
+@pytest.mark.parametrize('noise', [0.0, 0.02])
+def test_a_wandering_frequency_is_refused_and_no_multiple_of_the_period_is_made_up(seed, noise):
+    rng, times = np.random.default_rng(seed), np.linspace(0.0, 8.0, 2000)
+    knots = 1.0 + 0.09 * rng.uniform(-1.0, 1.0, 12)
+    rate = np.interp(times, np.linspace(0.0, 8.0, 12), knots) / 0.62
+    u = 2.0 * np.pi * np.concatenate([[0.0], np.cumsum(rate[1:] * np.diff(times))])
+    values = np.stack([np.sin(u) + 0.3 * np.cos(2.0 * u), np.cos(u) ** 3], axis=1)
+    recording = Demonstration(times, values + noise * rng.normal(size=values.shape))
+    with pytest.raises(DataError, match=r'1\.5 cycles of one frequency'):
+        find_period(recording)
+
+
+@pytest.mark.parametrize('part', [0.3, 0.5, 0.7, 1.0])
+@pytest.mark.parametrize('shape', ['sine', 'pulses'])
+def test_less_than_a_cycle_and_a_half_is_refused(part, shape):
+    times = np.linspace(0.0, 2.0 * part, 400)
+    with pytest.raises(DataError, match=r'1\.5 cycles'):
+        find_period(Demonstration(times, SHAPES[shape](np.pi * times + 0.4)))
+
+
+def test_a_gap_in_uneven_samples_does_not_matter():
+    times = np.sort(np.random.default_rng(1).uniform(0.0, 5.0, 500))
+    times = times[(times < 2.0) | (times > 2.9)]
+    found = find_period(Demonstration(times, SHAPES['pulses'](2.0 * np.pi * times / 0.7)))
+    assert found == pytest.approx(0.7, rel=1e-3)
 
 
 @given(st.floats(-3.1, 3.1), st.integers(0, 99))

@@ -18,14 +18,14 @@ from dmp_cpg_ros.core.modes.motion_library import (
     folded_length,
     leg_angles,
     lying_posture,
-    minimum_jerk,
     raised_posture,
     standing_posture,
 )
+from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
+from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
 
 LOWER, UPPER = np.array((-1.0, -1.2, -2.7)), np.array((1.0, 2.8, -0.2))
@@ -152,7 +152,7 @@ class Mover:
         self.legs = [LegMotion(slice(3 * i, 3 * i + 3), self.movements, one.transformation)
                      for i, one in enumerate(primitives)]
         zero = np.zeros(3)
-        self.states = [LegState(TransformationState(start[3 * i:3 * i + 3], zero), 0.0,
+        self.states = [LegState(SpringState(start[3 * i:3 * i + 3], zero), 0.0,
                                 np.zeros(3)) for i in range(4)]
         self.motions = [None] * 4
         self.measured = start

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.primitives.goal_filter import FirstOrderFilter
+from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.time_scaling import TimeScaling, scaled_times
 
 RATES = st.floats(0.1, 50.0)

@@ -10,8 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, default_gains
-from dmp_cpg_ros.core.primitives.spring_solution import spring_exponential
+from dmp_cpg_ros.core.primitives.spring_damper import (
+    SpringDamper,
+    default_gains,
+    spring_exponential,
+)
 from dmp_cpg_ros.core.primitives.time_scaling import TimeScaling
 
 STIFFNESS = st.floats(0.01, 1e4)

@@ -11,8 +11,8 @@ from core_examples import GAITS, TICK, network, quadruped
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import phase_generator, state_at
 from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState
 from dmp_cpg_ros.core.transformation.leg import (
     LegFeedback,
     LegParameters,
@@ -99,7 +99,7 @@ def test_the_kinematic_reading_follows_the_goals_closely() -> None:
 def test_the_torque_reading_sends_torques_of_the_measured_joints() -> None:
     leg, rng = leg_of('fl', reading='torque'), np.random.default_rng(0)
     q, q_dot, goal, goal_velocity, feedback = rng.normal(size=(5, 3))
-    measured = TransformationState(q, q_dot)
+    measured = SpringState(q, q_dot)
     out = leg.targets(leg.initial_state(), goal, goal_velocity, feedback, measured)
     p, J = leg.parameters, ROBOT.legs[0].rotor_inertia
     expected = J * (p.stiffness * (goal - q) + p.damping * (goal_velocity - q_dot)) + feedback

@@ -10,13 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.transformation.foot_path import activity_step
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState, TransformationSystem
 
 vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
 durations = st.floats(1e-4, 0.1)
 MS = 1_000_000
+
+
+def spring(k: float, b: float) -> SpringDamper:
+    return SpringDamper(np.full(3, k), np.full(3, b))
 
 
 @given(k=st.floats(10.0, 1e4), b=st.floats(1.0, 300.0), theta=vectors, theta_dot=vectors,
@@ -24,11 +28,11 @@ MS = 1_000_000
 def test_two_half_steps_along_a_moving_goal_are_one_step(
         k: float, b: float, theta: np.ndarray, theta_dot: np.ndarray, goal: np.ndarray,
         goal_velocity: np.ndarray, dt: float) -> None:
-    of = TransformationSystem(k, b, np.ones(3))
-    start = TransformationState(theta, theta_dot)
-    once = of.step(start, goal, goal_velocity, dt)
-    half = of.step(start, goal - 0.5 * dt * goal_velocity, goal_velocity, 0.5 * dt)
-    twice = of.step(half, goal, goal_velocity, 0.5 * dt)
+    of = spring(k, b)
+    start = SpringState(theta, theta_dot)
+    once = of.follow(start, goal, goal_velocity, dt)
+    half = of.follow(start, goal - 0.5 * dt * goal_velocity, goal_velocity, 0.5 * dt)
+    twice = of.follow(half, goal, goal_velocity, 0.5 * dt)
     assert np.allclose(once.position, twice.position, atol=1e-8)
     assert np.allclose(once.velocity, twice.velocity, atol=1e-6)
 
@@ -38,30 +42,37 @@ def test_two_half_steps_along_a_moving_goal_are_one_step(
 def test_the_step_starts_with_the_acceleration_of_the_paper(
         k: float, b: float, theta: np.ndarray, theta_dot: np.ndarray, goal: np.ndarray,
         goal_velocity: np.ndarray) -> None:
-    of, h = TransformationSystem(k, b, np.ones(3)), 1e-7
-    start = TransformationState(theta, theta_dot)
-    rate = (of.step(start, goal, goal_velocity, h).velocity - theta_dot) / h
+    of, h = spring(k, b), 1e-7
+    start = SpringState(theta, theta_dot)
+    rate = (of.follow(start, goal, goal_velocity, h).velocity - theta_dot) / h
     expected = k * (goal - theta) + b * (goal_velocity - theta_dot)
-    assert np.allclose(of.acceleration(theta, theta_dot, goal, goal_velocity), expected)
+    assert np.allclose(of.acceleration(
+        theta, theta_dot - goal_velocity, goal, np.zeros(3)), expected)
     assert np.allclose(rate, expected, rtol=1e-3, atol=1e-3 * k)
 
 
+@given(k=st.floats(100.0, 1e4), ratio=st.floats(0.3, 3.0), dt=st.floats(1e-3, 0.02),
+       seed=st.integers(0, 99))
+def test_goals_are_found_again_in_what_followed_them(
+        k: float, ratio: float, dt: float, seed: int) -> None:
+    of, rng = spring(k, 2.0 * ratio * np.sqrt(k)), np.random.default_rng(seed)
+    goals, rates = rng.normal(size=(2, 20, 3))
+    states = [SpringState(*rng.normal(size=(2, 3)))]
+    for goal, rate in zip(goals, rates, strict=True):
+        states.append(of.follow(states[-1], goal, rate, dt))
+    found = of.goals(np.array([s.position for s in states]),
+                     np.array([s.velocity for s in states]), np.full(20, dt))
+    np.testing.assert_allclose(found, goals, rtol=1e-6, atol=1e-6)
+
+
 def test_two_states_under_the_same_goals_converge_to_one_another() -> None:
-    of, rng = TransformationSystem(6400.0, 160.0, np.ones(3)), np.random.default_rng(0)
-    a = TransformationState(np.ones(3), np.zeros(3))
-    b = TransformationState(-np.ones(3), np.full(3, 10.0))
+    of, rng = spring(6400.0, 160.0), np.random.default_rng(0)
+    a = SpringState(np.ones(3), np.zeros(3))
+    b = SpringState(-np.ones(3), np.full(3, 10.0))
     for _ in range(100):
         goal, goal_velocity = rng.normal(size=3), rng.normal(size=3)
-        a, b = (of.step(state, goal, goal_velocity, 0.004) for state in (a, b))
+        a, b = (of.follow(state, goal, goal_velocity, 0.004) for state in (a, b))
     assert np.abs(a.position - b.position).max() < 1e-9
-
-
-@given(theta=vectors, feedback=vectors)
-def test_torque_is_inertia_times_acceleration_plus_feedback(
-        theta: np.ndarray, feedback: np.ndarray) -> None:
-    J = np.array([0.1, 0.2, 0.3])
-    torque = TransformationSystem(1.0, 1.0, J).torque(theta, feedback)
-    assert np.allclose(torque, J * theta + feedback)
 
 
 @given(alpha=st.floats(0.1, 50.0), r=vectors, r_ext=vectors, a=durations, b=durations)

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.networks.coupling import Coupling
-from dmp_cpg_ros.paper.networks.family import OscillatorFamily
-from dmp_cpg_ros.paper.networks.stabilised_step import (
+from dmp_cpg_ros.paper.coupling import Coupling
+from dmp_cpg_ros.paper.oscillators import OscillatorFamily
+from dmp_cpg_ros.paper.stabilised_step import (
     Field,
     chebyshev_stages,
     chebyshev_step,

@@ -1,6 +1,9 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""First-order reference filters (eq. p2p_filter) on goal, centre, amplitude and τ."""
+"""First-order filter ṙ = α (r_ext − r), integrated exactly (eq. p2p_filter).
+
+Filters the velocity reference of the robot, and goal, centre, amplitude and τ of primitives.
+"""
 
 from __future__ import annotations
 
@@ -60,23 +63,13 @@ class FirstOrderFilter:
         """
         value, command = np.asarray(value, dtype=float), np.asarray(command, dtype=float)
         elapsed = np.asarray(elapsed, dtype=float)
-        decay = np.exp(-self.rate * elapsed).reshape(
-            elapsed.shape + (1,) * max(value.ndim, command.ndim)
-        )
+        decay = self.kept(elapsed).reshape(elapsed.shape + (1,) * max(value.ndim, command.ndim))
         return command + (value - command) * decay
 
+    def kept(self, elapsed: ArrayLike) -> Array:
+        """Share exp(−α t) of a deviation that is left some time later, (...)."""
+        return np.asarray(np.exp(-self.rate * np.asarray(elapsed, dtype=float)))
+
     def step(self, value: ArrayLike, command: ArrayLike, dt: float) -> Array:
-        """State one step later.
-
-        Parameters
-        ----------
-        value, command : array_like (...)
-            State r and command r_ext, in the same unit.
-        dt : float
-            Length of the step [s].
-
-        Returns
-        -------
-        ndarray (...)
-        """
+        """State after one step of dt [s], as :meth:`at`."""
         return self.at(value, command, dt)
