@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,16 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.bag import find_bag
 from dmp_cpg_ros.analysis.context import find_parameter
 from dmp_cpg_ros.analysis.foot_motion import feet_in_base
-from dmp_cpg_ros.analysis.gait_in_force import gait_rows
+from dmp_cpg_ros.analysis.gait_in_force import GaitRow, gait_rows
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import common_rows, held, rotations, stretches
+from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.commands.analyze import read_json
 from dmp_cpg_ros.commands.run_knowledge import run_context
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
@@ -89,21 +91,57 @@ def read_motion(
     gaits = gait_rows(recording, context)
     if gaits is None or not recording.reference.time.size:
         raise DataError(f"'{path}': the reference or the gait in force was not recorded")
-    in_force: list[Gait | None] = [None] * len(canonical.time)
+    times, scale = canonical.time[at], body_scale(context.robot)
+    planned = _planned(recording, gaits, at, scale)
+    angles = joints.position[rows]
+    if topic == 'joint_targets':
+        angles = _goals(times, angles, joints.velocity[rows], parameters)
+    up = rotations(recording.imu.quaternion[attitude])[:, 2]
+    feet: list[list[FootSamples]] = [[] for _ in context.robot.legs]
+    for first, past in stretches(planned.steady):
+        part = slice(int(np.searchsorted(times, times[first] + SETTLING)), past)
+        if times[past - 1] - times[first] < SETTLING + SHORTEST:
+            continue
+        for i, leg in enumerate(context.robot.legs):
+            foot = feet_in_base(leg, angles[part, 3 * i : 3 * i + 3])
+            away = foot - nominal_foothold(context.robot, leg.name)
+            away[:, 2] = np.sum(up[part] * foot, axis=1) + planned.bounce[part, i]
+            feet[i].append(FootSamples(
+                planned.cycle_position[part, i], planned.duty[part], planned.cycle[part], away))
+    if not feet[0]:
+        raise DataError(
+            f"'{path}': the robot nowhere walks straight on for {SETTLING + SHORTEST:g} s at one "
+            f'speed of at least {SLOWEST:g} m/s')
+    return feet, context.robot
+
+
+class _Planned(NamedTuple):
+    """What the gaits plan at every stamp (m,), and whether the robot does so steadily."""
+
+    cycle_position: Array  # (m, 4)
+    duty: Array
+    cycle: Array
+    bounce: Array  # (m, 4)
+    steady: NDArray[np.bool_]
+
+
+def _planned(
+    recording: Recording, gaits: list[GaitRow], at: NDArray[np.int64], scale: BodyScale
+) -> _Planned:
+    """Plans at rows of the canonical states; NaN within changes of gait, which are not steady."""
+    canonical, reference = recording.canonical, recording.reference
+    in_force: list[GaitInForce | None] = [None] * len(canonical.time)
     for entry in gaits:
-        if isinstance(entry.gait, Gait):
-            in_force[entry.rows] = [entry.gait] * len(in_force[entry.rows])
+        in_force[entry.rows] = [entry.gait] * len(in_force[entry.rows])
     times = canonical.time[at]
-    r = held(recording.reference.time, recording.reference.value, times)
-    before = held(recording.reference.time, recording.reference.value, times - 0.1)
-    scale = body_scale(context.robot)
+    r, before = (held(reference.time, reference.value, times - ago) for ago in (0.0, 0.1))
     speed = np.array([scale.foot_speed(*row) for row in r])
-    omega, duty, bounce = (np.full(shape, np.nan) for shape in (len(at), len(at), (len(at), 4)))
-    c = np.full((len(at), 4), np.nan)
-    phi, phi_rate = phase(canonical.x[at]), phase_rate(canonical.x[at], canonical.x_dot[at])
+    phi, rate = phase(canonical.x[at]), phase_rate(canonical.x[at], canonical.x_dot[at])
+    omega, duty = np.full((2, len(at)), np.nan)
+    c, bounce = np.full((2, len(at), 4), np.nan)
     for k, row in enumerate(at):
         gait = in_force[row]
-        if gait is not None:
+        if isinstance(gait, Gait):
             omega[k], duty[k] = gait.omega(speed[k], scale), gait.duty(speed[k], scale)
             c[k] = gait.cycle_position(phi[k])
             bounce[k] = [gait.bounce(float(p), duty[k], omega[k]).height for p in c[k]]
@@ -111,27 +149,9 @@ def read_motion(
         (np.hypot(r[:, 0], r[:, 1]) > SLOWEST)
         & (np.abs(r[:, 2]) < STRAIGHT)
         & (np.abs(r - before).max(axis=1) < STEADY * speed)
-        & (np.abs(phi_rate - omega[:, None]).max(axis=1) < STEADY * omega)
+        & (np.abs(rate - omega[:, None]).max(axis=1) < STEADY * omega)
     )
-    angles = joints.position[rows]
-    if topic == 'joint_targets':
-        angles = _goals(times, angles, joints.velocity[rows], parameters)
-    up = rotations(recording.imu.quaternion[attitude])[:, 2]
-    feet: list[list[FootSamples]] = [[] for _ in context.robot.legs]
-    for first, past in stretches(steady):
-        part = slice(int(np.searchsorted(times, times[first] + SETTLING)), past)
-        if times[past - 1] - times[first] < SETTLING + SHORTEST:
-            continue
-        for i, leg in enumerate(context.robot.legs):
-            foot = feet_in_base(leg, angles[part, 3 * i : 3 * i + 3])
-            away = foot - nominal_foothold(context.robot, leg.name)
-            away[:, 2] = np.sum(up[part] * foot, axis=1) + bounce[part, i]
-            feet[i].append(FootSamples(c[part, i], duty[part], 2.0 * np.pi / omega[part], away))
-    if not feet[0]:
-        raise DataError(
-            f"'{path}': the robot nowhere walks straight on for {SETTLING + SHORTEST:g} s at one "
-            f'speed of at least {SLOWEST:g} m/s')
-    return feet, context.robot
+    return _Planned(c, duty, 2.0 * np.pi / omega, bounce, steady)
 
 
 def _goals(times: Array, angles: Array, rates: Array, parameters: Mapping[str, Any]) -> Array:

@@ -247,6 +247,23 @@ def test_arguments_that_mean_nothing_end_with_status_2(arguments):
     assert stopped.value.code == BAD_INPUT
 
 
+def test_a_motion_needs_the_recording_of_a_walk(tmp_path, capsys):
+    table, out = tmp_path / 'reach.csv', tmp_path / 'motion.yaml'
+    table.write_text('time,a\n0,1\n', encoding='utf-8')
+    bag = write_bag(tmp_path / 'bag', WALK)
+    for given, text in (
+        ([str(table)], 'no rosbag2 recording'),
+        ([str(tmp_path / 'nothing')], 'does not exist'),
+        ([str(bag)], 'no stamp has all of joint_targets'),
+        ([str(bag), '--topic', 'imu'], "joint_states, not 'imu'"),
+    ):
+        assert main([*given, '--motion', str(out)]) == BAD_INPUT
+        assert text in capsys.readouterr().err
+    assert main([str(table)]) == BAD_INPUT
+    assert '--out FILE or --motion FILE' in capsys.readouterr().err
+    assert not out.exists()
+
+
 def test_help_answers_without_ros():
     probe = (
         'import sys; sys.modules["rclpy"] = None; '

@@ -24,6 +24,7 @@ CONTRACT = ('reference_filter', 'canonical_oscillators', 'leg_transformation', '
 # Name on the package index: (rosdep key, name to import).
 DEPENDENCIES = {
     'numpy': ('python3-numpy', 'numpy'),
+    'scipy': ('python3-scipy', 'scipy'),
     'mujoco': ('python3-mujoco-pip', 'mujoco'),
     'rosbags': ('python3-rosbags-pip', 'rosbags'),
     'mcap': ('mcap-ros2-support', 'mcap'),

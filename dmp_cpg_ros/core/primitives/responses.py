@@ -112,5 +112,11 @@ def periodic_responses(
     coefficients[1:] *= 2.0
     rate = 1j * omega * np.arange(harmonics + 1)[:, None]
     coefficients = coefficients / (stiffness + damping * rate + rate**2)
-    waves = np.exp(1j * np.outer(phases, np.arange(harmonics + 1)))  # (m, harmonics + 1)
-    return np.stack([(waves @ (coefficients * rate**order)).real for order in range(3)])
+    angles = np.outer(phases, np.arange(harmonics + 1))
+    cosines, sines, orders = np.cos(angles), np.sin(angles), []
+    for order in range(3):
+        terms = coefficients * rate**order
+        # No matrix product: its bits depend on the number of threads.
+        orders.append(np.einsum('mh,hp->mp', cosines, np.ascontiguousarray(terms.real))
+                      - np.einsum('mh,hp->mp', sines, np.ascontiguousarray(terms.imag)))
+    return np.stack(orders)

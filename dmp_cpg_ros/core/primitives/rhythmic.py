@@ -145,10 +145,9 @@ class RhythmicPrimitive:
         ndarray (..., n)
         """
         x = np.asarray(x, dtype=float)
-        blended = np.tensordot(
-            self.bases.activations(phase(x)), self.weights, axes=1
-        )  # (..., n, 2)
-        return np.asarray(np.einsum('...nc,...c->...n', blended, x))
+        # No matrix product: its bits depend on the number of threads.
+        activations = self.bases.activations(phase(x))
+        return np.asarray(np.einsum('...m,mnc,...c->...n', activations, self.weights, x))
 
     def default_input(self) -> RhythmicInput:
         """The demonstration's centre, amplitude and speed."""
