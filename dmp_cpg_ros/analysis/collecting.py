@@ -11,40 +11,18 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.analysis.message_numbers import (
-    Rows,
-    events,
-    robot_clock,
-    stacked,
-    stamp_ns,
-    twist,
-    xyz,
-)
+    Rows, events, robot_clock, stacked, stamp_ns, twist, xyz)
 from dmp_cpg_ros.analysis.named_values import NamedValues
 from dmp_cpg_ros.analysis.recording import (
-    ArrivalSeries,
-    CanonicalSeries,
-    FootForceSeries,
-    ImuSeries,
-    JointSeries,
-    OdometrySeries,
-    PostureSeries,
-    Recording,
-    StatusEvent,
-    VelocitySeries,
-    WorkSeries,
-)
+    ArrivalSeries, CanonicalSeries, FootForceSeries, ImuSeries, JointSeries, OdometrySeries,
+    PostureSeries, Recording, StatusEvent, VelocitySeries, WorkSeries)
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
 Handler = Callable[[int, Any], None]
 
 JOINT_TOPICS = (
-    'joint_states',
-    'joint_targets',
-    'canonical_state',
-    'foot_contacts',
-    'posture_feedback',
-    'joint_work',
-)
+    'joint_states', 'joint_targets', 'canonical_state', 'foot_contacts', 'posture_feedback',
+    'joint_work')
 
 
 class Collector:
@@ -107,24 +85,15 @@ class Collector:
         x, x_dot = (canonical[name].reshape(-1, len(LEGS), 2) for name in ('position', 'velocity'))
         imu = stacked(self._rows['imu'], 10)
         return Recording(
-            joints=self._joints('joint_states'),
-            targets=self._joints('joint_targets'),
-            work=self._work(),
-            canonical=CanonicalSeries(time, x, x_dot, self._gaits(len(time))),
+            joints=self._joints('joint_states'), targets=self._joints('joint_targets'),
+            work=self._work(), canonical=CanonicalSeries(time, x, x_dot, self._gaits(len(time))),
             reference=VelocitySeries(*stacked(self._rows['reference'], 3)),
-            commands=self._command_series(),
-            odometry=self._odometry('odom'),
+            commands=self._command_series(), odometry=self._odometry('odom'),
             estimate=self._odometry('estimated_odom'),
-            imu=ImuSeries(imu[0], *np.split(imu[1], (4, 7), axis=1)),
-            feet=self._feet(),
-            posture=self._posture(),
-            inhibition=tuple(self._inhibition),
-            modes=tuple(self._modes),
+            imu=ImuSeries(imu[0], *np.split(imu[1], (4, 7), axis=1)), feet=self._feet(),
+            posture=self._posture(), inhibition=tuple(self._inhibition), modes=tuple(self._modes),
             statuses={name: tuple(history) for name, history in self._statuses.items()},
-            arrivals=self._arrivals(),
-            counts=counts,
-            undecodable=undecodable,
-        )
+            arrivals=self._arrivals(), counts=counts, undecodable=undecodable)
 
     def _joints(self, topic: str) -> JointSeries:
         time, values = self._named[topic].table(JOINT_NAMES)
@@ -163,8 +132,7 @@ class Collector:
             [self._last_target.get(stamp, np.nan) for stamp in self._ticks[1]], dtype=float
         )
         return ArrivalSeries(
-            stamps / 1e9, np.array(self._ticks[0], dtype=np.int64) / 1e9, targets / 1e9
-        )
+            stamps / 1e9, np.array(self._ticks[0], dtype=np.int64) / 1e9, targets / 1e9)
 
     def _take_joint_targets(self, bag_ns: int, message: Any) -> None:
         stamp = stamp_ns(message.header.stamp)
@@ -214,11 +182,8 @@ class Collector:
             'imu',
             message,
             [
-                *xyz(message.orientation),
-                message.orientation.w,
-                *xyz(message.angular_velocity),
-                *xyz(message.linear_acceleration),
-            ],
+                *xyz(message.orientation), message.orientation.w, *xyz(message.angular_velocity),
+                *xyz(message.linear_acceleration)],
         )
 
     def _row(self, topic: str, message: Any, row: list[float]) -> None:

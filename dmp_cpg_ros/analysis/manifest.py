@@ -19,11 +19,8 @@ PACKAGES = ('numpy', 'mujoco', 'rosbags', 'matplotlib', 'rclpy', 'mcap')
 
 
 def build_manifest(
-    parameters: Mapping[str, Any] | None = None,
-    seeds: Mapping[str, int] | None = None,
-    digests: Mapping[str, str] | None = None,
-    **facts: Any,
-) -> dict[str, Any]:
+        parameters: Mapping[str, Any] | None = None, seeds: Mapping[str, int] | None = None,
+        digests: Mapping[str, str] | None = None, **facts: Any) -> dict[str, Any]:
     """Contents of ``manifest.json``.
 
     Parameters

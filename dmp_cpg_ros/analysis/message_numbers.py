@@ -35,11 +35,8 @@ def events(message: Any) -> dict[str, StatusEvent]:
     time = stamp_ns(message.header.stamp) / 1e9
     return {
         status.name: StatusEvent(
-            time,
-            int(status.level),
-            status.message,
-            {pair.key: pair.value for pair in status.values},
-        )
+            time, int(status.level), status.message,
+            {pair.key: pair.value for pair in status.values})
         for status in message.status
     }
 

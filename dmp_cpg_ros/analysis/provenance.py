@@ -55,12 +55,8 @@ def _git(folder: Path, *arguments: str) -> str:
     """Output of a git command, empty when it fails or there is no git."""
     try:
         done = subprocess.run(
-            ['git', '-C', str(folder), *arguments],
-            capture_output=True,
-            text=True,
-            timeout=10,
-            check=False,
-        )
+            ['git', '-C', str(folder), *arguments], capture_output=True, text=True, timeout=10,
+            check=False)
     except (OSError, subprocess.TimeoutExpired):
         return ''
     return done.stdout.strip() if done.returncode == 0 else ''

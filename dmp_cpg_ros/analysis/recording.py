@@ -297,13 +297,8 @@ class Recording:
         axes = [
             series.time
             for series in (
-                self.joints,
-                self.canonical,
-                self.odometry,
-                self.reference,
-                self.feet,
-                self.targets,
-            )
+                self.joints, self.canonical, self.odometry, self.reference, self.feet,
+                self.targets)
             if series.time.size
         ]
         if not axes:

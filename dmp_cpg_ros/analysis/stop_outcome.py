@@ -107,14 +107,10 @@ def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float)
     path = odometry.position_in_world[: rest + 1, :2]
     slip = foot_slip(_first_rows(hold, rest + 1), robot, contact_force)
     return StopOutcome(
-        fell=False,
-        standing=bool(still.all() and loaded.all()),
-        body_rest_s=float(time[rest]),
+        fell=False, standing=bool(still.all() and loaded.all()), body_rest_s=float(time[rest]),
         slip_m=0.0 if slip is None else float(slip.mean()),
         displacement_m=float(np.hypot(*(path[-1] - path[0]))),
-        tilt=float(tilt(odometry.quaternion).max()),
-        deceleration=_deceleration(odometry),
-    )
+        tilt=float(tilt(odometry.quaternion).max()), deceleration=_deceleration(odometry))
 
 
 def _deceleration(odometry: OdometrySeries) -> float:
@@ -129,18 +125,11 @@ def _first_rows(hold: Recording, count: int) -> Recording:
     joints, odometry, feet = hold.joints, hold.odometry, hold.feet
     return Recording(
         joints=type(joints)(
-            joints.time[:count],
-            joints.position[:count],
-            joints.velocity[:count],
-            joints.effort[:count],
-        ),
+            joints.time[:count], joints.position[:count], joints.velocity[:count],
+            joints.effort[:count]),
         odometry=type(odometry)(
-            odometry.time[:count],
-            odometry.position_in_world[:count],
-            odometry.quaternion[:count],
-            odometry.velocity_in_base[:count],
-            odometry.rate_in_base[:count],
-        ),
+            odometry.time[:count], odometry.position_in_world[:count], odometry.quaternion[:count],
+            odometry.velocity_in_base[:count], odometry.rate_in_base[:count]),
         feet=type(feet)(feet.time[:count], feet.force[:count]),
     )
 
@@ -193,18 +182,7 @@ def summary(outcomes: Sequence[StopOutcome]) -> StopSummary:
         return (float(np.median(values)), float(values.max())) if values.size else (np.nan, np.nan)
 
     return StopSummary(
-        len(outcomes),
-        number('fell'),
-        number('standing'),
-        number('walked_on'),
-        sum(np.isfinite(outcome.bound_s) for outcome in outcomes),
-        number('bound_exceeded'),
-        spread('prediction_error'),
-        spread('bound_s'),
-        spread('measured_s'),
-        spread('body_rest_s'),
-        spread('slip_m'),
-        spread('displacement_m'),
-        spread('tilt'),
-        spread('deceleration'),
-    )
+        len(outcomes), number('fell'), number('standing'), number('walked_on'),
+        sum(np.isfinite(outcome.bound_s) for outcome in outcomes), number('bound_exceeded'),
+        spread('prediction_error'), spread('bound_s'), spread('measured_s'), spread('body_rest_s'),
+        spread('slip_m'), spread('displacement_m'), spread('tilt'), spread('deceleration'))

@@ -38,30 +38,24 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     tilt_panel.plot(odometry.time, pitch, color=PITCH, linewidth=0.9)
     tilt_panel.set_ylabel('tilt [°]')
     height_panel.plot(
-        odometry.time, 100.0 * height_over_ground(odometry, context), color=HEIGHT, linewidth=0.9
-    )
+        odometry.time, 100.0 * height_over_ground(odometry, context), color=HEIGHT, linewidth=0.9)
     height_panel.set_ylabel('height [cm]')
     if context.robot is not None:
         height_panel.axhline(
-            100.0 * context.robot.stance_height, color=style.INK, linewidth=0.9, linestyle=DASHED
-        )
+            100.0 * context.robot.stance_height, color=style.INK, linewidth=0.9, linestyle=DASHED)
     yaw_panel.plot(odometry.time, yaw, color=YAW)
     if reference.time.size > 1:
         asked = np.rad2deg(integral(reference.time, reference.value[:, 2]))
         yaw_panel.plot(
-            reference.time, asked + yaw[0], color=style.INK, linewidth=0.9, linestyle=DASHED
-        )
+            reference.time, asked + yaw[0], color=style.INK, linewidth=0.9, linestyle=DASHED)
     yaw_panel.set_ylabel('yaw [°]')
     yaw_panel.set_xlabel('time [s]')
     style.legend(
         figure,
         [
-            Line2D([], [], color=ROLL, label='roll'),
-            Line2D([], [], color=PITCH, label='pitch'),
+            Line2D([], [], color=ROLL, label='roll'), Line2D([], [], color=PITCH, label='pitch'),
             Line2D([], [], color=HEIGHT, label='height, yaw'),
-            Line2D([], [], color=style.INK, linestyle=DASHED, label='asked for'),
-            *shades,
-        ],
+            Line2D([], [], color=style.INK, linestyle=DASHED, label='asked for'), *shades],
     )
     figure.align_ylabels()
     return figure

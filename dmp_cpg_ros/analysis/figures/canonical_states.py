@@ -28,10 +28,8 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
         shades = style.shade_stops(panel, recording)
         for index, leg in enumerate(LEGS):
             panel.plot(
-                canonical.time[rows],
-                canonical.x[rows, index, component],
-                color=style.LEG_COLOURS[leg],
-            )
+                canonical.time[rows], canonical.x[rows, index, component],
+                color=style.LEG_COLOURS[leg])
         panel.set_ylabel(f'$x_{{i{component + 1}}}$ [–]')
         panel.set_ylim(-1.25 * context.radius, 1.25 * context.radius)
         style.limit_view(panel, window)

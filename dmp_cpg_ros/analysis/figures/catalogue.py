@@ -13,18 +13,8 @@ from matplotlib.figure import Figure
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import (
-    attitude,
-    canonical_states,
-    estimation,
-    footfall,
-    path,
-    phase_portrait,
-    speed_tracking,
-    style,
-    target_kinematics,
-    timing,
-    torques,
-)
+    attitude, canonical_states, estimation, footfall, path, phase_portrait, speed_tracking, style,
+    target_kinematics, timing, torques)
 from dmp_cpg_ros.analysis.recording import Recording
 
 
@@ -51,26 +41,16 @@ class FigureEntry:
 CATALOGUE: tuple[FigureEntry, ...] = tuple(
     FigureEntry(module.__name__.rsplit('.', 1)[-1], title, module.CAPTION, module.draw)
     for module, title in (
-        (target_kinematics, 'Target kinematics'),
-        (canonical_states, 'Canonical states'),
-        (phase_portrait, 'Phase portrait'),
-        (footfall, 'Footfall'),
-        (path, 'Path'),
-        (speed_tracking, 'Speed tracking'),
-        (attitude, 'Body attitude'),
-        (estimation, 'Estimate of the body'),
-        (torques, 'Joint torques'),
-        (timing, 'Timing'),
-    )
+        (target_kinematics, 'Target kinematics'), (canonical_states, 'Canonical states'),
+        (phase_portrait, 'Phase portrait'), (footfall, 'Footfall'), (path, 'Path'),
+        (speed_tracking, 'Speed tracking'), (attitude, 'Body attitude'),
+        (estimation, 'Estimate of the body'), (torques, 'Joint torques'), (timing, 'Timing'))
 )
 
 
 def write_figures(
-    recording: Recording,
-    context: RunContext,
-    folder: Path,
-    entries: Sequence[FigureEntry] = CATALOGUE,
-) -> dict[str, Path]:
+        recording: Recording, context: RunContext, folder: Path,
+        entries: Sequence[FigureEntry] = CATALOGUE) -> dict[str, Path]:
     """Draw and write ``NAME.png`` for each figure that the recording allows.
 
     Returns

@@ -34,13 +34,10 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
         style.limit_view(panel, recording.span)
     for axis, color in enumerate((FIRST, SECOND, THIRD)):
         velocity_panel.plot(
-            errors.time, 1e3 * errors.velocity_in_base[:, axis], color=color, linewidth=0.7
-        )
+            errors.time, 1e3 * errors.velocity_in_base[:, axis], color=color, linewidth=0.7)
     velocity_panel.set_ylabel('velocity [mm/s]')
     for axis, color in enumerate((FIRST, SECOND)):
-        tilt_panel.plot(
-            errors.time, np.rad2deg(errors.tilt[:, axis]), color=color, linewidth=0.9
-        )
+        tilt_panel.plot(errors.time, np.rad2deg(errors.tilt[:, axis]), color=color, linewidth=0.9)
     tilt_panel.set_ylabel('tilt [°]')
     yaw_panel.plot(errors.time, np.rad2deg(errors.yaw), color=THIRD)
     yaw_panel.set_ylabel('yaw [°]')
@@ -50,9 +47,7 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
         [
             Line2D([], [], color=FIRST, label='x, roll'),
             Line2D([], [], color=SECOND, label='y, pitch'),
-            Line2D([], [], color=THIRD, label='z, yaw'),
-            *shades,
-        ],
+            Line2D([], [], color=THIRD, label='z, yaw'), *shades],
     )
     figure.align_ylabels()
     return figure

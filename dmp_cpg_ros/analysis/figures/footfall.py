@@ -77,18 +77,11 @@ def _diagram(
         y = len(LEGS) - 1 - row
         if planned is not None:
             axes.broken_barh(
-                bars(recording.canonical.time, planned[:, row]),
-                (y - 0.4, 0.8),
-                facecolor=style.LEG_COLOURS[leg],
-                alpha=0.28,
-                linewidth=0,
-            )
+                bars(recording.canonical.time, planned[:, row]), (y - 0.4, 0.8),
+                facecolor=style.LEG_COLOURS[leg], alpha=0.28, linewidth=0)
         axes.broken_barh(
-            bars(recording.feet.time, contact[:, row]),
-            (y - 0.22, 0.44),
-            facecolor=style.LEG_COLOURS[leg],
-            linewidth=0,
-        )
+            bars(recording.feet.time, contact[:, row]), (y - 0.22, 0.44),
+            facecolor=style.LEG_COLOURS[leg], linewidth=0)
     axes.set_yticks(range(len(LEGS)), [style.LEG_NAMES[leg] for leg in reversed(LEGS)])
     axes.set_ylim(-0.6, len(LEGS) - 0.4)
     axes.grid(visible=False, axis='y')

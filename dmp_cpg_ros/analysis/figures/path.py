@@ -42,48 +42,28 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     if context.robot is not None and _footholds(panel, recording, context):
         handles += [
             Line2D(
-                [],
-                [],
-                color=style.LEG_COLOURS[leg],
-                marker='.',
-                linestyle='',
-                label=style.LEG_NAMES[leg],
-            )
+                [], [], color=style.LEG_COLOURS[leg], marker='.', linestyle='',
+                label=style.LEG_NAMES[leg])
             for leg in LEGS
         ]
     panel.plot(x, y, color=style.INK, linewidth=1.3, zorder=3)
     _headings(panel, recording)
     panel.plot(
-        x[0], y[0], marker='o', color='white', markeredgecolor=style.INK, markersize=6, zorder=5
-    )
+        x[0], y[0], marker='o', color='white', markeredgecolor=style.INK, markersize=6, zorder=5)
     for episode in episodes(recording, STOPPING):
         if episode.events[0].message != 'at_rest':
             panel.plot(
-                np.interp(episode.end, odometry.time, x),
-                np.interp(episode.end, odometry.time, y),
-                marker='s',
-                color='#C00000',
-                markersize=5,
-                zorder=5,
-            )
+                np.interp(episode.end, odometry.time, x), np.interp(episode.end, odometry.time, y),
+                marker='s', color='#C00000', markersize=5, zorder=5)
     handles += [
         Line2D(
-            [],
-            [],
-            color='white',
-            markeredgecolor=style.INK,
-            marker='o',
-            linestyle='',
-            label='begin',
-        ),
+            [], [], color='white', markeredgecolor=style.INK, marker='o', linestyle='',
+            label='begin'),
         Line2D([], [], color='#C00000', marker='s', linestyle='', label='stop'),
     ]
     panel.set(
-        xlim=(x.min() - margin, x.max() + margin),
-        ylim=(y.min() - margin, y.max() + margin),
-        xlabel='x [m]',
-        ylabel='y [m]',
-    )
+        xlim=(x.min() - margin, x.max() + margin), ylim=(y.min() - margin, y.max() + margin),
+        xlabel='x [m]', ylabel='y [m]')
     panel.set_aspect('equal')
     style.legend(figure, handles)
     return figure
@@ -98,20 +78,8 @@ def _headings(axes: Axes, recording: Recording, every: float = 2.0) -> None:
         for column in (*odometry.position_in_world[:, :2].T, yaw)
     )
     axes.quiver(
-        x,
-        y,
-        np.cos(heading),
-        np.sin(heading),
-        color=style.INK,
-        angles='xy',
-        scale_units='xy',
-        scale=4.5,
-        width=0.0028,
-        headwidth=5,
-        headlength=5,
-        headaxislength=4.5,
-        zorder=4,
-    )
+        x, y, np.cos(heading), np.sin(heading), color=style.INK, angles='xy', scale_units='xy',
+        scale=4.5, width=0.0028, headwidth=5, headlength=5, headaxislength=4.5, zorder=4)
 
 
 def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
@@ -132,11 +100,6 @@ def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
         ]
         if places:
             axes.plot(
-                *np.array(places).T,
-                color=style.LEG_COLOURS[leg.name],
-                marker='.',
-                markersize=3.5,
-                linestyle='',
-                zorder=2,
-            )
+                *np.array(places).T, color=style.LEG_COLOURS[leg.name], marker='.', markersize=3.5,
+                linestyle='', zorder=2)
     return True

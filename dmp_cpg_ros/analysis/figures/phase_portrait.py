@@ -50,8 +50,7 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     axes[0, 1].set(xlim=(target[0] - r0, target[0] + r0), ylim=(target[1] - r0, target[1] + r0))
     _all_legs(axes[0, 2], recording, context, stops[0], places)
     for panel, title in zip(
-        axes[0], (f'{style.LEG_NAMES[LEGS[held]]}', 'close-up of C', 'all legs'), strict=True
-    ):
+        axes[0], (f'{style.LEG_NAMES[LEGS[held]]}', 'close-up of C', 'all legs'), strict=True):
         panel.set_aspect('equal')
         panel.set_title(title)
         panel.set_xlabel('$x_{i1}$ [–]')
@@ -61,8 +60,7 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
         Line2D([], [], color=REQUESTED, label='stop requested'),
         Line2D([], [], color=style.INK, label='inhibited'),
         Patch(facecolor='#E8EEF6', edgecolor='#3B6EA8', label='region C'),
-        Line2D([], [], color='#C00000', marker='x', linestyle='', label='target $x_d$'),
-    ]
+        Line2D([], [], color='#C00000', marker='x', linestyle='', label='target $x_d$')]
     style.legend(figure, handles)
     return figure
 
@@ -87,50 +85,30 @@ def _places(context: RunContext) -> np.ndarray:
 def _limit_cycle(axes: Axes, context: RunContext) -> None:
     axes.add_patch(
         Circle(
-            (0.0, 0.0),
-            context.radius,
-            fill=False,
-            linestyle=(0, (4, 3)),
-            linewidth=0.8,
-            edgecolor='#AAAAAA',
-            zorder=1,
-        )
+            (0.0, 0.0), context.radius, fill=False, linestyle=(0, (4, 3)), linewidth=0.8,
+            edgecolor='#AAAAAA', zorder=1)
     )
 
 
 def _inhibited(
-    axes: Axes, recording: Recording, context: RunContext, stop: Episode, held: int
-) -> None:
+        axes: Axes, recording: Recording, context: RunContext, stop: Episode, held: int) -> None:
     time, x = recording.canonical.time, recording.canonical.x[:, held]
     target = _place_at(recording, context, stop.end, held)
     _limit_cycle(axes, context)
     axes.add_patch(
         Circle(
-            target,
-            context.inhibition.region_radius,
-            facecolor='#E8EEF6',
-            edgecolor='#3B6EA8',
-            linewidth=0.8,
-            zorder=1.5,
-        )
+            target, context.inhibition.region_radius, facecolor='#E8EEF6', edgecolor='#3B6EA8',
+            linewidth=0.8, zorder=1.5)
     )
     captured = next((event.time for event in stop.events if event.message != 'waiting'), stop.end)
     for start, end, colour, width in (
-        (stop.start - AHEAD, stop.start, FREE, 3.2),
-        (stop.start, captured, REQUESTED, 1.3),
-        (captured, stop.end, style.INK, 1.5),
-    ):
+        (stop.start - AHEAD, stop.start, FREE, 3.2), (stop.start, captured, REQUESTED, 1.3),
+        (captured, stop.end, style.INK, 1.5)):
         rows = style.rows_in(time, (start, end))
         axes.plot(*x[rows].T, color=colour, linewidth=width, zorder=3)
     axes.plot(
-        *target,
-        marker='x',
-        color='#C00000',
-        markersize=5,
-        markeredgewidth=1.3,
-        linestyle='',
-        zorder=5,
-    )
+        *target, marker='x', color='#C00000', markersize=5, markeredgewidth=1.3, linestyle='',
+        zorder=5)
     rest = x[time <= stop.end]
     if len(rest):
         axes.plot(*rest[-1], marker='o', color=style.INK, markersize=3.5, zorder=4)
@@ -144,14 +122,8 @@ def _sense(axes: Axes, context: RunContext) -> None:
     tail, head = (0.78 * state_at(angle, context.radius) for angle in (2.0, 2.9))
     axes.add_patch(
         FancyArrowPatch(
-            tuple(tail),
-            tuple(head),
-            connectionstyle='arc3,rad=-0.22',
-            arrowstyle='-|>',
-            mutation_scale=8,
-            color=style.GREY,
-            linewidth=0.9,
-        )
+            tuple(tail), tuple(head), connectionstyle='arc3,rad=-0.22', arrowstyle='-|>',
+            mutation_scale=8, color=style.GREY, linewidth=0.9)
     )
 
 
@@ -167,22 +139,10 @@ def _all_legs(
         if len(x):
             axes.plot(*x[-1], marker='o', color=style.LEG_COLOURS[leg], markersize=5, zorder=4)
             axes.annotate(
-                leg.upper(),
-                x[-1],
-                0.62 * x[-1],
-                color=style.LEG_COLOURS[leg],
-                ha='center',
-                va='center',
-                fontweight='bold',
-            )
+                leg.upper(), x[-1], 0.62 * x[-1], color=style.LEG_COLOURS[leg], ha='center',
+                va='center', fontweight='bold')
         axes.plot(
-            *places[index],
-            marker='o',
-            markerfacecolor='none',
-            color=style.LEG_COLOURS[leg],
-            markersize=8,
-            linestyle='',
-            zorder=3,
-        )
+            *places[index], marker='o', markerfacecolor='none', color=style.LEG_COLOURS[leg],
+            markersize=8, linestyle='', zorder=3)
     reach = context.radius + context.inhibition.region_radius + 0.1
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach))

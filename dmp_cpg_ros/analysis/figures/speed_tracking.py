@@ -22,10 +22,7 @@ CAPTION = (
 )
 
 PANELS = (
-    (0, 'forward speed $v$ [m/s]'),
-    (1, 'lateral speed [m/s]'),
-    (2, 'turn rate $\\gamma$ [rad/s]'),
-)
+    (0, 'forward speed $v$ [m/s]'), (1, 'lateral speed [m/s]'), (2, 'turn rate $\\gamma$ [rad/s]'))
 
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
@@ -43,24 +40,14 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     for panel, (column, label) in zip(axes[:, 0], panels, strict=True):
         shades = style.shade_stops(panel, recording)
         panel.plot(
-            odometry.time, motion[:, column], color=style.MEASURED, alpha=0.28, linewidth=0.6
-        )
+            odometry.time, motion[:, column], color=style.MEASURED, alpha=0.28, linewidth=0.6)
         panel.plot(odometry.time, mean[:, column], color=style.MEASURED, linewidth=1.5)
         panel.step(
-            recording.commands.time,
-            recording.commands.value[:, column],
-            where='post',
-            color='#E69F00',
-            linewidth=1.0,
-            linestyle=(0, (1, 1.2)),
-        )
+            recording.commands.time, recording.commands.value[:, column], where='post',
+            color='#E69F00', linewidth=1.0, linestyle=(0, (1, 1.2)))
         panel.plot(
-            recording.reference.time,
-            recording.reference.value[:, column],
-            color=style.REFERENCE,
-            linewidth=1.0,
-            linestyle=(0, (5, 2)),
-        )
+            recording.reference.time, recording.reference.value[:, column], color=style.REFERENCE,
+            linewidth=1.0, linestyle=(0, (5, 2)))
         panel.set_ylabel(label)
         style.limit_view(panel, recording.span)
     axes[-1, 0].set_xlabel('time [s]')
@@ -69,9 +56,7 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
         [
             Line2D([], [], color='#E69F00', linestyle=(0, (1, 1.2)), label='command'),
             Line2D([], [], color=style.REFERENCE, linestyle=(0, (5, 2)), label='reference'),
-            Line2D([], [], color=style.MEASURED, linewidth=1.5, label='measured'),
-            *shades,
-        ],
+            Line2D([], [], color=style.MEASURED, linewidth=1.5, label='measured'), *shades],
     )
     figure.align_ylabels()
     return figure

@@ -83,8 +83,7 @@ def applied() -> Iterator[None]:
 
 
 def new_figure(
-    height: float, rows: int = 1, columns: int = 1, **options: Any
-) -> tuple[Figure, Any]:
+        height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
     """Figure of page width and its axes, ndarray (rows, columns).
 
     Parameters
@@ -105,14 +104,8 @@ def legend(figure: Figure, handles: Sequence[Any]) -> None:
     height = LEGEND_HEIGHT / figure.get_figheight()
     figure.set_layout_engine('constrained', rect=(0.0, 0.0, 1.0, 1.0 - height))
     figure.legend(
-        handles=list(handles),
-        loc='upper center',
-        ncols=len(handles),
-        columnspacing=1.3,
-        handlelength=1.6,
-        handletextpad=0.5,
-        borderaxespad=0.3,
-    )
+        handles=list(handles), loc='upper center', ncols=len(handles), columnspacing=1.3,
+        handlelength=1.6, handletextpad=0.5, borderaxespad=0.3)
 
 
 def leg_legend(figure: Figure, extra: Sequence[Any] = ()) -> None:

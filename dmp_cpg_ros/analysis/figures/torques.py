@@ -34,12 +34,8 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
         else np.array([leg.torque_limit for leg in context.robot.legs])
     )
     figure, axes = style.new_figure(
-        4.6,
-        3,
-        1 if limits is None else 2,
-        sharex='col',
-        width_ratios=None if limits is None else (3.0, 1.0),
-    )
+        4.6, 3, 1 if limits is None else 2, sharex='col',
+        width_ratios=None if limits is None else (3.0, 1.0))
     for k, joint in enumerate(JOINTS_OF_LEG):
         panel = axes[k, 0]
         for index, leg in enumerate(LEGS):
@@ -70,22 +66,13 @@ def _shares(axes: Axes, share: np.ndarray) -> None:
     for index, leg in enumerate(LEGS):
         y = len(LEGS) - 1 - index
         axes.barh(
-            y,
-            100.0 * np.nanpercentile(share[:, index], 99.0),
-            height=0.62,
-            color=style.LEG_COLOURS[leg],
-            alpha=0.75,
-        )
+            y, 100.0 * np.nanpercentile(share[:, index], 99.0), height=0.62,
+            color=style.LEG_COLOURS[leg], alpha=0.75)
         axes.plot(
-            [100.0 * np.nanmax(share[:, index])] * 2,
-            [y - 0.31, y + 0.31],
-            color=style.INK,
-            linewidth=1.2,
-        )
+            [100.0 * np.nanmax(share[:, index])] * 2, [y - 0.31, y + 0.31], color=style.INK,
+            linewidth=1.2)
     axes.axvline(100.0, color=style.GREY, linewidth=0.9, linestyle=(0, (5, 2)))
     axes.set(
-        xlim=(0.0, 108.0),
-        yticks=range(len(LEGS)),
-        yticklabels=[leg.upper() for leg in reversed(LEGS)],
-    )
+        xlim=(0.0, 108.0), yticks=range(len(LEGS)),
+        yticklabels=[leg.upper() for leg in reversed(LEGS)])
     axes.grid(visible=False, axis='y')

@@ -79,17 +79,8 @@ def estimation_metrics(recording: Recording, context: RunContext) -> dict[str, A
         ``z_error_share``; ``height_rmse_m`` over the ground.
     """
     names = (
-        'v_x_rmse',
-        'v_y_rmse',
-        'v_z_rmse',
-        'roll_rmse_deg',
-        'pitch_rmse_deg',
-        'yaw_error_deg',
-        'yaw_error_deg_per_10m',
-        'position_error_share',
-        'z_error_share',
-        'height_rmse_m',
-    )
+        'v_x_rmse', 'v_y_rmse', 'v_z_rmse', 'roll_rmse_deg', 'pitch_rmse_deg', 'yaw_error_deg',
+        'yaw_error_deg_per_10m', 'position_error_share', 'z_error_share', 'height_rmse_m')
     metrics: dict[str, Any] = dict.fromkeys(names)
     errors = estimate_errors(recording)
     if errors is None:
@@ -130,9 +121,5 @@ def _rms(values: Array) -> list[float]:
 
 def _taken(series: OdometrySeries, rows: NDArray[np.int64]) -> OdometrySeries:
     return OdometrySeries(
-        series.time[rows],
-        series.position_in_world[rows],
-        series.quaternion[rows],
-        series.velocity_in_base[rows],
-        series.rate_in_base[rows],
-    )
+        series.time[rows], series.position_in_world[rows], series.quaternion[rows],
+        series.velocity_in_base[rows], series.rate_in_base[rows])

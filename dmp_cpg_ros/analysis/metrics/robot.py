@@ -104,8 +104,7 @@ def yaw_drift(recording: Recording) -> float | None:
     gained = walked = 0.0
     for start, end in steady_segments(recording):
         v_x, v_y, gamma = held(
-            recording.reference.time, recording.reference.value, np.array([start])
-        )[0]
+            recording.reference.time, recording.reference.value, np.array([start]))[0]
         if abs(gamma) > MOVING or np.hypot(v_x, v_y) < MOVING:
             continue
         there = [

@@ -99,8 +99,7 @@ def _first(episode: Episode, key: str) -> float | None:
 
 
 def _body_at_rest(
-    recording: Recording, request: float, window: tuple[float, float]
-) -> dict[str, Any]:
+        recording: Recording, request: float, window: tuple[float, float]) -> dict[str, Any]:
     odometry = recording.odometry
     rows = (odometry.time >= window[0]) & (odometry.time < window[1])
     if not rows.any():
@@ -118,8 +117,7 @@ def _body_at_rest(
 
 
 def _feet_at_rest(
-    recording: Recording, context: RunContext, window: tuple[float, float]
-) -> dict[str, Any]:
+        recording: Recording, context: RunContext, window: tuple[float, float]) -> dict[str, Any]:
     feet = recording.feet
     rows = (feet.time >= window[0]) & (feet.time < window[1])
     if not rows.any():
