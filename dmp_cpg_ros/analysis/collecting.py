@@ -11,11 +11,28 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.analysis.message_numbers import (
-    Rows, events, robot_clock, stacked, stamp_ns, twist, xyz)
+    Rows,
+    events,
+    robot_clock,
+    stacked,
+    stamp_ns,
+    twist,
+    xyz,
+)
 from dmp_cpg_ros.analysis.named_values import NamedValues
 from dmp_cpg_ros.analysis.recording import (
-    ArrivalSeries, CanonicalSeries, FootForceSeries, ImuSeries, JointSeries, OdometrySeries,
-    PostureSeries, Recording, StatusEvent, VelocitySeries, WorkSeries)
+    ArrivalSeries,
+    CanonicalSeries,
+    FootForceSeries,
+    ImuSeries,
+    JointSeries,
+    OdometrySeries,
+    PostureSeries,
+    Recording,
+    StatusEvent,
+    VelocitySeries,
+    WorkSeries,
+)
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
 Handler = Callable[[int, Any], None]

@@ -13,8 +13,18 @@ from matplotlib.figure import Figure
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import (
-    attitude, canonical_states, estimation, footfall, path, phase_portrait, speed_tracking, style,
-    target_kinematics, timing, torques)
+    attitude,
+    canonical_states,
+    estimation,
+    footfall,
+    path,
+    phase_portrait,
+    speed_tracking,
+    style,
+    target_kinematics,
+    timing,
+    torques,
+)
 from dmp_cpg_ros.analysis.recording import Recording
 
 

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import (
-    MOVING, SETTLING, changing_intervals, gait_period, running_intervals, steady_segments)
+    MOVING,
+    SETTLING,
+    changing_intervals,
+    gait_period,
+    running_intervals,
+    steady_segments,
+)
 from dmp_cpg_ros.analysis.gait_in_force import gaits_walked, phase_offsets, planned_stance
 from dmp_cpg_ros.analysis.motion import held, mean_between
 from dmp_cpg_ros.analysis.recording import Recording
