@@ -49,6 +49,11 @@ class Episode:
     end: float
     events: tuple[StatusEvent, ...]
 
+    @property
+    def captured(self) -> float:
+        """When inhibition took hold: the first state that is not ``waiting``, or the end [s]."""
+        return next((e.time for e in self.events if e.message != 'waiting'), self.end)
+
 
 def episodes(recording: Recording, words: tuple[str, ...]) -> list[Episode]:
     """Longest stretches in which the inhibition's state is one of ``words``."""
@@ -65,6 +70,12 @@ def episodes(recording: Recording, words: tuple[str, ...]) -> list[Episode]:
             Episode(current[0].time, max(recording.span[1], current[-1].time), tuple(current))
         )
     return found
+
+
+def requested_stops(recording: Recording) -> list[Episode]:
+    """Stops that were asked for while the robot walked; one that began at rest is none."""
+    return [episode for episode in episodes(recording, STOPPING)
+            if episode.events[0].message != 'at_rest']
 
 
 def running_intervals(recording: Recording) -> list[tuple[float, float]]:

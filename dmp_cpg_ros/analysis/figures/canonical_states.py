@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_model.state import LEGS
 
 CAPTION = (
     'The four oscillators across the addition and the removal of sparse inhibition. Only the '
@@ -23,16 +22,10 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     rows = style.rows_in(canonical.time, window)
     if not rows.any():
         return None
-    figure, axes = style.new_figure(3.6, 2, sharex=True)
-    for component, panel in enumerate(axes[:, 0]):
-        shades = style.shade_stops(panel, recording)
-        for index, leg in enumerate(LEGS):
-            panel.plot(
-                canonical.time[rows], canonical.x[rows, index, component],
-                color=style.LEG_COLOURS[leg])
-        panel.set_ylabel(f'$x_{{i{component + 1}}}$ [–]')
+    figure, panels, shades = style.time_panels(
+        recording, 3.6, ('$x_{i1}$ [–]', '$x_{i2}$ [–]'), window)
+    for component, panel in enumerate(panels):
+        style.plot_legs(panel, canonical.time[rows], canonical.x[rows, :, component])
         panel.set_ylim(-1.25 * context.radius, 1.25 * context.radius)
-        style.limit_view(panel, window)
-    axes[-1, 0].set_xlabel('time [s]')
     style.leg_legend(figure, shades)
     return figure

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
@@ -19,7 +18,7 @@ CAPTION = (
     'correct.'
 )
 
-FIRST, SECOND, THIRD = '#56B4E9', '#E69F00', '#6A51A3'
+COLOURS = (style.BLUE, style.ORANGE, style.VIOLET)
 
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
@@ -27,27 +26,14 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     errors = estimate_errors(recording)
     if errors is None:
         return None
-    figure, axes = style.new_figure(4.6, 3, sharex=True)
-    velocity_panel, tilt_panel, yaw_panel = axes[:, 0]
-    for panel in axes[:, 0]:
-        shades = style.shade_stops(panel, recording)
-        style.limit_view(panel, recording.span)
-    for axis, color in enumerate((FIRST, SECOND, THIRD)):
-        velocity_panel.plot(
+    figure, (velocities, tilts, yaws), shades = style.time_panels(
+        recording, 4.6, ('velocity [mm/s]', 'tilt [°]', 'yaw [°]'))
+    for axis, color in enumerate(COLOURS):
+        velocities.plot(
             errors.time, 1e3 * errors.velocity_in_base[:, axis], color=color, linewidth=0.7)
-    velocity_panel.set_ylabel('velocity [mm/s]')
-    for axis, color in enumerate((FIRST, SECOND)):
-        tilt_panel.plot(errors.time, np.rad2deg(errors.tilt[:, axis]), color=color, linewidth=0.9)
-    tilt_panel.set_ylabel('tilt [°]')
-    yaw_panel.plot(errors.time, np.rad2deg(errors.yaw), color=THIRD)
-    yaw_panel.set_ylabel('yaw [°]')
-    yaw_panel.set_xlabel('time [s]')
-    style.legend(
-        figure,
-        [
-            Line2D([], [], color=FIRST, label='x, roll'),
-            Line2D([], [], color=SECOND, label='y, pitch'),
-            Line2D([], [], color=THIRD, label='z, yaw'), *shades],
-    )
-    figure.align_ylabels()
+    for axis, color in enumerate(COLOURS[:2]):
+        tilts.plot(errors.time, np.rad2deg(errors.tilt[:, axis]), color=color, linewidth=0.9)
+    yaws.plot(errors.time, np.rad2deg(errors.yaw), color=COLOURS[2])
+    style.legend(figure, [style.key(label, color=color) for label, color in zip(
+        ('x, roll', 'y, pitch', 'z, yaw'), COLOURS, strict=True)] + shades)
     return figure

@@ -73,18 +73,12 @@ def _diagram(
 ) -> None:
     contact = recording.feet.force > context.contact_force
     planned = planned_stance(recording, context)
-    for row, leg in enumerate(LEGS):
-        y = len(LEGS) - 1 - row
+    for leg in range(len(LEGS)):
         if planned is not None:
-            axes.broken_barh(
-                bars(recording.canonical.time, planned[:, row]), (y - 0.4, 0.8),
-                facecolor=style.LEG_COLOURS[leg], alpha=0.28, linewidth=0)
-        axes.broken_barh(
-            bars(recording.feet.time, contact[:, row]), (y - 0.22, 0.44),
-            facecolor=style.LEG_COLOURS[leg], linewidth=0)
-    axes.set_yticks(range(len(LEGS)), [style.LEG_NAMES[leg] for leg in reversed(LEGS)])
-    axes.set_ylim(-0.6, len(LEGS) - 0.4)
-    axes.grid(visible=False, axis='y')
+            style.leg_bars(axes, leg, bars(recording.canonical.time, planned[:, leg]), 0.8,
+                           alpha=0.28)
+        style.leg_bars(axes, leg, bars(recording.feet.time, contact[:, leg]), 0.44)
+    style.leg_rows(axes)
     style.limit_view(axes, window)
 
 

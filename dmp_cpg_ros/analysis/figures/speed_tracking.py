@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import MOVING, gait_period
@@ -21,42 +22,31 @@ CAPTION = (
     'goes to zero whatever the command.'
 )
 
-PANELS = (
-    (0, 'forward speed $v$ [m/s]'), (1, 'lateral speed [m/s]'), (2, 'turn rate $\\gamma$ [rad/s]'))
+PANELS = ('forward speed $v$ [m/s]', 'lateral speed [m/s]', 'turn rate $\\gamma$ [rad/s]')
+
+COMMANDED: Any = {'color': style.ORANGE, 'linestyle': (0, (1, 1.2))}
+FILTERED: Any = {'color': style.REFERENCE, 'linestyle': style.DASHED}
 
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
     """Draw v and γ (and the lateral speed where it was asked for); None without odometry."""
-    odometry = recording.odometry
+    odometry, commands, reference = recording.odometry, recording.commands, recording.reference
     if odometry.time.size < 3:
         return None
     motion = body_motion(recording)
     mean = smoothed(odometry.time, motion, gait_period(recording) or 0.5)
-    lateral = (
-        recording.reference.time.size and np.abs(recording.reference.value[:, 1]).max() > MOVING
-    )
-    panels = [entry for entry in PANELS if entry[0] != 1 or lateral]
-    figure, axes = style.new_figure(1.6 * len(panels) + 0.6, len(panels), sharex=True)
-    for panel, (column, label) in zip(axes[:, 0], panels, strict=True):
-        shades = style.shade_stops(panel, recording)
+    lateral = reference.time.size and np.abs(reference.value[:, 1]).max() > MOVING
+    columns = (0, 1, 2) if lateral else (0, 2)
+    figure, panels, shades = style.time_panels(
+        recording, 1.6 * len(columns) + 0.6, [PANELS[column] for column in columns])
+    for panel, column in zip(panels, columns, strict=True):
         panel.plot(
             odometry.time, motion[:, column], color=style.MEASURED, alpha=0.28, linewidth=0.6)
         panel.plot(odometry.time, mean[:, column], color=style.MEASURED, linewidth=1.5)
         panel.step(
-            recording.commands.time, recording.commands.value[:, column], where='post',
-            color='#E69F00', linewidth=1.0, linestyle=(0, (1, 1.2)))
-        panel.plot(
-            recording.reference.time, recording.reference.value[:, column], color=style.REFERENCE,
-            linewidth=1.0, linestyle=(0, (5, 2)))
-        panel.set_ylabel(label)
-        style.limit_view(panel, recording.span)
-    axes[-1, 0].set_xlabel('time [s]')
-    style.legend(
-        figure,
-        [
-            Line2D([], [], color='#E69F00', linestyle=(0, (1, 1.2)), label='command'),
-            Line2D([], [], color=style.REFERENCE, linestyle=(0, (5, 2)), label='reference'),
-            Line2D([], [], color=style.MEASURED, linewidth=1.5, label='measured'), *shades],
-    )
-    figure.align_ylabels()
+            commands.time, commands.value[:, column], where='post', linewidth=1.0, **COMMANDED)
+        panel.plot(reference.time, reference.value[:, column], linewidth=1.0, **FILTERED)
+    style.legend(figure, [
+        style.key('command', **COMMANDED), style.key('reference', **FILTERED),
+        style.key('measured', color=style.MEASURED, linewidth=1.5), *shades])
     return figure

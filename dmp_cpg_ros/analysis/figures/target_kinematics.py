@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG
 
 CAPTION = (
     'Targets of the hips and the knees across a stop by sparse inhibition and the start after it. '
@@ -24,15 +24,11 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     rows = style.rows_in(targets.time, window)
     if not rows.any():
         return None
-    figure, axes = style.new_figure(3.6, 2, sharex=True)
-    for panel, joint in zip(axes[:, 0], ('hip', 'knee'), strict=True):
-        shades = style.shade_stops(panel, recording)
-        for index, leg in enumerate(LEGS):
-            angle = targets.position[rows, 3 * index + JOINTS_OF_LEG.index(joint)]
-            panel.plot(targets.time[rows], angle, color=style.LEG_COLOURS[leg])
-        panel.set_ylabel(f'{joint} target [rad]')
-        style.limit_view(panel, window)
-    axes[-1, 0].set_xlabel('time [s]')
+    joints = ('hip', 'knee')
+    figure, panels, shades = style.time_panels(
+        recording, 3.6, [f'{joint} target [rad]' for joint in joints], window)
+    for panel, joint in zip(panels, joints, strict=True):
+        angles = targets.position[rows, JOINTS_OF_LEG.index(joint)::3]
+        style.plot_legs(panel, targets.time[rows], angles)
     style.leg_legend(figure, shades)
-    figure.align_ylabels()
     return figure

@@ -38,10 +38,7 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
         width_ratios=None if limits is None else (3.0, 1.0))
     for k, joint in enumerate(JOINTS_OF_LEG):
         panel = axes[k, 0]
-        for index, leg in enumerate(LEGS):
-            panel.plot(
-                joints.time[rows], joints.effort[rows, 3 * index + k], color=style.LEG_COLOURS[leg]
-            )
+        style.plot_legs(panel, joints.time[rows], joints.effort[rows, k::3])
         panel.set_ylabel(f'{joint} [N m]')
         style.limit_view(panel, window)
         if limits is not None:
