@@ -18,12 +18,6 @@ from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
-CAPTION = (
-    'Bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles of '
-    'steady walking. Bottom: the first stop and the start after it; at rest all four bars should '
-    'be unbroken.'
-)
-
 CYCLES = 6
 """Gait cycles of steady walking that are drawn."""
 

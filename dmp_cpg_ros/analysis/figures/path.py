@@ -18,11 +18,6 @@ from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations, 
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
-CAPTION = (
-    'The base from above. Small dots are footholds, one for each stance; squares mark where the '
-    'robot stood still, arrows its heading every two seconds.'
-)
-
 FEWEST_SAMPLES = 5
 """Shorter contacts are no footholds."""
 

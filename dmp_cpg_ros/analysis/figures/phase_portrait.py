@@ -19,14 +19,6 @@ from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
-CAPTION = (
-    'The first stop in the plane of the oscillators. Left: the inhibited oscillator runs on its '
-    'limit cycle until inhibition is armed and it enters the region C, where it is held near its '
-    'target. Middle: close-up of C; the small distance at which it rests is the pull of the other '
-    'oscillators over the gain. Right: all four legs; dots mark where they rest, rings their '
-    'places in the gait.'
-)
-
 AHEAD = 1.5
 """Time before the request that is drawn [s]."""
 
