@@ -26,10 +26,11 @@ LAYERS = {
     'paper': ({'core'}, {'numpy'}),
     'configuration': ({'core'}, {'yaml'}),
     'suite': ({'core', 'configuration'}, set()),
+    'layouts': ({'core'}, set()),
     'primitive_files': ({'core', 'configuration'}, {'numpy', 'yaml'}),
     'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml'}),
-    'nodes': ({'core', 'configuration', 'suite', 'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
-    'analysis': ({'core', 'paper', 'configuration', 'suite'}, {'numpy', *RECORDS, *FIGURES}),
+    'nodes': ({'core', 'configuration', 'layouts', 'suite', 'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
+    'analysis': ({'core', 'paper', 'configuration', 'layouts', 'suite'}, {'numpy', *RECORDS, *FIGURES}),
     'commands': ({'core', 'configuration', 'suite', 'primitive_files', 'robot', 'nodes',
                   'analysis'}, EVERYTHING),
     'studies': ({'core', 'paper', 'configuration', 'suite', 'primitive_files', 'robot', 'nodes',
@@ -99,7 +100,7 @@ def test_no_import_runs_in_a_circle() -> None:
 
 @pytest.mark.parametrize(('layers', 'unwanted'), [
     (['core', 'paper'], EVERYTHING - {'numpy'}),
-    (['configuration', 'suite', 'primitive_files', 'models', 'analysis'], ROS | {'mujoco'}),
+    (['configuration', 'layouts', 'suite', 'primitive_files', 'models', 'analysis'], ROS | {'mujoco'}),
     (['robot'], ROS | RECORDS),
 ])
 def test_importing_a_layer_loads_nothing_that_it_must_do_without(

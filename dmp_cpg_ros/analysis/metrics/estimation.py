@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.ground import height_over_ground
 from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations
-from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording
+from dmp_cpg_ros.analysis.recording import Recording, taken
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def estimate_errors(recording: Recording) -> EstimateErrors | None:
     rows = common_rows(truth.time, estimate.time)
     if len(rows[0]) < 2:
         return None
-    true, found = _taken(truth, rows[0]), _taken(estimate, rows[1])
+    true, found = taken(truth, rows[0]), taken(estimate, rows[1])
     angles = roll_pitch_yaw(found.quaternion) - roll_pitch_yaw(true.quaternion)
     way, way_found = (each.position_in_world - each.position_in_world[0] for each in (true, found))
     velocity = found.velocity_in_base - true.velocity_in_base
@@ -117,9 +117,3 @@ def _height_error(recording: Recording, context: RunContext) -> float | None:
 
 def _rms(values: Array) -> list[float]:
     return list(np.sqrt((values**2).mean(axis=0)).tolist())
-
-
-def _taken(series: OdometrySeries, rows: NDArray[np.int64]) -> OdometrySeries:
-    return OdometrySeries(
-        series.time[rows], series.position_in_world[rows], series.quaternion[rows],
-        series.velocity_in_base[rows], series.rate_in_base[rows])
