@@ -147,6 +147,7 @@ class StopSummary:
 
     def spread(self, name: str) -> tuple[float, float]:
         """Median and worst of a number, such as ``slip_m``; NaN where no outcome has it."""
-        values = np.array([getattr(outcome, name) for outcome in self.outcomes if not outcome.fell])
+        upright = [outcome for outcome in self.outcomes if not outcome.fell]
+        values = np.array([getattr(outcome, name) for outcome in upright])
         values = values[np.isfinite(values)]
         return (float(np.median(values)), float(values.max())) if values.size else (np.nan, np.nan)

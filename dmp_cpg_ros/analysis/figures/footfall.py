@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis import gait_in_force
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import RUNNING, episodes, gait_period, steady_segments
+from dmp_cpg_ros.analysis.episodes import (
+    gait_period,
+    running_intervals,
+    steady_segments,
+    within,
+)
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.recording import Recording
@@ -56,10 +61,9 @@ def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool
     stance, duty = gait_in_force.planned_stance(recording, context)
     if not duty.size:
         return None
-    running = np.zeros(len(canonical.time), dtype=bool)
-    for episode in episodes(recording, RUNNING):
-        running |= (canonical.time >= episode.start) & (canonical.time < episode.end)
-    return stance & running[:, None] if recording.inhibition else stance
+    if not recording.inhibition:
+        return stance
+    return stance & within(canonical.time, running_intervals(recording))[:, None]
 
 
 def _diagram(
