@@ -80,7 +80,8 @@ def run_robot(case: RobotCase) -> RobotOutcome:
         robot, [StopCase('amble', 0.5, phase) for phase in phases], load_gait('amble'),
         suite.parameters)))
     pushed = [change for phase in phases
-              for change in survived_pushes(PushCase('amble', 0.5, phase, SIDES), case.file)]
+              for change in survived_pushes(
+                  PushCase('amble', 0.5, phase, SIDES), case.file).speed_change]
     return RobotOutcome(
         robot.description.mass, steady('amble', (0.5, 0.0, 0.0), case.file),
         steady('trot', (1.0, 0.0, 0.0), case.file), top_speed(case.file),

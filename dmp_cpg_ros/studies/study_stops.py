@@ -10,7 +10,6 @@ be used.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -21,14 +20,13 @@ from multiprocessing import Pool
 from pathlib import Path
 
 from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary
-from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.markdown_table import markdown_table
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.stop_trial import METHODS, StopCase, run_trials
 from dmp_cpg_ros.suite import Suite, load_gait, load_suite
 
@@ -56,9 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for case, outcome in results:
         if outcome.fell:
             print(f'\nfell: {case}', end='')
-    if options.json:
-        write_json(options.json, [asdict(case) | asdict(outcome) for case, outcome in results])
-        print(f'\nwrote {options.json}')
+    write_results(options.json, [asdict(case) | asdict(outcome) for case, outcome in results])
     return int(any(outcome.fell for case, outcome in results if case.method == METHODS[0]))
 
 
@@ -169,8 +165,7 @@ def _share(part: int, whole: int) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='study_stops', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of('study_stops', __doc__, 'every case and outcome')
     parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
     parser.add_argument('--phases', type=int, default=16, metavar='N',
                         help='request phases, evenly over a cycle (default: 16)')
@@ -186,9 +181,6 @@ def _parser() -> argparse.ArgumentParser:
                         help='lateral impulse in the instant of the request [N s] (default: 0)')
     parser.add_argument('--baselines', action='store_true',
                         help='also stop by freezing all phases, and by finishing every swing')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
-                        help='processes (default: one per processor)')
-    parser.add_argument('--json', type=Path, metavar='FILE', help='write every case and outcome')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
     return parser
 
