@@ -14,6 +14,7 @@ from typing import Any
 
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import Connection
+from rosbags.rosbag2 import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
@@ -62,7 +63,8 @@ def opened(bag: Path) -> Iterator[AnyReader]:
     Raises
     ------
     DataError
-        If the bag cannot be read, or a folder holds several that do not belong together.
+        If the bag cannot be read, also later, or a folder holds several that do not belong
+        together.
     """
     with ExitStack() as stack:
         try:
@@ -70,7 +72,15 @@ def opened(bag: Path) -> Iterator[AnyReader]:
         except DataError as damage:
             reader = _reader([_readable(file, bag, stack) for file in _parts(bag, damage)])
         stack.callback(reader.close)
-        yield reader
+        try:
+            yield reader
+        except (AnyReaderError, ReaderError, OSError) as error:
+            raise DataError(f"the bag '{bag}' is damaged: {error}") from error
+
+
+def base_name(topic: str) -> str:
+    """Topic without namespace."""
+    return topic.rsplit('/', 1)[-1]
 
 
 def decoded(

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import MOVING, gait_period
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.ground import height_over_ground
+from dmp_cpg_ros.analysis.foot_motion import height_over_ground
 from dmp_cpg_ros.analysis.metrics.estimation import estimate_errors
 from dmp_cpg_ros.analysis.metrics.tracking import body_motion
 from dmp_cpg_ros.analysis.motion import integral, roll_pitch_yaw, smoothed

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import requested_stops
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.foot_motion import feet_in_base
-from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations, stretches
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.foot_motion import feet_in_world, foot_rows
+from dmp_cpg_ros.analysis.motion import roll_pitch_yaw, stretches
+from dmp_cpg_ros.analysis.recording import Recording, taken
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 FEWEST_SAMPLES = 5
@@ -71,20 +71,16 @@ def _headings(axes: Axes, recording: Recording, every: float = 2.0) -> None:
 
 def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
     """Mark the mean place of each stance of each foot; returns whether it could."""
-    rows = common_rows(recording.joints.time, recording.odometry.time, recording.feet.time)
+    rows = foot_rows(recording)
     if context.robot is None or len(rows[0]) < 2:
         return False
-    R = rotations(recording.odometry.quaternion[rows[1]])
-    base = recording.odometry.position_in_world[rows[1]]
+    odometry = taken(recording.odometry, rows[1])
     for index, leg in enumerate(context.robot.legs):
         q = recording.joints.position[rows[0], 3 * index : 3 * index + 3]
-        feet = base + np.einsum('nij,nj->ni', R, feet_in_base(leg, q))
+        feet = feet_in_world(leg, q, odometry)
         loaded = recording.feet.force[rows[2], index] > context.contact_force
-        places = [
-            feet[first:past, :2].mean(axis=0)
-            for first, past in stretches(loaded)
-            if past - first > FEWEST_SAMPLES
-        ]
+        places = [feet[first:past, :2].mean(axis=0) for first, past in stretches(loaded)
+                  if past - first > FEWEST_SAMPLES]
         if places:
             axes.plot(
                 *np.array(places).T, color=style.LEG_COLOURS[leg.name], markersize=3.5, zorder=2,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.metrics.timing import ROBOT_NODE
+from dmp_cpg_ros.analysis.metrics.summary import ROBOT_NODE
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 
 MEDIAN, LATE = '#0072B2', '#D55E00'

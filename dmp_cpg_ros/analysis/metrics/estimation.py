@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.ground import height_over_ground
+from dmp_cpg_ros.analysis.foot_motion import height_over_ground
 from dmp_cpg_ros.analysis.motion import (
     common_rows,
     roll_pitch_yaw,

@@ -16,8 +16,7 @@ from dmp_cpg_ros.analysis.episodes import (
     should_stand,
     steady_segments,
 )
-from dmp_cpg_ros.analysis.foot_motion import foot_slip
-from dmp_cpg_ros.analysis.ground import height_over_ground
+from dmp_cpg_ros.analysis.foot_motion import foot_slip, height_over_ground
 from dmp_cpg_ros.analysis.motion import held, integral, roll_pitch_yaw, smoothed, tilt
 from dmp_cpg_ros.analysis.recording import Recording
 
