@@ -35,8 +35,7 @@ def find_bag(path: Path | str) -> Path:
     path = Path(path)
     if not path.exists():
         raise MissingFileError(
-            f"'{path}' does not exist; name a rosbag2 folder or a run's folder with bag/ inside"
-        )
+            f"'{path}' does not exist; name a rosbag2 folder or a run's folder with bag/ inside")
     if path.is_file():
         if path.suffix in STORAGE_SUFFIXES:
             return path
@@ -129,8 +128,7 @@ def _parts(bag: Path, damage: DataError) -> list[Path]:
     if len(files) > 1 and not all(numbers):
         raise DataError(
             f"'{bag}' holds {len(files)} recordings and no usable metadata.yaml that makes them "
-            f'one; name one of them: {", ".join(file.name for file in files)}'
-        )
+            f'one; name one of them: {", ".join(file.name for file in files)}')
     return files
 
 

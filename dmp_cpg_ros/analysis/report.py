@@ -70,8 +70,7 @@ def render(title: str, subtitle: str, results: RunResults) -> str:
         f'<title>{title}</title><style>{CSS}</style></head>\n<body><main>'
         f'<header><h1>{title}</h1><p class="subtitle">{escape(subtitle)}</p></header>'
         f'<nav>{links}</nav>\n{body}<footer>dmp_cpg_ros · {created}</footer>'
-        '</main></body></html>\n'
-    )
+        '</main></body></html>\n')
 
 
 def _summary(results: RunResults) -> str:
@@ -100,8 +99,7 @@ def _stops(metrics: dict[str, Any]) -> str:
     return ''.join(
         f'<h3>{title}</h3>{parts.record_table(metrics[group]["all"])}'
         for group, title in (('stop', 'Stops'), ('start', 'Starts'))
-        if metrics[group]['all']
-    )
+        if metrics[group]['all'])
 
 
 def _speeds(metrics: dict[str, Any]) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.foot_motion import foot_slip
 from dmp_cpg_ros.analysis.metrics.stops import STILL_SPEED
-from dmp_cpg_ros.analysis.motion import rotations, tilt
+from dmp_cpg_ros.analysis.motion import tilt, velocity_in_world
 from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording, taken
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 
@@ -122,8 +122,7 @@ def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float)
 
 
 def _deceleration(odometry: OdometrySeries) -> float:
-    R_world_base = rotations(odometry.quaternion)
-    velocity = np.einsum('nij,nj->ni', R_world_base, odometry.velocity_in_base)[:, :2]
+    velocity = velocity_in_world(odometry)[:, :2]
     rows = round(DECELERATION_WINDOW / float(np.diff(odometry.time).mean()))
     change = velocity[rows:] - velocity[:-rows]
     return float(np.hypot(*change.T).max() / DECELERATION_WINDOW)

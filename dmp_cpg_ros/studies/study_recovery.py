@@ -135,8 +135,7 @@ def _tick(run: LoopRun[WalkingLoop], seconds: float) -> None:
 def row(robot: str, up: bool, down: bool, falls: Sequence[Recovery]) -> tuple[str, ...]:
     """Cells of one robot's row."""
     stood = [fall for fall in falls if fall.stands]
-    rolls = [sum(fall.tries == n for fall in stood) for n in range(3)]
-    rolls.append(sum(fall.tries > 2 for fall in stood))
+    rolls = np.bincount([min(fall.tries, 3) for fall in stood], minlength=4)
     seconds = [fall.seconds for fall in stood]
     times = f'{np.median(seconds):.1f} / {max(seconds):.1f}' if seconds else '-'
     yes = ('no', 'yes')

@@ -125,8 +125,11 @@ def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
 
 def table(results: Results) -> str:
     """Markdown table: a row per gait, speed, cadence, leg and method, and one for each method."""
-    rows = [(*_labels(key), *_cells(StopSummary([outcome for _, outcome in group]), key[-1]))
-            for key, group in groupby(results, lambda result: _key(result[0]))]
+    rows = []
+    for key, group in groupby(results, lambda result: _key(result[0])):
+        labels = [f'{part:g}' if isinstance(part, float) else part for part in key]
+        of = StopSummary([outcome for _, outcome in group])
+        rows.append((*labels, *_cells(of, key[-1])))
     for method in METHODS:
         outcomes = [outcome for case, outcome in results if case.method == method]
         if outcomes:
@@ -136,11 +139,6 @@ def table(results: Results) -> str:
 
 def _key(case: StopCase) -> tuple[str, float, str, float, str]:
     return case.gait, case.speed, case.leg, case.cadence, case.method
-
-
-def _labels(key: tuple[str, float, str, float, str]) -> tuple[str, ...]:
-    gait, speed, leg, cadence, method = key
-    return gait, f'{speed:g}', leg, f'{cadence:g}', method
 
 
 def _cells(of: StopSummary, method: str) -> tuple[str, ...]:

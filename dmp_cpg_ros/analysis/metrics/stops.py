@@ -41,10 +41,7 @@ def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
     slowest = max(completed, key=lambda entry: float(entry['measured_s']), default={})
     return {
         **{key: slowest.get(key) for key in ('predicted_s', 'bound_s', 'measured_s')},
-        'count': len(entries),
-        'completed': len(completed),
-        'all': entries,
-    }
+        'count': len(entries), 'completed': len(completed), 'all': entries}
 
 
 def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[str, Any]:
@@ -55,12 +52,9 @@ def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[s
     end = stands_until(recording, at_rest.time, episode.end)
     window = (min(at_rest.time + REST_SETTLING, end), end)
     return {
-        **entry,
-        'rest_s': at_rest.time,
-        'rest_until_s': end,
+        **entry, 'rest_s': at_rest.time, 'rest_until_s': end,
         **_body_at_rest(recording, entry['request_s'], window),
-        **_feet_at_rest(recording, context, window),
-    }
+        **_feet_at_rest(recording, context, window)}
 
 
 def _start(recording: Recording, episode: Episode) -> dict[str, Any]:
@@ -80,12 +74,8 @@ def _times(episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
     if done is not None:
         measured = done.number('measured_s')
         measured = done.time - request if measured is None else measured
-    return {
-        'request_s': request,
-        'predicted_s': _first(episode, 'predicted_s'),
-        'bound_s': _first(episode, 'bound_s'),
-        'measured_s': measured,
-    }
+    return {'request_s': request, 'predicted_s': _first(episode, 'predicted_s'),
+            'bound_s': _first(episode, 'bound_s'), 'measured_s': measured}
 
 
 def _first(episode: Episode, key: str) -> float | None:
@@ -107,8 +97,7 @@ def _body_at_rest(
     return {
         'body_speed_at_rest_m_s': float(speed[rows].max()),
         'body_still_after_s': still_after if speed[rows][-1] < STILL_SPEED else None,
-        'displacement_m': float(np.hypot(*(end - start))),
-    }
+        'displacement_m': float(np.hypot(*(end - start)))}
 
 
 def _feet_at_rest(
@@ -118,7 +107,5 @@ def _feet_at_rest(
     if not rows.any():
         return {'feet_down_at_rest': None, 'least_foot_force_n': None}
     force = feet.force[rows]
-    return {
-        'feet_down_at_rest': bool((force > context.contact_force).all()),
-        'least_foot_force_n': float(force.min()),
-    }
+    return {'feet_down_at_rest': bool((force > context.contact_force).all()),
+            'least_foot_force_n': float(force.min())}
