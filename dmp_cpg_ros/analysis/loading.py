@@ -18,10 +18,8 @@ from dmp_cpg_ros.analysis.recording import (
     ArrivalSeries,
     CanonicalSeries,
     FootForceSeries,
-    ImuSeries,
     JointSeries,
     OdometrySeries,
-    PostureSeries,
     Recording,
     StatusEvent,
     VelocitySeries,
@@ -29,7 +27,7 @@ from dmp_cpg_ros.analysis.recording import (
 )
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
-from dmp_cpg_ros.layouts import CANONICAL_NAMES, SHIFT_NAMES
+from dmp_cpg_ros.layouts import CANONICAL_NAMES
 
 Array = NDArray[np.float64]
 Pairs = list[tuple[int, int]]
@@ -91,20 +89,13 @@ def _odometry(message: Any) -> tuple[float, ...]:
             *_xyz(twist.linear), *_xyz(twist.angular))
 
 
-def _imu(message: Any) -> tuple[float, ...]:
-    return (*_xyz(message.orientation), message.orientation.w,
-            *_xyz(message.angular_velocity), *_xyz(message.linear_acceleration))
-
-
-NAMED = ('joint_states', 'joint_targets', 'canonical_state', 'foot_contacts', 'posture_feedback',
-         'joint_work')
+NAMED = ('joint_states', 'joint_targets', 'canonical_state', 'foot_contacts', 'joint_work')
 """Topics of ``JointState``."""
 
 ROWS: dict[tuple[str, str], Callable[[Any], tuple[float, ...]]] = {
     ('reference', 'geometry_msgs/msg/TwistStamped'): lambda message: _twist(message.twist),
     ('odom', 'nav_msgs/msg/Odometry'): _odometry,
     ('estimated_odom', 'nav_msgs/msg/Odometry'): _odometry,
-    ('imu', 'sensor_msgs/msg/Imu'): _imu,
     ('cmd_vel', 'geometry_msgs/msg/TwistStamped'): lambda message: _twist(message.twist),
     ('cmd_vel', 'geometry_msgs/msg/Twist'): _twist,
 }
@@ -154,9 +145,7 @@ class _Collector:
             commands=VelocitySeries(*self._stacked('cmd_vel', (3,))),
             odometry=OdometrySeries(*self._stacked('odom', (3, 4, 3, 3))),
             estimate=OdometrySeries(*self._stacked('estimated_odom', (3, 4, 3, 3))),
-            imu=ImuSeries(*self._stacked('imu', (4, 3, 3))),
             feet=self._feet(),
-            posture=self._posture(),
             inhibition=self._changes('inhibition_state'),
             modes=self._changes('body_mode'),
             statuses={name: tuple(history)
@@ -186,11 +175,6 @@ class _Collector:
         if not time.size:
             time, values = self._named['foot_contacts'].table([f'{leg}_foot' for leg in LEGS])
         return FootForceSeries(time, values['effort'])
-
-    def _posture(self) -> PostureSeries:
-        time, values = self._named['posture_feedback'].table((*JOINT_NAMES, *SHIFT_NAMES))
-        shifts = values['position'][:, len(JOINT_NAMES):].reshape(-1, len(LEGS), 3)
-        return PostureSeries(time, values['effort'][:, :len(JOINT_NAMES)], shifts[:, :, :2])
 
     def _arrivals(self) -> ArrivalSeries:
         bag_ns, stamps = np.array(self._named['joint_states'].arrivals, dtype=np.int64

@@ -131,23 +131,6 @@ class OdometrySeries(Series):
 
 
 @dataclass(frozen=True)
-class ImuSeries(Series):
-    """Inertial measurements.
-
-    Attributes
-    ----------
-    quaternion : ndarray (n, 4)
-        x, y, z, w.
-    rate_in_base, acceleration_in_base : ndarray (n, 3)
-        [rad/s], [m/s^2]
-    """
-
-    quaternion: Array = no_rows(4)
-    rate_in_base: Array = no_rows(3)
-    acceleration_in_base: Array = no_rows(3)
-
-
-@dataclass(frozen=True)
 class FootForceSeries(Series):
     """Normal contact forces.
 
@@ -158,22 +141,6 @@ class FootForceSeries(Series):
     """
 
     force: Array = no_rows(N_LEGS)
-
-
-@dataclass(frozen=True)
-class PostureSeries(Series):
-    """What the posture controller asked of the legs.
-
-    Attributes
-    ----------
-    torque : ndarray (n, 12)
-        Feedback torques τ_fb [N m].
-    foot_shift_in_base : ndarray (n, 4, 2)
-        Shift of the foot placement in x and y [m].
-    """
-
-    torque: Array = no_rows(N_JOINTS)
-    foot_shift_in_base: Array = no_rows(N_LEGS, 2)
 
 
 @dataclass(frozen=True)
@@ -242,12 +209,8 @@ class Recording:
         The filtered reference and the commands as sent.
     odometry, estimate : OdometrySeries
         Body motion, and what the robot believes of it.
-    imu : ImuSeries
-        Inertial measurements.
     feet : FootForceSeries
         Contact forces.
-    posture : PostureSeries
-        Balance feedback.
     inhibition : tuple of StatusEvent
         ``inhibition_state`` where it changed.
     modes : tuple of StatusEvent
@@ -271,9 +234,7 @@ class Recording:
     commands: VelocitySeries = VelocitySeries()
     odometry: OdometrySeries = OdometrySeries()
     estimate: OdometrySeries = OdometrySeries()
-    imu: ImuSeries = ImuSeries()
     feet: FootForceSeries = FootForceSeries()
-    posture: PostureSeries = PostureSeries()
     inhibition: tuple[StatusEvent, ...] = ()
     modes: tuple[StatusEvent, ...] = ()
     statuses: Mapping[str, tuple[StatusEvent, ...]] = field(default_factory=dict)

@@ -29,8 +29,10 @@ LAYERS = {
     'layouts': ({'core'}, set()),
     'primitive_files': ({'core', 'configuration'}, {'numpy', 'yaml'}),
     'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml'}),
-    'nodes': ({'core', 'configuration', 'layouts', 'suite', 'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
-    'analysis': ({'core', 'paper', 'configuration', 'layouts', 'suite'}, {'numpy', *RECORDS, *FIGURES}),
+    'nodes': ({'core', 'configuration', 'layouts', 'suite', 'robot'},
+              {'numpy', 'yaml', *ROS, *RECORDS}),
+    'analysis': ({'core', 'paper', 'configuration', 'layouts', 'suite'},
+                 {'numpy', *RECORDS, *FIGURES}),
     'commands': ({'core', 'configuration', 'suite', 'primitive_files', 'robot', 'nodes',
                   'analysis'}, EVERYTHING),
     'studies': ({'core', 'paper', 'configuration', 'suite', 'primitive_files', 'robot', 'nodes',
@@ -100,7 +102,8 @@ def test_no_import_runs_in_a_circle() -> None:
 
 @pytest.mark.parametrize(('layers', 'unwanted'), [
     (['core', 'paper'], EVERYTHING - {'numpy'}),
-    (['configuration', 'layouts', 'suite', 'primitive_files', 'models', 'analysis'], ROS | {'mujoco'}),
+    (['configuration', 'layouts', 'suite', 'primitive_files', 'models', 'analysis'],
+     ROS | {'mujoco'}),
     (['robot'], ROS | RECORDS),
 ])
 def test_importing_a_layer_loads_nothing_that_it_must_do_without(
