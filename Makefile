@@ -61,8 +61,9 @@ ACTIVATED := . $(BIN)/activate &&
 
 STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
+FIGURE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery benchmark-walking doc-images bench lint install clean
+.PHONY: help demo test study-stops study-recovery benchmark-walking doc-images paper-figures bench lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -92,6 +93,9 @@ doc-images: $(INSTALLED) ## make the pictures of the README
 	cp $(addprefix build/doc_images/figures/,walking.png canonical_states.png footfall.png phase_portrait.png) doc/images/
 	$(ACTIVATED) python -m dmp_cpg_ros.commands.film build/doc_images doc/images/stop_and_start.gif \
 	  --start 12.5 --end 20.5 --fps 12.5 --width 480
+
+paper-figures: $(INSTALLED) ## draw the figures of the paper into build/paper_figures/ (FIGURE_ARGS=...)
+	$(ACTIVATED) python -m dmp_cpg_ros.studies.paper_figures --out build/paper_figures $(FIGURE_ARGS)
 
 bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.bench $(BENCH_ARGS)

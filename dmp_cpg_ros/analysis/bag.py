@@ -14,6 +14,7 @@ from typing import Any
 
 from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import Connection
+from rosbags.rosbag2 import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
@@ -34,8 +35,7 @@ def find_bag(path: Path | str) -> Path:
     path = Path(path)
     if not path.exists():
         raise MissingFileError(
-            f"'{path}' does not exist; name a rosbag2 folder or a run's folder with bag/ inside"
-        )
+            f"'{path}' does not exist; name a rosbag2 folder or a run's folder with bag/ inside")
     if path.is_file():
         if path.suffix in STORAGE_SUFFIXES:
             return path
@@ -62,7 +62,8 @@ def opened(bag: Path) -> Iterator[AnyReader]:
     Raises
     ------
     DataError
-        If the bag cannot be read, or a folder holds several that do not belong together.
+        If the bag cannot be read, also later, or a folder holds several that do not belong
+        together.
     """
     with ExitStack() as stack:
         try:
@@ -70,7 +71,15 @@ def opened(bag: Path) -> Iterator[AnyReader]:
         except DataError as damage:
             reader = _reader([_readable(file, bag, stack) for file in _parts(bag, damage)])
         stack.callback(reader.close)
-        yield reader
+        try:
+            yield reader
+        except (AnyReaderError, ReaderError, OSError) as error:
+            raise DataError(f"the bag '{bag}' is damaged: {error}") from error
+
+
+def base_name(topic: str) -> str:
+    """Topic without namespace."""
+    return topic.rsplit('/', 1)[-1]
 
 
 def decoded(
@@ -119,8 +128,7 @@ def _parts(bag: Path, damage: DataError) -> list[Path]:
     if len(files) > 1 and not all(numbers):
         raise DataError(
             f"'{bag}' holds {len(files)} recordings and no usable metadata.yaml that makes them "
-            f'one; name one of them: {", ".join(file.name for file in files)}'
-        )
+            f'one; name one of them: {", ".join(file.name for file in files)}')
     return files
 
 

@@ -7,11 +7,9 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from rosbags.highlevel import AnyReader, AnyReaderError
-from rosbags.rosbag2 import ReaderError
+from rosbags.highlevel import AnyReader
 
-from dmp_cpg_ros.analysis.bag import find_bag, opened
-from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.analysis.bag import base_name, find_bag, opened
 
 TOPICS = ('canonical_state', 'joint_states', 'joint_targets')
 SHARED_TOPIC = 'joint_targets'
@@ -40,24 +38,16 @@ def payload_digests(path: Path | str) -> dict[str, str]:
     MissingFileError, DataError
         If there is no readable bag.
     """
-    bag = find_bag(path)
     hashes: dict[str, hashlib._Hash] = {}
-    try:
-        with opened(bag) as reader:
-            used = [
-                connection
-                for connection in reader.connections
-                if connection.topic.rsplit('/', 1)[-1] in TOPICS
-            ]
-            for connection, _, raw in reader.messages(used) if used else ():
-                key = connection.topic.rsplit('/', 1)[-1]
-                if key == SHARED_TOPIC:
-                    key = f'{key}/{_leg(reader, raw, connection.msgtype)}'
-                elif key == WORDED_TOPIC:
-                    raw = _content(reader, raw, connection.msgtype)
-                hashes.setdefault(key, hashlib.sha256()).update(raw)
-    except (AnyReaderError, ReaderError, OSError) as error:
-        raise DataError(f"the bag '{bag}' is damaged: {error}") from error
+    with opened(find_bag(path)) as reader:
+        used = [c for c in reader.connections if base_name(c.topic) in TOPICS]
+        for connection, _, raw in reader.messages(used) if used else ():
+            key = base_name(connection.topic)
+            if key == SHARED_TOPIC:
+                key = f'{key}/{_leg(reader, raw, connection.msgtype)}'
+            elif key == WORDED_TOPIC:
+                raw = _content(reader, raw, connection.msgtype)
+            hashes.setdefault(key, hashlib.sha256()).update(raw)
     return {key: value.hexdigest() for key, value in sorted(hashes.items())}
 
 

@@ -59,12 +59,8 @@ def facts(metrics: Mapping[str, Any], lock_step: bool | None = None) -> list[Fac
         In the order of importance.
     """
     return [
-        *_decoding(metrics),
-        *_walking(metrics),
-        *_stops(metrics),
-        *_timing(metrics, lock_step),
-        *_certificate(metrics),
-    ]
+        *_decoding(metrics), *_walking(metrics), *_stops(metrics), *_timing(metrics, lock_step),
+        *_certificate(metrics)]
 
 
 def _decoding(metrics: Mapping[str, Any]) -> list[Fact]:
@@ -89,9 +85,7 @@ def _walking(metrics: Mapping[str, Any]) -> list[Fact]:
         Fact(
             f'Mean speed within {SPEED_TOLERANCE:.0%} of the reference wherever that was constant',
             'no such stretch' if error is None else f'largest error {error:.1%}',
-            None if error is None else error <= SPEED_TOLERANCE,
-        ),
-    ]
+            None if error is None else error <= SPEED_TOLERANCE),]
     if robot['cost_of_transport'] is not None:
         finding = f'{robot["cost_of_transport"]:.2f}, {COSTS[robot["cost_of_transport_from"]]}'
         found.append(Fact('Cost of transport', finding, None))
@@ -112,14 +106,12 @@ def _stops(metrics: Mapping[str, Any]) -> list[Fact]:
             done, count = metrics[word]['completed'], metrics[word]['count']
             found.append(Fact(f'Every {word} {end}', f'{done} of {count}', done == count))
             found.extend(_predictions(entries, 'rest' if word == 'stop' else 'walking'))
-    stops = metrics['stop']['all']
-    speeds = [entry.get('body_speed_at_rest_m_s') for entry in stops]
-    speeds = [speed for speed in speeds if speed is not None]
+    speeds = _known(metrics['stop']['all'], 'body_speed_at_rest_m_s')
     if speeds:
-        finding = f'at most {1e3 * max(speeds):.2g} mm/s'
-        found.append(Fact('The body stood still at rest', finding, max(speeds) < STILL_SPEED))
-    down = [entry.get('feet_down_at_rest') for entry in stops]
-    down = [entry for entry in down if entry is not None]
+        fastest = max(speed for speed, in speeds)
+        finding = f'at most {1e3 * fastest:.2g} mm/s'
+        found.append(Fact('The body stood still at rest', finding, fastest < STILL_SPEED))
+    down = [loaded for loaded, in _known(metrics['stop']['all'], 'feet_down_at_rest')]
     if down:
         finding = f'in {sum(down)} of {len(down)} stops'
         found.append(Fact('All four feet carried load at rest', finding, all(down)))
@@ -128,19 +120,23 @@ def _stops(metrics: Mapping[str, Any]) -> list[Fact]:
 
 def _predictions(entries: list[dict[str, Any]], aim: str) -> list[Fact]:
     found = []
-    pairs = [(entry['measured_s'], entry['predicted_s']) for entry in entries]
-    pairs = [pair for pair in pairs if None not in pair]
+    pairs = _known(entries, 'measured_s', 'predicted_s')
     if pairs:
         measured, predicted = max(pairs, key=lambda pair: float(abs(pair[0] - pair[1])))
         finding = f'{measured:.3f} s measured, {predicted:.3f} s predicted (worst case)'
         found.append(Fact(f'Time to {aim} against its prediction', finding, None))
-    pairs = [(entry['measured_s'], entry['bound_s']) for entry in entries]
-    pairs = [pair for pair in pairs if None not in pair]
+    pairs = _known(entries, 'measured_s', 'bound_s')
     if pairs:
         measured, bound = max(pairs, key=lambda pair: float(pair[0] / pair[1]))
         finding = f'{measured:.3f} s of {bound:.3f} s (nearest case)'
         found.append(Fact(f'Time to {aim} within its bound', finding, measured <= bound))
     return found
+
+
+def _known(entries: list[dict[str, Any]], *keys: str) -> list[tuple[Any, ...]]:
+    """Values of some keys of the entries that have all of them."""
+    rows = [tuple(entry.get(key) for key in keys) for entry in entries]
+    return [row for row in rows if None not in row]
 
 
 def _timing(metrics: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
@@ -155,22 +151,14 @@ def _timing(metrics: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
     latency = _number(timing['latency_ms_p50'], 'median {:.2f} ms')
     late = _number(timing['latency_ms_p99'], '99% {:.2f} ms')
     return [
-        Fact(
-            'The suite kept wall time',
-            f'real-time factor {factor:.3f}, {rate}',
-            kept,
-        ),
+        Fact('The suite kept wall time', f'real-time factor {factor:.3f}, {rate}', kept),
         Fact('Latency from state to last target', f'{latency}, {late}', None),
     ]
 
 
 def _certificate(metrics: Mapping[str, Any]) -> list[Fact]:
-    entries = metrics['certificate'] or []
-    holds = [
-        bool(entry['holds'])
-        for entry in entries
-        if isinstance(entry, dict) and 'holds' in entry and entry.get('required', True)
-    ]
+    holds = [bool(entry['holds']) for entry in metrics['certificate'] or []
+             if isinstance(entry, dict) and 'holds' in entry and entry.get('required', True)]
     if not holds:
         return []
     finding = f'{sum(holds)} of {len(holds)} required inequalities'

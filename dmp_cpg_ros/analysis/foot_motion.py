@@ -7,8 +7,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.motion import common_rows, rotations
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording, taken
+from dmp_cpg_ros.core.robot_model import world
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
@@ -35,26 +37,31 @@ def foot_slip(recording: Recording, robot: RobotDescription, contact_force: floa
     ndarray (4,) or None
         [m]; None where a topic is missing.
     """
-    joints, odometry, feet = recording.joints, recording.odometry, recording.feet
-    rows = common_rows(joints.time, odometry.time, feet.time)
+    rows = foot_rows(recording)
     if len(rows[0]) < 2:
         return None
-    time = joints.time[rows[0]]
-    R = rotations(odometry.quaternion[rows[1]])
+    joints, odometry = taken(recording.joints, rows[0]), taken(recording.odometry, rows[1])
+    R = rotations(odometry.quaternion)
     slips = []
     for i, leg in enumerate(robot.legs):
-        q, q_dot = (
-            series[rows[0], 3 * i : 3 * i + 3] for series in (joints.position, joints.velocity)
-        )
-        loaded = feet.force[rows[2], i] > contact_force
-        foot = odometry.position_in_world[rows[1]] + np.einsum(
-            'nij,nj->ni', R, feet_in_base(leg, q)
-        )
+        q, q_dot = (of[:, 3 * i : 3 * i + 3] for of in (joints.position, joints.velocity))
+        loaded = recording.feet.force[rows[2], i] > contact_force
+        foot = feet_in_world(leg, q, odometry)
         rate = np.einsum(
-            'nij,nj->ni', R, odometry.rate_in_base[rows[1]] + shank_rate_in_base(leg, q, q_dot)
-        )
-        slips.append(_slid(time, foot[:, :2], rate, loaded, leg.foot_radius))
+            'nij,nj->ni', R, odometry.rate_in_base + shank_rate_in_base(leg, q, q_dot))
+        slips.append(_slid(joints.time, foot[:, :2], rate, loaded, leg.foot_radius))
     return np.array(slips)
+
+
+def foot_rows(recording: Recording) -> list[NDArray[np.int64]]:
+    """Rows of joints, odometry and foot forces that bear the same stamps."""
+    return common_rows(recording.joints.time, recording.odometry.time, recording.feet.time)
+
+
+def feet_in_world(leg: LegGeometry, q: Array, odometry: OdometrySeries) -> Array:
+    """Places of a leg's foot, (n, 3) [m], of its joint angles (n, 3) and the base at each."""
+    return odometry.position_in_world + np.einsum(
+        'nij,nj->ni', rotations(odometry.quaternion), feet_in_base(leg, q))
 
 
 def feet_in_base(leg: LegGeometry, q: Array) -> Array:
@@ -79,3 +86,28 @@ def _slid(
     rolled = 0.5 * (rolling[1:] + rolling[:-1]) * np.diff(time)[:, None]
     steps = np.hypot(*(np.diff(foot_xy, axis=0) - rolled).T)
     return float(steps[loaded[1:] & loaded[:-1]].sum())
+
+
+def height_over_ground(odometry: OdometrySeries, context: RunContext) -> Array:
+    """Height of the base over the ground below its hips.
+
+    Parameters
+    ----------
+    odometry : OdometrySeries
+        The base's way.
+    context : RunContext
+        World and robot; without a robot the ground below the base's origin is taken.
+
+    Returns
+    -------
+    ndarray (n,)
+        [m]
+    """
+    place = odometry.position_in_world
+    if context.world.is_flat or not place.size:
+        return place[:, 2]
+    hips = np.zeros((1, 3))
+    if context.robot is not None:
+        hips = np.array([leg.hip_in_base for leg in context.robot.legs])
+    hips_in_world = place[:, None] + np.einsum('nij,lj->nli', rotations(odometry.quaternion), hips)
+    return world.height_over_ground(context.world, place, hips_in_world)

@@ -52,8 +52,7 @@ def gait_rows(recording: Recording, context: RunContext) -> list[GaitRow] | None
     try:
         return [
             GaitRow(slice(first, past), reader.read(frames[first]))
-            for first, past in zip(borders, borders[1:], strict=False)
-        ]
+            for first, past in zip(borders, borders[1:], strict=False)]
     except DataError:
         return None
 
@@ -85,8 +84,7 @@ def planned_stance(recording: Recording, context: RunContext) -> tuple[NDArray[n
     phi = phase(recording.canonical.x)
     speeds = [
         scale.foot_speed(*value)
-        for value in held(reference.time, reference.value, recording.canonical.time)
-    ]
+        for value in held(reference.time, reference.value, recording.canonical.time)]
     duty, position = np.empty(len(phi)), np.empty(phi.shape)
     for entry in found:
         duty[entry.rows] = [entry.gait.duty(speed, scale) for speed in speeds[entry.rows]]

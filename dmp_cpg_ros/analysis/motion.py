@@ -15,14 +15,10 @@ Array = NDArray[np.float64]
 def rotations(quaternion: Array) -> Array:
     """Rotation matrices R_world_base of quaternions x, y, z, w: (n, 4) → (n, 3, 3)."""
     x, y, z, w = quaternion.T
-    return np.stack(
-        [
-            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=-1),
-            np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=-1),
-            np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1),
-        ],
-        axis=-2,
-    )
+    rows = ((1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)))
+    return np.ascontiguousarray(np.moveaxis(np.array(rows), -1, 0))
 
 
 def roll_pitch_yaw(quaternion: Array) -> Array:
@@ -39,12 +35,17 @@ def tilt(quaternion: Array) -> Array:
     return np.arccos(np.clip(rotations(quaternion)[:, 2, 2], -1.0, 1.0))
 
 
+def velocity_in_world(odometry: OdometrySeries) -> Array:
+    """Velocity of the base, ndarray (n, 3) [m/s]."""
+    return np.einsum('nij,nj->ni', rotations(odometry.quaternion), odometry.velocity_in_base)
+
+
 def velocity_in_heading(odometry: OdometrySeries) -> Array:
     """Velocity of the base in the horizontal frame that turns with its yaw, ndarray (n, 3) [m/s].
 
     This is the frame in which v is commanded: pitching and rolling do not leak into it.
     """
-    v = np.einsum('nij,nj->ni', rotations(odometry.quaternion), odometry.velocity_in_base)
+    v = velocity_in_world(odometry)
     yaw = roll_pitch_yaw(odometry.quaternion)[:, 2]
     c, s = np.cos(yaw), np.sin(yaw)
     return np.stack([c * v[:, 0] + s * v[:, 1], -s * v[:, 0] + c * v[:, 1], v[:, 2]], axis=1)
@@ -86,6 +87,11 @@ def smoothed(time: Array, values: Array, window: float) -> Array:
     running = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
     width = (2 * half + 1).reshape(-1, *(1,) * (values.ndim - 1))
     return (running[index + half + 1] - running[index - half]) / width
+
+
+def root_mean_square(values: Array) -> list[float]:
+    """Root mean squares of the columns of (n, k)."""
+    return list(np.sqrt((values**2).mean(axis=0)).tolist())
 
 
 def common_rows(*times: Array) -> list[NDArray[np.int64]]:

@@ -18,33 +18,23 @@ UNITS = {'_m_s': 'm/s', '_s': 's', '_m': 'm', '_n': 'N'}
 """Endings of keys that name a unit."""
 
 
-def data_uri(png: Path) -> str:
-    """PNG file as a URI that carries the picture itself."""
-    return 'data:image/png;base64,' + base64.b64encode(png.read_bytes()).decode('ascii')
-
-
 def figure(png: Path, title: str, caption: str = '') -> str:
-    """Picture with title and caption."""
+    """Picture with title and caption; the URI carries the picture itself."""
+    data = base64.b64encode(png.read_bytes()).decode('ascii')
     words = f'<b>{escape(title)}.</b> {escape(caption)}' if caption else escape(title)
     return (
-        f'<figure><img alt="{escape(title)}" src="{data_uri(png)}">'
-        f'<figcaption>{words}</figcaption></figure>'
-    )
+        f'<figure><img alt="{escape(title)}" src="data:image/png;base64,{data}">'
+        f'<figcaption>{words}</figcaption></figure>')
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
     """Table of cells that are HTML already; the columns ``numbers`` are set to the right."""
     classes = [' class="number"' if index in numbers else '' for index in range(len(head))]
-    return _table(
-        ''.join(
-            f'<th scope="col"{kind}>{escape(name)}</th>'
-            for name, kind in zip(head, classes, strict=True)
-        ),
-        (
-            ''.join(f'<td{kind}>{cell}</td>' for cell, kind in zip(row, classes, strict=True))
-            for row in rows
-        ),
-    )
+    heads = (f'<th scope="col"{kind}>{escape(name)}</th>'
+             for name, kind in zip(head, classes, strict=True))
+    return _table(''.join(heads), (
+        ''.join(f'<td{kind}>{cell}</td>' for cell, kind in zip(row, classes, strict=True))
+        for row in rows))
 
 
 def fact_table(entries: Iterable[Fact]) -> str:
@@ -52,19 +42,15 @@ def fact_table(entries: Iterable[Fact]) -> str:
     rows = (
         f'<td>{escape(fact.statement)}</td><td>{escape(fact.finding)}</td>'
         f'<td class="mark {MARKS[fact.holds][0]}">{MARKS[fact.holds][1]}</td>'
-        for fact in entries
-    )
+        for fact in entries)
     return _table('<th scope="col">Statement</th><th scope="col">Found</th><th></th>', rows)
 
 
 def record_table(records: Sequence[Mapping[str, Any]]) -> str:
     """Records with their keys as columns, in the order in which the keys first appear."""
     keys = list(dict.fromkeys(key for record in records for key in record))
-    numbers = [
-        index
-        for index, key in enumerate(keys)
-        if all(_is_number(record.get(key)) for record in records)
-    ]
+    numbers = [index for index, key in enumerate(keys)
+               if all(_is_number(record.get(key)) for record in records)]
     rows = ([text(record.get(key)) for key in keys] for record in records)
     return table([label(key) for key in keys], rows, numbers)
 

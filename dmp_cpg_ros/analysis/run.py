@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,45 +13,14 @@ from dmp_cpg_ros.analysis.figures.catalogue import write_figures
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.pictures import Draw, write_pictures
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.analysis.report import ReportContents, write_report
+from dmp_cpg_ros.analysis.report import RunResults, render
 from dmp_cpg_ros.analysis.strict_json import plain, write_json
 
 
-@dataclass(frozen=True)
-class RunResults:
-    """What an analysis found and wrote.
-
-    Attributes
-    ----------
-    folder : Path
-        Where everything is.
-    metrics, manifest : dict
-        As in ``metrics.json`` and ``manifest.json``.
-    report : Path or None
-        None when no report was asked for.
-    figures : dict of str to Path
-        Figures by name.
-    pictures : dict of str to (Path, str)
-        Pictures and captions by name.
-    """
-
-    folder: Path
-    metrics: dict[str, Any]
-    manifest: dict[str, Any]
-    report: Path | None
-    figures: dict[str, Path] = field(default_factory=dict)
-    pictures: dict[str, tuple[Path, str]] = field(default_factory=dict)
-
-
 def write_results(
-    folder: Path,
-    recording: Recording,
-    context: RunContext,
-    manifest: Mapping[str, Any],
-    certificate: Sequence[Any] | None = None,
-    draw: Draw | None = None,
-    report: bool = True,
-) -> RunResults:
+        folder: Path, recording: Recording, context: RunContext, manifest: Mapping[str, Any],
+        certificate: Sequence[Any] | None = None, draw: Draw | None = None,
+        report: bool = True) -> RunResults:
     """Write everything that a run's folder holds besides its bag.
 
     Parameters
@@ -87,20 +55,10 @@ def write_results(
         return RunResults(folder, metrics, facts, None)
     figures = write_figures(recording, context, folder / 'figures')
     pictures = {} if draw is None else write_pictures(recording, context, folder / 'figures', draw)
-    path = folder / 'report.html'
-    write_report(
-        path,
-        ReportContents(
-            _title(context, facts),
-            _subtitle(recording, context, facts),
-            metrics,
-            facts,
-            figures,
-            pictures,
-            lock_step=facts.get('lock_step'),
-        ),
-    )
-    return RunResults(folder, metrics, facts, path, figures, pictures)
+    results = RunResults(folder, metrics, facts, folder / 'report.html', figures, pictures)
+    text = render(_title(context, facts), _subtitle(recording, context, facts), results)
+    (folder / 'report.html').write_text(text, encoding='utf-8')
+    return results
 
 
 def _title(context: RunContext, manifest: Mapping[str, Any]) -> str:

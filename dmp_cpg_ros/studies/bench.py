@@ -8,17 +8,14 @@ absolute times drift with the machine.
 
 from __future__ import annotations
 
-import argparse
 import sys
-import time
+import timeit
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph, Edges, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
@@ -32,6 +29,7 @@ from dmp_cpg_ros.paper.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
 from dmp_cpg_ros.paper.network import OscillatorNetwork
 from dmp_cpg_ros.paper.oscillators import HopfOscillators
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.output import parser_of, write_results
 from dmp_cpg_ros.suite import load_suite
 
 Array = NDArray[np.float64]
@@ -61,7 +59,11 @@ class Row:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure and print; returns the exit status."""
-    options = _parser().parse_args(arguments)
+    parser = parser_of('bench', __doc__, 'the tables', jobs=False)
+    parser.add_argument('--sizes', type=int, nargs='+', metavar='N',
+                        default=[10, 100, 1000, 3000, 10_000],
+                        help='numbers of oscillators (default: 10 100 1000 3000 10000)')
+    options = parser.parse_args(arguments)
     tables = {
         'One time step of four coupled oscillators (ratio: to the first row)': steps_of_four(),
         'A time step per oscillator (ratio: to 1,000 oscillators)': steps_of_many(options.sizes),
@@ -72,9 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'\n{title}')
         for row in rows:
             print(f'  {row.what.ljust(width)} {_text(row.seconds)} {row.ratio:8.2f}')
-    if options.json:
-        write_json(options.json, tables)
-        print(f'\nwrote {options.json}')
+    write_results(options.json, tables)
     return 0
 
 
@@ -150,19 +150,10 @@ def parts_of_a_tick() -> list[Row]:
 
 def seconds_of(what: Callable[[], object], repetitions: int = 7, least: float = 0.01) -> float:
     """Time of one call: the best of several repetitions of at least some seconds each."""
-    what()
-    calls, best = 1, float('inf')
-    while True:
-        start = time.perf_counter()
-        for _ in range(calls):
-            what()
-        elapsed = time.perf_counter() - start
-        if elapsed < least:
-            calls = max(calls + 1, int(1.5 * calls * least / max(elapsed, 1e-9)))
-            continue
-        best, repetitions = min(best, elapsed / calls), repetitions - 1
-        if repetitions == 0:
-            return best
+    timer, calls = timeit.Timer(what), 1
+    while (elapsed := timer.timeit(calls)) < least:
+        calls = max(calls + 1, int(1.5 * calls * least / max(elapsed, 1e-9)))
+    return min(timer.repeat(repetitions, calls)) / calls
 
 
 def _with_ratios(cases: Sequence[tuple[str, Callable[[], object]]]) -> list[Row]:
@@ -200,16 +191,6 @@ def _classical(of: CanonicalSystem, x: Array, gains: Array) -> Array:
 def _text(seconds: float) -> str:
     unit, scale = ('ns', 1e9) if seconds < 1e-6 else ('us', 1e6) if seconds < 1e-3 else ('ms', 1e3)
     return f'{scale * seconds:8.1f} {unit}'
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='bench', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--sizes', type=int, nargs='+', metavar='N',
-                        default=[10, 100, 1000, 3000, 10_000],
-                        help='numbers of oscillators (default: 10 100 1000 3000 10000)')
-    parser.add_argument('--json', type=Path, metavar='FILE', help='write the tables')
-    return parser
 
 
 if __name__ == '__main__':

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,50 +38,36 @@ def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> Re
     -------
     Recording
     """
-    time = _column(states, 'time_ns') * 1e-9
     robot = Recording(
-        joints=JointSeries(time, _column(states, 'joint_position'),
-                           _column(states, 'joint_velocity'), _column(states, 'joint_effort')),
-        odometry=OdometrySeries(
-            time, _column(states, 'base_position_in_world'), _column(states, 'base_quaternion'),
-            _column(states, 'base_velocity_in_base'), _column(states, 'base_rate_in_base')),
-        feet=FootForceSeries(time, _column(states, 'foot_force')),
-        work=_work(time, states))
+        joints=JointSeries(*_columns(
+            states, 'time_ns', 'joint_position', 'joint_velocity', 'joint_effort')),
+        odometry=OdometrySeries(*_columns(
+            states, 'time_ns', 'base_position_in_world', 'base_quaternion',
+            'base_velocity_in_base', 'base_rate_in_base')),
+        feet=FootForceSeries(*_columns(states, 'time_ns', 'foot_force')),
+        work=WorkSeries() if any(state.joint_work is None for state in states) else WorkSeries(
+            *_columns(states, 'time_ns', 'joint_work', 'joint_peak_effort')))
     if not ticks:
         return robot
-    time = _column(ticks, 'time_ns') * 1e-9
-    targets = [tick.targets for tick in ticks]
+    time, r, x, x_dot = _columns(ticks, 'time_ns', 'r', 'x', 'x_dot')
+    targets = _columns([tick.targets for tick in ticks], 'position', 'velocity', 'effort')
     return replace(
-        robot,
-        targets=JointSeries(time, _column(targets, 'position'), _column(targets, 'velocity'),
-                            _column(targets, 'effort')),
-        canonical=CanonicalSeries(time, _column(ticks, 'x'), _column(ticks, 'x_dot'),
-                                  tuple(tick.gait for tick in ticks)),
-        reference=VelocitySeries(time, _column(ticks, 'r')), inhibition=tuple(_events(ticks)),
-        modes=tuple(_modes(ticks)))
+        robot, targets=JointSeries(time, *targets),
+        canonical=CanonicalSeries(time, x, x_dot, tuple(tick.gait for tick in ticks)),
+        reference=VelocitySeries(time, r),
+        inhibition=_changes(time, [(tick.supervisor.word, {}) for tick in ticks]),
+        modes=_changes(time, [(tick.mode.mode, {'reason': tick.mode.reason}) for tick in ticks]))
 
 
-def _work(time: NDArray[np.float64], states: Sequence[RobotState]) -> WorkSeries:
-    if any(state.joint_work is None for state in states):
-        return WorkSeries()
-    return WorkSeries(time, _column(states, 'joint_work'), _column(states, 'joint_peak_effort'))
+def _columns(rows: Sequence[object], *names: str) -> list[NDArray[np.float64]]:
+    """Arrays of some attributes; times in seconds."""
+    return [np.array([getattr(row, name) for row in rows]) * (1e-9 if name == 'time_ns' else 1)
+            for name in names]
 
 
-def _column(rows: Sequence[object], name: str) -> NDArray[np.float64]:
-    return np.array([getattr(row, name) for row in rows])
-
-
-def _events(ticks: Sequence[Tick]) -> Iterable[StatusEvent]:
-    word = ''
-    for tick in ticks:
-        if tick.supervisor.word != word:
-            word = tick.supervisor.word
-            yield StatusEvent(tick.time_ns * 1e-9, 0, word, {})
-
-
-def _modes(ticks: Sequence[Tick]) -> Iterable[StatusEvent]:
-    mode = ''
-    for tick in ticks:
-        if tick.mode.mode != mode:
-            mode = tick.mode.mode
-            yield StatusEvent(tick.time_ns * 1e-9, 0, mode, {'reason': tick.mode.reason})
+def _changes(time: NDArray[np.float64], states: Sequence[tuple[str, dict[str, str]]]
+             ) -> tuple[StatusEvent, ...]:
+    """Words and values where the word changed."""
+    return tuple(StatusEvent(float(at), 0, word, values)
+                 for k, (at, (word, values)) in enumerate(zip(time, states, strict=True))
+                 if k == 0 or word != states[k - 1][0])

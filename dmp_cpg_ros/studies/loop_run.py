@@ -6,9 +6,17 @@ from __future__ import annotations
 
 from typing import Generic, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+
+Array = NDArray[np.float64]
+
+PUSH_DURATION = 0.1
+"""Time over which the impulse of a push is spread [s]."""
 
 Loop = TypeVar('Loop', bound=WalkingLoop)
 
@@ -53,6 +61,10 @@ class LoopRun(Generic[Loop]):
             self.state = self.robot.step(self.loop.tick(self.state).targets)
             self.states.append(self.state)
         return not self.fell()
+
+    def push(self, impulse: Array) -> None:
+        """Push the base by an impulse in the world (3,) [N s], from the next tick on."""
+        self.robot.apply_push(impulse / PUSH_DURATION, round(PUSH_DURATION * 1e9))
 
     def walk_until(self, time: float) -> bool:
         """Tick until a time from the start [s]; keep no states."""

@@ -36,9 +36,6 @@ SHORTEST_HOLD, LONGEST_HOLD, HOLD_AT_REST = 2.5, 12.0, 1.0
 SPEED_WINDOW = 2.0
 """Time at the end over which the resumed speed is averaged [s]."""
 
-PUSH_DURATION = 0.1
-"""Time over which the impulse of a push is spread [s]."""
-
 TimeBound = Callable[[FreezingLoop], float]
 """Bound on the time to rest of a loop in which a stop has just been requested [s]."""
 
@@ -139,8 +136,7 @@ class _Trial(LoopRun[FreezingLoop]):
     def stop(self, case: StopCase, time_bound: TimeBound | None) -> tuple[float, float, float]:
         """Request a stop and hold; return the predicted, bounded and measured time to rest [s]."""
         if case.push:
-            force = np.array((0.0, case.push / PUSH_DURATION, 0.0))
-            self.robot.apply_push(force, round(PUSH_DURATION * 1e9))
+            self.push(np.array((0.0, case.push, 0.0)))
         self.states = [self.state]
         if case.method != METHODS[0]:
             self.loop.freeze(case.method == 'finish_swing')

@@ -10,8 +10,6 @@ cannot be used.
 
 from __future__ import annotations
 
-import argparse
-import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -21,13 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_run import LoopRun
-from dmp_cpg_ros.studies.markdown_table import markdown_table
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.suite import load_suite
 
 OWN_ROBOT = 'robots/mini_quadruped.yaml'
@@ -66,7 +63,12 @@ class Recovery:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study and print its table; returns the exit status."""
-    options, _ = parse_arguments(_parser(), arguments)
+    parser = parser_of('study_recovery', __doc__, 'every fall and outcome')
+    parser.add_argument('robots', nargs='*', default=[OWN_ROBOT], metavar='ROBOT',
+                        help=f'robot files (default: {OWN_ROBOT})')
+    parser.add_argument('--seeds', type=int, default=50, metavar='N',
+                        help='falls of each robot (default: 50)')
+    options, _ = parse_arguments(parser, arguments)
     rows, outcomes, fine = [], {}, []
     try:
         with Pool(options.jobs) as pool:
@@ -80,9 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'study_recovery: {error}', file=sys.stderr)
         return 2
     print(markdown_table(COLUMNS, rows))
-    if options.json:
-        write_json(options.json, outcomes)
-        print(f'\nwrote {options.json}')
+    write_results(options.json, outcomes)
     return int(not fine[0])
 
 
@@ -136,27 +136,13 @@ def _tick(run: LoopRun[WalkingLoop], seconds: float) -> None:
 def row(robot: str, up: bool, down: bool, falls: Sequence[Recovery]) -> tuple[str, ...]:
     """Cells of one robot's row."""
     stood = [fall for fall in falls if fall.stands]
-    rolls = [sum(fall.tries == n for fall in stood) for n in range(3)]
-    rolls.append(sum(fall.tries > 2 for fall in stood))
+    rolls = np.bincount([min(fall.tries, 3) for fall in stood], minlength=4)
     seconds = [fall.seconds for fall in stood]
     times = f'{np.median(seconds):.1f} / {max(seconds):.1f}' if seconds else '-'
     yes = ('no', 'yes')
     return (Path(robot).stem, yes[up], yes[down], str(len(falls)),
             f'{len(stood)} ({100.0 * len(stood) / max(len(falls), 1):.0f} %)',
             ' / '.join(map(str, rolls)), times)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='study_recovery', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('robots', nargs='*', default=[OWN_ROBOT], metavar='ROBOT',
-                        help=f'robot files (default: {OWN_ROBOT})')
-    parser.add_argument('--seeds', type=int, default=50, metavar='N',
-                        help='falls of each robot (default: 50)')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
-                        help='processes (default: one per processor)')
-    parser.add_argument('--json', type=Path, metavar='FILE', help='write every fall and outcome')
-    return parser
 
 
 if __name__ == '__main__':

@@ -10,7 +10,6 @@ be used.
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -20,8 +19,7 @@ from math import pi
 from multiprocessing import Pool
 from pathlib import Path
 
-from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, summary
-from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary
 from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
@@ -29,7 +27,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.markdown_table import markdown_table
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.stop_trial import METHODS, StopCase, run_trials
 from dmp_cpg_ros.suite import Suite, load_gait, load_suite
 
@@ -57,9 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for case, outcome in results:
         if outcome.fell:
             print(f'\nfell: {case}', end='')
-    if options.json:
-        write_json(options.json, [asdict(case) | asdict(outcome) for case, outcome in results])
-        print(f'\nwrote {options.json}')
+    write_results(options.json, [asdict(case) | asdict(outcome) for case, outcome in results])
     return int(any(outcome.fell for case, outcome in results if case.method == METHODS[0]))
 
 
@@ -130,12 +126,15 @@ def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
 
 def table(results: Results) -> str:
     """Markdown table: a row per gait, speed, cadence, leg and method, and one for each method."""
-    rows = [(*_labels(key), *_cells(summary([outcome for _, outcome in group]), key[-1]))
-            for key, group in groupby(results, lambda result: _key(result[0]))]
+    rows = []
+    for key, group in groupby(results, lambda result: _key(result[0])):
+        labels = [f'{part:g}' if isinstance(part, float) else part for part in key]
+        of = StopSummary([outcome for _, outcome in group])
+        rows.append((*labels, *_cells(of, key[-1])))
     for method in METHODS:
         outcomes = [outcome for case, outcome in results if case.method == method]
         if outcomes:
-            rows.append(('all', '', '', '', method, *_cells(summary(outcomes), method)))
+            rows.append(('all', '', '', '', method, *_cells(StopSummary(outcomes), method)))
     return markdown_table(COLUMNS, rows)
 
 
@@ -143,25 +142,21 @@ def _key(case: StopCase) -> tuple[str, float, str, float, str]:
     return case.gait, case.speed, case.leg, case.cadence, case.method
 
 
-def _labels(key: tuple[str, float, str, float, str]) -> tuple[str, ...]:
-    gait, speed, leg, cadence, method = key
-    return gait, f'{speed:g}', leg, f'{cadence:g}', method
-
-
 def _cells(of: StopSummary, method: str) -> tuple[str, ...]:
-    def pair(values: tuple[float, float], scale: float, digits: int) -> str:
+    def pair(name: str, scale: float, digits: int) -> str:
+        values = of.spread(name)
         if values[0] != values[0]:
             return '-'
         return ' / '.join(f'{scale * value:.{digits}f}' for value in values)
 
-    exceeded = f'{of.bound_exceeded}/{of.bounded}' if of.bounded else '-'
-    walked_on = _share(of.walked_on, of.count) if method == METHODS[0] else '-'
-    return (str(of.count), str(of.fell), _share(of.standing, of.count),
-            walked_on, pair(of.prediction_error, 100.0, 1), exceeded,
-            pair(of.bound_s, 1.0, 2), pair(of.measured_s, 1.0, 2),
-            pair(of.body_rest_s, 1.0, 2), pair(of.slip_m, 1e3, 1),
-            pair(of.displacement_m, 1.0, 2), pair(of.tilt, 180.0 / pi, 1),
-            pair(of.deceleration, 1.0, 1))
+    bounded, count = of.number('bounded'), len(of.outcomes)
+    return (str(count), str(of.number('fell')), _share(of.number('standing'), count),
+            _share(of.number('walked_on'), count) if method == METHODS[0] else '-',
+            pair('prediction_error', 100.0, 1),
+            f"{of.number('bound_exceeded')}/{bounded}" if bounded else '-',
+            pair('bound_s', 1.0, 2), pair('measured_s', 1.0, 2), pair('body_rest_s', 1.0, 2),
+            pair('slip_m', 1e3, 1), pair('displacement_m', 1.0, 2), pair('tilt', 180.0 / pi, 1),
+            pair('deceleration', 1.0, 1))
 
 
 def _share(part: int, whole: int) -> str:
@@ -169,8 +164,7 @@ def _share(part: int, whole: int) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='study_stops', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of('study_stops', __doc__, 'every case and outcome')
     parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
     parser.add_argument('--phases', type=int, default=16, metavar='N',
                         help='request phases, evenly over a cycle (default: 16)')
@@ -186,9 +180,6 @@ def _parser() -> argparse.ArgumentParser:
                         help='lateral impulse in the instant of the request [N s] (default: 0)')
     parser.add_argument('--baselines', action='store_true',
                         help='also stop by freezing all phases, and by finishing every swing')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1, metavar='N',
-                        help='processes (default: one per processor)')
-    parser.add_argument('--json', type=Path, metavar='FILE', help='write every case and outcome')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
     return parser
 

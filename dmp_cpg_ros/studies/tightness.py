@@ -105,22 +105,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def rows(graphs: Sequence[str]) -> Iterator[Row]:
     """All lines of the table for some graphs."""
-    for graph in graphs:
-        yield synchronisation_row(graph)
-    for graph in graphs:
-        yield capture_row(graph)
-    for graph in graphs:
-        yield contraction_row(graph, OMEGA)
-    for graph in graphs:
-        yield replace(contraction_row(graph, 3.0), condition='contraction, slow gait')
-    for graph in graphs:
-        yield mismatch_row(graph)
-    for graph in graphs:
-        yield vote_row(graph)
-    for graph in graphs:
-        yield step_row(graph)
-    for graph in graphs:
-        yield rest_row(graph)
+    for make in (synchronisation_row, capture_row, contraction_row, slow_contraction_row,
+                 mismatch_row, vote_row, step_row, rest_row):
+        yield from map(make, graphs)
 
 
 def synchronisation_row(graph: str) -> Row:
@@ -140,7 +127,7 @@ def capture_row(graph: str) -> Row:
     return Row('capture', graph, f'k_inh [1/s] at k = {COUPLING[graph]:g}', certified, works)
 
 
-def contraction_row(graph: str, omega: float) -> Row:
+def contraction_row(graph: str, omega: float = OMEGA) -> Row:
     """Coupling gain for contraction under an inhibition that is more than strong enough."""
     gains = _held(3.0 * SIZE * omega / REGION)
 
@@ -153,6 +140,11 @@ def contraction_row(graph: str, omega: float) -> Row:
     works = threshold(lambda k: stops(network(graph, k, RHO), omega, gains, REGION, 6.0),
                       0.3 * needed, needed)
     return Row('contraction', graph, f'k [1/s] at omega = {omega:g}', needed, works)
+
+
+def slow_contraction_row(graph: str) -> Row:
+    """Return the same of a slow gait."""
+    return replace(contraction_row(graph, 3.0), condition='contraction, slow gait')
 
 
 def mismatch_row(graph: str) -> Row:

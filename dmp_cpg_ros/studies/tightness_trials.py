@@ -73,6 +73,11 @@ def threshold(works: Callable[[float], bool], failing: float, working: float,
     return working
 
 
+def _in_phase(system: CanonicalSystem, x: Array) -> NDArray[np.complex128]:
+    """States (4, 2) as complex numbers that are equal when every leg is in its place."""
+    return np.asarray((x[:, 0] - 1j * x[:, 1]) * np.exp(-1j * system.graph.phases))
+
+
 def synchronises(graph: str, coupling: float, rho: float, omega: float) -> bool:
     """Whether disagreement dies out from the state in which coupling is weakest.
 
@@ -86,7 +91,7 @@ def synchronises(graph: str, coupling: float, rho: float, omega: float) -> bool:
     x = np.stack([z.real, -z.imag], axis=1)
     for _ in range(600):
         x = system.step(x, omega, np.zeros(SIZE), 0.5 * STEP)
-    z = (x[:, 0] - 1j * x[:, 1]) * np.exp(-1j * system.graph.phases)
+    z = _in_phase(system, x)
     return bool(np.linalg.norm(z - z.mean()) < 1e-6)
 
 
@@ -113,7 +118,7 @@ def stays_together(system: CanonicalSystem, omega: float, mismatch: float,
         x = state_at(system.graph.phases)
         for _ in range(300):
             x = system.step(x, omegas, np.zeros(SIZE), STEP)
-        z = (x[:, 0] - 1j * x[:, 1]) * np.exp(-1j * system.graph.phases)
+        z = _in_phase(system, x)
         if np.ptp(np.angle(z / z[0])) > phase_spread:
             return False
     return True
@@ -151,5 +156,5 @@ def keeps_walking(system: CanonicalSystem, omega: float, step: float) -> bool:
     with np.errstate(over='ignore', invalid='ignore'):
         for _ in range(600):
             x = system.step(x, omega, np.zeros(SIZE), step)
-        z = (x[:, 0] - 1j * x[:, 1]) * np.exp(-1j * system.graph.phases)
+        z = _in_phase(system, x)
         return bool(np.abs(z - z[0]).max() < 1e-6 and np.all(np.abs(np.abs(z) - 1.0) < 0.2))

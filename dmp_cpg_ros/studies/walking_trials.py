@@ -44,9 +44,6 @@ MEASURED, MEASURED_WAY = 5.0, 2.0
 heading are averaged: over half a metre the sway of single steps would be taken for drift.
 """
 
-PUSH_DURATION = 0.1
-"""Time over which the impulse of a push is spread [s]."""
-
 RECOVERY = 3.0
 """Time for which the robot must stay on its feet after a push [s]."""
 
@@ -181,19 +178,24 @@ class PushCase:
     largest: float = 3.2
 
 
-def survived_pushes(case: PushCase, robot: str | None = None) -> tuple[float, ...]:
-    """Largest speed change Δv = J/m that is survived, per direction, by bisection [m/s].
+@dataclass(frozen=True)
+class PushOutcome:
+    """Largest speed change Δv = J/m that is survived in each of the directions [m/s]."""
+
+    speed_change: tuple[float, ...]
+
+
+def survived_pushes(case: PushCase, robot: str | None = None) -> PushOutcome:
+    """Look for the largest speed change that is survived, per direction, by bisection.
 
     Every impulse below it that the bisection tried was survived too; NaN where the robot fell
     before any push.
     """
     run = Walk(case.gait, robot)
-    if not (run.reach((case.speed, 0.0, 0.0)) and run.walk(3.0)):
-        return (nan,) * len(case.directions)
-    omega = run.loop.network.omega(run.loop.r)
-    if not run.walk(case.phase * 2.0 * pi / omega):
-        return (nan,) * len(case.directions)
-    return tuple(_largest(run, angle, case) for angle in case.directions)
+    upright = run.reach((case.speed, 0.0, 0.0)) and run.walk(3.0) and run.walk(
+        case.phase * 2.0 * pi / run.loop.network.omega(run.loop.r))
+    return PushOutcome(tuple(
+        _largest(run, angle, case) if upright else nan for angle in case.directions))
 
 
 def _largest(run: Walk, angle: float, case: PushCase) -> float:
@@ -212,9 +214,8 @@ def survives(run: Walk, angle: float, speed_change: float) -> bool:
     """
     after = deepcopy(run)
     yaw = float(roll_pitch_yaw(run.state.base_quaternion[None])[0, 2]) + angle
-    force = after.robot.description.mass * speed_change / PUSH_DURATION
-    after.robot.apply_push(np.array((force * cos(yaw), force * sin(yaw), 0.0)),
-                           round(PUSH_DURATION * 1e9))
+    impulse = after.robot.description.mass * speed_change
+    after.push(np.array((impulse * cos(yaw), impulse * sin(yaw), 0.0)))
     return after.walk(RECOVERY)
 
 
@@ -297,8 +298,8 @@ def relative_error(outcome: SteadyOutcome, velocity: Velocity) -> float:
     """
     if outcome.fell or isnan(outcome.velocity[0]):
         return nan
-    v_x, v_y, gamma = velocity
-    if hypot(v_x, v_y) == 0.0:
-        return abs(outcome.velocity[2] - gamma) / abs(gamma)
-    along = (outcome.velocity[0] * v_x + outcome.velocity[1] * v_y) / hypot(v_x, v_y)
-    return abs(along - hypot(v_x, v_y)) / hypot(v_x, v_y)
+    speed = hypot(*velocity[:2])
+    if speed == 0.0:
+        return abs(outcome.velocity[2] - velocity[2]) / abs(velocity[2])
+    along = float(np.dot(outcome.velocity[:2], velocity[:2])) / speed
+    return abs(along - speed) / speed

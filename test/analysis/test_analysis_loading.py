@@ -27,8 +27,7 @@ from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.recording import JointSeries, Recording, StatusEvent
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 
-SERIES = ('joints', 'targets', 'canonical', 'reference', 'odometry', 'estimate', 'imu', 'feet',
-          'posture')
+SERIES = ('joints', 'targets', 'canonical', 'reference', 'odometry', 'estimate', 'feet')
 
 
 @pytest.fixture(scope='module')
@@ -213,7 +212,7 @@ def test_a_copy_that_cannot_lie_beside_its_bag_is_temporary(
 
 
 def test_files_of_one_folder_are_separate_recordings(walked: Recording, tmp_path: Path) -> None:
-    less = dataclasses.replace(walked, imu=Recording().imu)
+    less = dataclasses.replace(walked, estimate=Recording().estimate)
     monday = written_file(walked, tmp_path / 'monday.mcap')
     tuesday = cut(written_file(less, tmp_path / 'tuesday.mcap'))
     before = contents(tmp_path)

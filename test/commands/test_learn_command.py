@@ -16,7 +16,6 @@ from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.paper.demonstrations import joint_angles, walking_joints
 from dmp_cpg_ros.primitive_files import load_primitive
-from dmp_cpg_ros.studies import bench_learning
 
 WALK, REACH = walking_joints(0.5, 2.6, dt=0.005), joint_angles(dt=0.004)
 EPOCH = 1_700_000_000
@@ -274,21 +273,3 @@ def test_help_answers_without_ros():
     )
     assert done.returncode == 0, done.stderr
     assert '--kind' in done.stdout
-
-
-def test_the_comparison_keeps_our_error_below_one_percent():
-    for name, (kind, demonstration) in bench_learning.demonstrations().items():
-        assert bench_learning.learn_ours(kind, demonstration, 25).errors.max() < 0.01, name
-
-
-def test_the_comparison_runs_without_the_other_library(monkeypatch):
-    monkeypatch.setitem(sys.modules, 'movement_primitives', None)
-    monkeypatch.setitem(sys.modules, 'movement_primitives.dmp', None)
-    rows = {
-        name: row
-        for name, row in bench_learning.demonstrations().items()
-        if name == 'minimum jerk'
-    }
-    text = bench_learning.table(rows, 10)
-    assert '– | –' in text
-    assert text.count('\n') == 2

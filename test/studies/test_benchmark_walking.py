@@ -15,7 +15,7 @@ import pytest
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport
 from dmp_cpg_ros.analysis.recording import WorkSeries
-from dmp_cpg_ros.studies.markdown_table import markdown_table
+from dmp_cpg_ros.studies.output import markdown_table
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.studies import benchmark_tables

@@ -87,22 +87,6 @@ def _messages(recording: Recording, stamped: bool) -> Iterator[tuple[int, str, s
             'canonical_state',
             *_joint_state(time, names, x.ravel(), x_dot.ravel(), np.array([])),
         )
-    names = [*JOINT_NAMES, *(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xy')]
-    posture = recording.posture
-    for time, torque, shift in zip(
-        posture.time, posture.torque, posture.foot_shift_in_base, strict=True
-    ):
-        yield (
-            _ns(time),
-            'posture_feedback',
-            *_joint_state(
-                time,
-                names,
-                np.concatenate([np.zeros(12), shift.ravel()]),
-                np.zeros(20),
-                np.concatenate([torque, np.zeros(8)]),
-            ),
-        )
     for row, time in enumerate(recording.targets.time):
         for leg in range(4):
             columns = slice(3 * leg, 3 * leg + 3)
@@ -132,12 +116,7 @@ def _messages(recording: Recording, stamped: bool) -> Iterator[tuple[int, str, s
 
 
 def _robot_messages(recording: Recording) -> Iterator[tuple[int, str, str, Any]]:
-    joints, odometry, imu, feet = (
-        recording.joints,
-        recording.odometry,
-        recording.imu,
-        recording.feet,
-    )
+    joints, odometry, feet = recording.joints, recording.odometry, recording.feet
     for row, time in enumerate(joints.time):
         yield (
             _ns(time),
@@ -157,22 +136,6 @@ def _robot_messages(recording: Recording) -> Iterator[tuple[int, str, str, Any]]
             _ns(time),
             'foot_contacts',
             *_joint_state(time, LEGS, np.array([]), np.array([]), force),
-        )
-    for row, time in enumerate(imu.time):
-        yield (
-            _ns(time),
-            'imu',
-            'sensor_msgs/msg/Imu',
-            make(
-                'sensor_msgs/msg/Imu',
-                header=_header(time, 'base_link'),
-                orientation=_quaternion(imu.quaternion[row]),
-                orientation_covariance=np.zeros(9),
-                angular_velocity=_vector(imu.rate_in_base[row]),
-                angular_velocity_covariance=np.zeros(9),
-                linear_acceleration=_vector(imu.acceleration_in_base[row]),
-                linear_acceleration_covariance=np.zeros(9),
-            ),
         )
     for row, time in enumerate(odometry.time):
         yield _ns(time), 'odom', 'nav_msgs/msg/Odometry', _odometry(odometry, row, time)

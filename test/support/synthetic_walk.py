@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.recording import (
     CanonicalSeries,
     FootForceSeries,
-    ImuSeries,
     JointSeries,
     OdometrySeries,
-    PostureSeries,
     Recording,
     StatusEvent,
     VelocitySeries,
@@ -203,7 +201,6 @@ class SyntheticWalk:
         force = stance * MASS * 9.81 / np.maximum(stance.sum(axis=1, keepdims=True), 1)
         effort = np.tile([0.5, -1.0, 6.0], 4) * np.repeat(stance, 3, axis=1)
         velocity = np.column_stack([speed, np.zeros((len(t), 2))])
-        gravity = np.tile([0.0, 0.0, 9.81], (len(t), 1))
         return Recording(
             joints=JointSeries(t, q, dq, effort),
             targets=JointSeries(t, q, dq, 0.1 * effort),
@@ -212,9 +209,7 @@ class SyntheticWalk:
             commands=self.commands(),
             odometry=OdometrySeries(t, position, quaternion, velocity, rate),
             estimate=self._estimate(position, yaw, velocity, rate),
-            imu=ImuSeries(t, quaternion, rate, gravity),
             feet=FootForceSeries(t, force),
-            posture=PostureSeries(t, 0.1 * effort, np.zeros((len(t), 4, 2))),
             inhibition=self.events(),
             statuses=self.statuses(),
         )

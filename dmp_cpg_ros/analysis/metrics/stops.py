@@ -8,9 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.analysis.body_modes import stands_until
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import RUNNING, STARTING, STOPPING, Episode, episodes
+from dmp_cpg_ros.analysis.episodes import (
+    RUNNING,
+    STARTING,
+    Episode,
+    episodes,
+    requested_stops,
+    stands_until,
+)
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 
 STILL_SPEED = 0.01
@@ -22,12 +28,7 @@ REST_SETTLING = 0.5
 
 def stop_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     """Group ``stop`` of ``metrics.json``: the slowest completed stop, and ``all``."""
-    entries = [
-        _stop(recording, context, episode)
-        for episode in episodes(recording, STOPPING)
-        if episode.events[0].message != 'at_rest'
-    ]
-    return _summary(entries)
+    return _summary([_stop(recording, context, stop) for stop in requested_stops(recording)])
 
 
 def start_metrics(recording: Recording) -> dict[str, Any]:
@@ -40,10 +41,7 @@ def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
     slowest = max(completed, key=lambda entry: float(entry['measured_s']), default={})
     return {
         **{key: slowest.get(key) for key in ('predicted_s', 'bound_s', 'measured_s')},
-        'count': len(entries),
-        'completed': len(completed),
-        'all': entries,
-    }
+        'count': len(entries), 'completed': len(completed), 'all': entries}
 
 
 def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[str, Any]:
@@ -54,23 +52,14 @@ def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[s
     end = stands_until(recording, at_rest.time, episode.end)
     window = (min(at_rest.time + REST_SETTLING, end), end)
     return {
-        **entry,
-        'rest_s': at_rest.time,
-        'rest_until_s': end,
+        **entry, 'rest_s': at_rest.time, 'rest_until_s': end,
         **_body_at_rest(recording, entry['request_s'], window),
-        **_feet_at_rest(recording, context, window),
-    }
+        **_feet_at_rest(recording, context, window)}
 
 
 def _start(recording: Recording, episode: Episode) -> dict[str, Any]:
-    walking = next(
-        (
-            event
-            for event in recording.inhibition
-            if event.time >= episode.end and event.message in RUNNING
-        ),
-        None,
-    )
+    walking = next((event for event in recording.inhibition
+                    if event.time >= episode.end and event.message in RUNNING), None)
     interrupted = walking is None or walking.time > episode.end
     return _times(episode, None if interrupted else walking)
 
@@ -85,12 +74,8 @@ def _times(episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
     if done is not None:
         measured = done.number('measured_s')
         measured = done.time - request if measured is None else measured
-    return {
-        'request_s': request,
-        'predicted_s': _first(episode, 'predicted_s'),
-        'bound_s': _first(episode, 'bound_s'),
-        'measured_s': measured,
-    }
+    return {'request_s': request, 'predicted_s': _first(episode, 'predicted_s'),
+            'bound_s': _first(episode, 'bound_s'), 'measured_s': measured}
 
 
 def _first(episode: Episode, key: str) -> float | None:
@@ -99,8 +84,7 @@ def _first(episode: Episode, key: str) -> float | None:
 
 
 def _body_at_rest(
-    recording: Recording, request: float, window: tuple[float, float]
-) -> dict[str, Any]:
+        recording: Recording, request: float, window: tuple[float, float]) -> dict[str, Any]:
     odometry = recording.odometry
     rows = (odometry.time >= window[0]) & (odometry.time < window[1])
     if not rows.any():
@@ -113,19 +97,15 @@ def _body_at_rest(
     return {
         'body_speed_at_rest_m_s': float(speed[rows].max()),
         'body_still_after_s': still_after if speed[rows][-1] < STILL_SPEED else None,
-        'displacement_m': float(np.hypot(*(end - start))),
-    }
+        'displacement_m': float(np.hypot(*(end - start)))}
 
 
 def _feet_at_rest(
-    recording: Recording, context: RunContext, window: tuple[float, float]
-) -> dict[str, Any]:
+        recording: Recording, context: RunContext, window: tuple[float, float]) -> dict[str, Any]:
     feet = recording.feet
     rows = (feet.time >= window[0]) & (feet.time < window[1])
     if not rows.any():
         return {'feet_down_at_rest': None, 'least_foot_force_n': None}
     force = feet.force[rows]
-    return {
-        'feet_down_at_rest': bool((force > context.contact_force).all()),
-        'least_foot_force_n': float(force.min()),
-    }
+    return {'feet_down_at_rest': bool((force > context.contact_force).all()),
+            'least_foot_force_n': float(force.min())}

@@ -1,0 +1,49 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the commands of the studies share: tables, options, files of results."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from dmp_cpg_ros.analysis.strict_json import write_json
+
+
+def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Markdown table with columns of even width, from headings and one cell per column."""
+    widths = [max(len(row[i]) for row in (columns, *rows)) for i in range(len(columns))]
+    rule = ['-' * width for width in widths]
+    return '\n'.join(
+        f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |"
+        for row in (columns, rule, *rows))
+
+
+def at_least_one(text: str) -> int:
+    """Type of an option that is a positive number."""
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError(f'{number} must be at least 1')
+    return number
+
+
+def parser_of(name: str, description: str | None, written: str, *, jobs: bool = True
+              ) -> argparse.ArgumentParser:
+    """Parser with the options ``--json``, for what is written, and ``--jobs``."""
+    parser = argparse.ArgumentParser(prog=name, description=description,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    if jobs:
+        parser.add_argument('--jobs', type=at_least_one, default=os.cpu_count() or 1, metavar='N',
+                            help='processes (default: one per processor)')
+    parser.add_argument('--json', type=Path, metavar='FILE', help=f'write {written}')
+    return parser
+
+
+def write_results(file: Path | None, results: Any) -> None:
+    """Write results as JSON, where a file was asked for."""
+    if file:
+        write_json(file, results)
+        print(f'\nwrote {file}')
