@@ -80,9 +80,9 @@ def read_motion(
     walked = next((frame for frame in canonical.frame if frame and '>' not in frame), 'amble')
     parameters = read_json(run / 'manifest.json').get('parameters') or {'gait': walked}
     context, _ = run_context(parameters, robot_file)
-    rows, at, attitude = common_rows(joints.time, canonical.time, recording.imu.time)
+    rows, at, attitude = common_rows(joints.time, canonical.time, recording.odometry.time)
     if not len(rows):
-        raise DataError(f"'{path}': no stamp has all of {topic}, canonical_state and imu")
+        raise DataError(f"'{path}': no stamp has all of {topic}, canonical_state and odom")
     missing = [JOINT_NAMES[j] for j in np.flatnonzero(np.isnan(joints.position[rows]).any(axis=0))]
     if missing:
         raise DataError(f"'{path}': {topic} lacks the joints {', '.join(missing)}")
@@ -96,7 +96,7 @@ def read_motion(
     angles = joints.position[rows]
     if topic == 'joint_targets':
         angles = _goals(times, angles, joints.velocity[rows], parameters)
-    up = rotations(recording.imu.quaternion[attitude])[:, 2]
+    up = rotations(recording.odometry.quaternion[attitude])[:, 2]
     feet: list[list[FootSamples]] = [[] for _ in context.robot.legs]
     for first, past in stretches(planned.steady):
         part = slice(int(np.searchsorted(times, times[first] + SETTLING)), past)
