@@ -78,7 +78,7 @@ def test_the_height_that_was_shown_is_played(motion_file):
         walk.loop.request(False)
         walk.loop.command(0.5)
         walk.go(4.0)
-        feet = [walk.loop.legs[0].kinematics.foot_in_base(tick.targets.position[:3])[2]
+        feet = [walk.loop.legs[0].primitive.kinematics.foot_in_base(tick.targets.position[:3])[2]
                 for tick in walk.ticks[-250:]]
         highest.append(float(np.ptp(feet)) / walk.robot.description.stance_height)
     assert highest[1] / highest[0] == pytest.approx(0.25 / 0.2, rel=0.08)
@@ -138,6 +138,6 @@ def test_another_package_offers_a_motion_by_an_entry_point(tmp_path, monkeypatch
     walk.loop.request(False)
     walk.loop.command(0.3)
     walk.go(3.0)
-    feet = [walk.loop.legs[0].kinematics.foot_in_base(tick.targets.position[:3])[2]
+    feet = [walk.loop.legs[0].primitive.kinematics.foot_in_base(tick.targets.position[:3])[2]
             for tick in walk.ticks[-250:]]
     assert np.ptp(feet) > 0.3 * walk.robot.description.stance_height

@@ -62,7 +62,7 @@ class Walk:
         description, gait, scale = (
             self.robot.description, self.loop.network.gait, self.loop.network.scale)
         feet = []
-        for i, leg in enumerate(self.loop.legs):
+        for i, leg in enumerate(control.primitive for control in self.loop.legs):
             rows, last = [], -round(seconds / 0.004)
             joints = slice(3 * i, 3 * i + 3)
             targets = [tick.targets for tick in self.ticks[last - 1 :]]
