@@ -11,24 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
-from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
-from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.gait.network import CanonicalParameters
-from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
-from dmp_cpg_ros.core.modes.body_mode import ModeParameters
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
 from dmp_cpg_ros.core.suite_parameters import (
-    CANONICAL,
-    INHIBITION,
-    REFERENCE,
+    PART_OF,
     GaitParameters,
     RobotFileParameters,
     RobotParameters,
@@ -36,8 +25,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
     chosen_world,
 )
-from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT, WALKING
+from dmp_cpg_ros.suite_table import CANONICAL, KINDS, ROBOT, WALKING
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""
@@ -143,19 +131,8 @@ def load_suite(
             )
     sets = {kind.name: node_sets(path, kind.name, overrides, namespace) for kind in WALKING}
     canonical, robot = sets[CANONICAL], sets[ROBOT]
-    parameters = SuiteParameters(
-        sets[REFERENCE][ReferenceParameters],
-        canonical[CanonicalParameters],
-        sets[INHIBITION][InhibitionParameters],
-        sets[LEG][LegParameters],
-        sets[POSTURE][PostureParameters],
-        sets[POSTURE][EstimationParameters],
-        sets[POSTURE][StateSourceParameters],
-        sets[INHIBITION][VoteSourceParameters],
-        sets[POSTURE][ModeParameters],
-        canonical[GaitChangeParameters],
-        canonical[GaitChoiceParameters],
-    )
+    parameters = SuiteParameters.of(
+        {part: sets[node][part] for node, parts in PART_OF.items() for part in parts})
     gait = canonical[GaitParameters]
     return Suite(
         parameters,

@@ -13,8 +13,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters, VotingSwitch
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingSwitch
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters

@@ -106,10 +106,10 @@ def certify_suite(suite: Suite, suggest: bool = False) -> Certified:
     p = suite.parameters
     network = GaitNetwork(p.canonical, suite.gait, body_scale(load_description(suite.robot_file)))
     running = (network, p.inhibition, p.reference, p.leg, p.posture, suite.tick_ns * 1e-9)
-    votes = votes_needed(network, p.inhibition,
+    votes = votes_needed(network, p.inhibition, p.voting,
                          operating_range(network, p.inhibition, p.reference))
-    suggestion = suggest_gains(*running) if suggest else None
-    return Certified(suite, certify(*running), suggestion, votes)
+    suggestion = suggest_gains(*running, p.voting) if suggest else None
+    return Certified(suite, certify(*running, voting=p.voting), suggestion, votes)
 
 
 def _report(certified: Certified, suggest: bool) -> list[str]:
@@ -147,13 +147,13 @@ def _table(inequalities: Sequence[Inequality]) -> list[str]:
 
 def _votes(certified: Certified) -> list[str]:
     """How many legs can stop the gait by their votes."""
-    votes, inhibition = certified.votes, certified.suite.parameters.inhibition
+    votes, voting = certified.votes, certified.suite.parameters.voting
     alone = ('certainly stops' if votes.certain == 1 else
              'may stop' if votes.powerless == 0 else 'cannot stop')
     needed = 'no number of legs is certain to be enough' if votes.certain is None else (
         f'votes needed: {votes.certain} of {len(LEGS)}')
     return [
-        f'voting is {"on" if inhibition.voting else "off"}; a full vote has the weight '
+        f'voting is {"on" if voting.voting else "off"}; a full vote has the weight '
         f'{votes.clamp.limit:.4g}, a gain of {votes.clamp.gain:.4g} 1/s: {needed}; '
         f'{votes.powerless} or fewer cannot stop the gait, one leg alone {alone} it',
         'gains of each from which 1, 2, ... votes certainly stop it: '

@@ -217,7 +217,7 @@ def _analyze(
 def _check_votes(scenario: Scenario, suite: Suite) -> None:
     """Raise ParameterError when a scenario votes where nobody counts."""
     votes = any(event.kind == 'votes' for event in scenario.events)
-    if votes and not suite.parameters.inhibition.voting:
+    if votes and not suite.parameters.voting.voting:
         raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
 
 
@@ -247,7 +247,8 @@ def _certificate(suite: Suite) -> Certificate:
     """Certificate of the parameters that the nodes will run with."""
     p = suite.parameters
     network = GaitNetwork(p.canonical, suite.gait, body_scale(load_description(suite.robot_file)))
-    return certify(network, p.inhibition, p.reference, p.leg, p.posture, suite.tick_ns * 1e-9)
+    return certify(network, p.inhibition, p.reference, p.leg, p.posture, suite.tick_ns * 1e-9,
+                   voting=p.voting)
 
 
 def _say(time_s: float, text: str) -> None:

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The suite without ROS: the same objects in the order of the nodes, tick by tick.
+"""The suite without ROS: the blocks of the diagram, tick by tick in the order of the nodes.
 
 For tuning, tests and studies. In lock-step the nodes publish the same numbers, bit for bit.
 """
@@ -9,49 +9,45 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.balance.controller import PostureController, PostureFeedback
-from dmp_cpg_ros.core.canonical.inhibition import (
-    Inhibition,
-    InhibitionParameters,
-    initial_inhibition,
-)
+from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.certificates.changes import refused_change
 from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
+from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.estimate import estimated_state
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE
 from dmp_cpg_ros.core.gait.choice import highest_speed
-from dmp_cpg_ros.core.gait.contact_feedback import ContactPhase, initial_contact_state
+from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
 from dmp_cpg_ros.core.gait.gait_reader import GaitReader
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.gait.running_network import RunningNetwork
+from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
-from dmp_cpg_ros.core.inhibition.vote_counter import VoteCounter
-from dmp_cpg_ros.core.inhibition.voting_sensors import vote_sensors
+from dmp_cpg_ros.core.inhibition.voters import vote_sensors
+from dmp_cpg_ros.core.inhibition.votes import VoteInbox
+from dmp_cpg_ros.core.inhibition.voting import Voting
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.updated import updated
-from dmp_cpg_ros.core.modes.body_command import BodyCommand
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.body_mode import ModeState
 from dmp_cpg_ros.core.modes.body_requests import REQUESTS
-from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
+from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceSystem
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.legs import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState
-from dmp_cpg_ros.core.transformation.leg import LegPrimitive, LegState, body_scale
+from dmp_cpg_ros.core.transformation.leg import body_scale
 
 Array = NDArray[np.float64]
 
@@ -107,54 +103,107 @@ class WalkingLoop:
     """
 
     def __init__(
-        self,
-        description: RobotDescription,
-        gait: Gait,
-        parameters: SuiteParameters | None = None,
+        self, description: RobotDescription, gait: Gait, parameters: SuiteParameters | None = None,
         gaits: Mapping[str, Gait] | None = None,
     ) -> None:
         """Build the parts at rest (or free, with ``start_inhibited`` false)."""
         self.parameters = p = parameters or SuiteParameters()
-        reader = GaitReader({**(gaits or {}), gait.name: gait}, unnamed=gait)
-        networks = GaitNetworks(p.canonical, body_scale(description), p.gait_change, reader)
-        self._running = RunningNetwork(networks, gait, p.gait_choice)
-        self.network = self._running.network
-        self.gate = CommandGate(p.reference, body_scale(description))
-        self.gate.highest_speed = highest_speed(p.gait_choice, gait.name, reader.named)
+        self._reader = reader = GaitReader({**(gaits or {}), gait.name: gait}, unnamed=gait)
+        scale, legs = body_scale(description), RobotLegs(description)
+        self._weight = description.mass * GRAVITY
+        self.gate = CommandGate(
+            p.reference, scale, highest_speed(p.gait_choice, gait.name, reader.named))
         self.reference = ReferenceSystem(p.reference)
-        self.supervisor = GaitSupervisor(p.inhibition, self.network, p.leg.activity_rate)
-        self.votes = VoteCounter(
-            p.inhibition, p.votes, self.network, p.reference, description.mass
-        )
-        known_legs = RobotLegs(description)
-        self.posture = PostureController(description, self.network.gait, p.posture, known_legs)
-        self.body = BodyControl(description, p.mode, known_legs)
-        self.legs = [LegPrimitive(leg, description, self.network.gait, p.leg) for leg in LEGS]
-        self.motions = [
-            LegMotion(slice(3 * i, 3 * i + 3), self.body.modes.movements, leg.transformation)
-            for i, leg in enumerate(self.legs)
-        ]
-        self.stop = self.supervisor.initial_state()
-        self.inhibition = self.supervisor.inhibition(self.stop)
-        self.r = np.zeros(3)
-        self.x = initial_canonical_state(self.network, p.inhibition)
-        self.posture_state = self.posture.initial_state()
+        self.canonical = RunningGait(p.canonical, scale, reader, p.gait_change, p.gait_choice,
+                                     quarter_weight(description))
+        self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
+        self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
+        self.inbox = VoteInbox()
         self.estimator = (
-            BodyEstimator(description, p.estimation, known_legs)
+            BodyEstimator(description, p.estimation, legs)
             if p.state_source.state_source == ESTIMATE
             else None
         )
+        self.body = BodyControl(description, p.posture, p.mode, legs)
+        self.legs = [LegControl(leg, description, p.leg, self.body.modes.movements)
+                     for leg in LEGS]
+        self._clock, self._dt = TickClock(), 0.004
+        self.r = np.zeros(3)
+        self.canon = self.canonical.initial_state(gait, p.inhibition)
+        self.stop = self.supervisor.initial_state()
+        self.inhibition = self.supervisor.inhibition(self.stop)
+        self.votes = self.voting.initial_state(self.network)
         self.estimator_state: EstimatorState | None = None
-        self.mode, self.barring = self.body.initial_state(), 'standing'
-        self.contact = (
-            ContactPhase(quarter_weight(description)) if p.canonical.contact_feedback else None
-        )
-        self.contact_state = initial_contact_state()
-        self.leg_states: list[LegState] = [leg.initial_state() for leg in self.legs]
-        self.motion_states: list[MotionState | None] = [None] * len(LEGS)
-        self._time_ns: int | None = None
-        self._dt = 0.004
-        self._body_command = BodyCommand()
+        self.posture = self.body.initial_state()
+        self.leg_states = [leg.initial_state() for leg in self.legs]
+        self._limits: ContactLimits | None = None
+        self._barring = 'standing'
+
+    def tick(self, state: RobotState) -> Tick:
+        """Run all parts on the robot's state of one tick.
+
+        Parameters
+        ----------
+        state : RobotState
+            Measured state with its stamp.
+
+        Returns
+        -------
+        Tick
+        """
+        dt = self._clock.step(state.time_ns)
+        self._dt = dt or self._dt
+        command, inhibition = self.gate.at(state.time_ns), self.inhibition
+        r_ext = np.array((0.0, 0.0, 0.0) if inhibition.requested else command)
+        self.r = r = self.reference.step(self.r, r_ext, dt)
+        self.canon = canon = self.canonical.step(
+            self.canon, r, inhibition, dt, state.foot_force, self._contact_limits(dt))
+        gait, x, x_dot, network = canon.gait, canon.x, canon.x_dot, self.network
+        self.posture, feedback = self.body.step(
+            self.posture, self._estimated(state), gait, x, x_dot, r, dt)
+        self._barring = self.mode.mode
+        self.votes = self.voting.step(
+            self.votes, state.time_ns, network, vote_sensors(state), x, r,
+            self.stop.word in ('walking', 'free'), self.inbox.take())
+        self.stop = self.supervisor.step(
+            self.stop, state.time_ns, network, x, x_dot, r, command, self.votes.tally,
+            self.mode.mode)
+        self.inhibition = self.supervisor.inhibition(self.stop)
+        targets = self._joint_targets(state, x_dot, feedback, dt)
+        return Tick(
+            state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait.word)
+
+    def _joint_targets(
+        self, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
+    ) -> JointTargets:
+        """Targets of all legs."""
+        legs = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
+        return JointTargets(*(
+            np.concatenate([getattr(leg, name) for leg in legs])
+            for name in ('position', 'velocity', 'effort')))
+
+    def _leg(
+        self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
+    ) -> JointTargets:
+        self.leg_states[i], targets = self.legs[i].step(
+            self.leg_states[i], self.canon.gait, self.x, x_dot, self.r, feedback,
+            state.joint_position, state.joint_velocity, dt)
+        return targets
+
+    @property
+    def network(self) -> GaitNetwork:
+        """The oscillators in the gait in force."""
+        return self.canonical.network(self.canon.gait)
+
+    @property
+    def x(self) -> Array:
+        """Canonical states, ndarray (4, 2)."""
+        return self.canon.x
+
+    @property
+    def mode(self) -> ModeState:
+        """What the body does."""
+        return self.posture.mode
 
     def command(self, v_x: float, v_y: float = 0.0, gamma: float = 0.0) -> None:
         """Command a velocity; acts from the next tick on. Raises DataError for values that are
@@ -167,19 +216,12 @@ class WalkingLoop:
 
         Raises DataError for a start while the robot does not stand.
         """
-        if not stop and self.barring != 'standing':
-            raise DataError(f'the gait cannot start: the robot is {self.barring}')
+        if not stop and self._barring != 'standing':
+            raise DataError(f'the gait cannot start: the robot is {self._barring}')
         self.stop = self.supervisor.request(self.stop, stop)
-        command = self.gate.at(self.stop.time_ns)
         return predict(
-            self.supervisor,
-            self.reference,
-            self.stop,
-            self.inhibition,
-            self.x,
-            self.r,
-            command,
-            self._dt,
+            self.supervisor, self.reference, self.stop, self.inhibition, self.network, self.x,
+            self.r, self.gate.at(self.stop.time_ns), self._dt,
         )
 
     def change(self, values: Mapping[str, Any]) -> str:
@@ -200,36 +242,48 @@ class WalkingLoop:
         ParameterError
             If a value is impossible.
         """
-        running, name = self._running, values.get('gait', self._running.wanted.name)
-        wanted = running.networks.reader.named(name)
-        present = self._described(self.parameters, running.wanted)
+        named, canon = self._reader.named, self.canon
+        wanted = named(values.get('gait', canon.wanted.name))
+        present = self._described(self.parameters, canon.wanted)
         proposed = self._described(present.changed(values).parameters, wanted)
         reason = refused_change(
-            proposed.parameters, (running.leading_to, running.wanted, wanted), present.scale,
-            self._dt,
-        )
+            proposed.parameters, (canon.leading_to, canon.wanted, wanted), present.scale, self._dt)
         if reason:
             return reason
         verdict = CertificateGate().judge(present, present.certificate(), proposed)
         if verdict.accepted:
             self.parameters = p = proposed.parameters
-            self._running.change(p.canonical, p.gait_change)
-            self._running.choice, self._running.wanted = p.gait_choice, wanted
-            self.gate.parameters = self.reference.parameters = p.reference
-            self.gate.highest_speed = highest_speed(
-                p.gait_choice, wanted.name, running.networks.reader.named)
-            self.supervisor.parameters = p.inhibition
-            self.votes.follow(p.inhibition, p.reference, p.votes)
-            if self.contact is not None:
-                self.contact.limits = verdict.certificate.contact
+            self.gate.follow(p.reference, highest_speed(p.gait_choice, wanted.name, named))
+            self.reference = ReferenceSystem(p.reference)
+            self.canonical = self.canonical.with_parameters(
+                p.canonical, p.gait_change, p.gait_choice)
+            self.canon = updated(canon, wanted=wanted)
+            self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
+            self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
+            self._limits = verdict.certificate.contact
         return verdict.reason
 
     def _described(self, parameters: SuiteParameters, gait: Gait) -> Running:
         """What a certificate is computed from."""
-        choice, named = parameters.gait_choice, self._running.networks.reader.named
-        others = [named(name) for name in choice.auto_gaits if choice.auto_gait]
-        return Running(parameters, gait, self.network.scale, self._dt,
+        choice = parameters.gait_choice
+        others = [self._reader.named(name) for name in choice.auto_gaits if choice.auto_gait]
+        return Running(parameters, gait, self.canonical.scale, self._dt,
                        tuple(other for other in others if other is not gait))
+
+    def _contact_limits(self, dt: float) -> ContactLimits | None:
+        """What contact feedback may do, computed at the second tick, which has a time step."""
+        if self._limits is None and dt > 0.0 and self.parameters.canonical.contact_feedback:
+            running = self._described(self.parameters, self.canon.wanted)
+            self._limits = running.certificate().contact
+        return self._limits
+
+    def _estimated(self, state: RobotState) -> RobotState:
+        """State of the robot as the posture block is to know it."""
+        if self.estimator is None:
+            return updated(state, foot_force=np.zeros(len(LEGS)))  # as odom, which has none
+        readings = readings_of(state)
+        self.estimator_state, estimate = self.estimator.step(self.estimator_state, readings)
+        return estimated_state(readings, estimate)
 
     def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
         """Vote for a stop, as the topic ``votes`` does; counts from the next tick on.
@@ -246,7 +300,10 @@ class WalkingLoop:
         DataError
             If a name or a number cannot be used.
         """
-        self.votes.box.accept(weights, voter)
+        self.inbox.accept(weights, voter)
+
+    def _request_mode(self, what: str, _: Any) -> str:
+        return self.request_mode(what)
 
     def request_mode(self, what: str) -> str:
         """Ask for ``stand_up``, ``lie_down`` or ``recover``, as the services do.
@@ -261,7 +318,7 @@ class WalkingLoop:
         DataError
             If it is refused.
         """
-        self.mode, answer = self.body.request(self.mode, what)
+        self.posture, answer = self.body.request(self.posture, what)
         if not answer.accepted:
             raise DataError(f'{what}: {answer.text}')
         return answer.text
@@ -280,160 +337,6 @@ class WalkingLoop:
             'inhibit': self.request,
             'set': self.change,
             'votes': lambda weights: self.vote(weights, 'scenario'),
-            **{what: self._asking(what) for what in REQUESTS},
+            **{what: partial(self._request_mode, what) for what in REQUESTS},
             'gait': self.change_gait,
         }
-
-    def _asking(self, what: str) -> Callable[[Any], Any]:
-        return lambda _: self.request_mode(what)
-
-    def tick(self, state: RobotState) -> Tick:
-        """Run all parts on the robot's state of one tick.
-
-        Parameters
-        ----------
-        state : RobotState
-            Measured state with its stamp.
-
-        Returns
-        -------
-        Tick
-        """
-        dt = 0.0 if self._time_ns is None else (state.time_ns - self._time_ns) * 1e-9
-        self._time_ns, self._dt = state.time_ns, dt or self._dt
-        command = self.gate.at(state.time_ns)
-        inhibition = self.inhibition
-        r_ext = np.array((0.0, 0.0, 0.0) if inhibition.requested else command)
-        self.r = self.reference.step(self.r, r_ext, dt)
-        self.x = self._running.begin_tick(self.x, self.r, inhibition, dt)
-        self._follow(self._running.network)
-        offset = self._contact_offset(state, inhibition, dt)
-        self.x = self._running.advance(self.x, self.r, inhibition, dt, offset)
-        self._follow(self._running.network)
-        x_dot = self.network.rate(self.x, self.r, inhibition, offset)
-        feedback = self._balance(self._body(state), x_dot, dt)
-        self.barring = self.mode.mode
-        ballot = self.votes.count(
-            state.time_ns, vote_sensors(state), self.network, self.x, self.r, self.stop.word
-        )
-        self.stop = self.supervisor.step(
-            self.stop, state.time_ns, self.x, x_dot, self.r, command, ballot, self.barring
-        )
-        self.inhibition = self.supervisor.inhibition(self.stop)
-        if feedback.mode != self._body_command.text:
-            self._body_command = BodyCommand.from_text(feedback.mode)
-        body = self._body_command
-        targets = [
-            self._leg(i, state, x_dot, feedback, dt)
-            if body.balanced
-            else self._moved_leg(i, state, body, feedback, dt)
-            for i in range(len(LEGS))
-        ]
-        return Tick(
-            state.time_ns,
-            self.r,
-            self.x,
-            x_dot,
-            self.stop,
-            feedback,
-            JointTargets(
-                np.concatenate([target.position for target in targets]),
-                np.concatenate([target.velocity for target in targets]),
-                np.concatenate([target.effort for target in targets]),
-            ),
-            self.mode,
-            self._running.word,
-        )
-
-    def _contact_offset(
-        self, state: RobotState, inhibition: Inhibition, dt: float
-    ) -> Array | float:
-        """Frequency offsets from the contacts, where these are fed back [rad/s]."""
-        if self.contact is None:
-            return 0.0
-        if self.contact.limits is None and dt > 0.0:
-            running = self._described(self.parameters, self._running.wanted)
-            self.contact.limits = running.certificate().contact
-        self.contact_state, offset = self.contact.step(
-            self.contact_state, state.foot_force, self.network, self.x, self.r, inhibition, dt
-        )
-        return offset
-
-    def _follow(self, network: GaitNetwork) -> None:
-        """Let all parts use the network that acts, and its gait."""
-        self.network = self.supervisor.network = network
-        self.posture.gait = network.gait
-        for leg in self.legs:
-            leg.gait = network.gait
-
-    def _body(self, state: RobotState) -> RobotState:
-        """State of the robot as the posture controller is to know it."""
-        if self.estimator is None:
-            return updated(state, foot_force=np.zeros(len(LEGS)))  # as odom, which has none
-        readings = readings_of(state)
-        self.estimator_state, estimate = self.estimator.step(self.estimator_state, readings)
-        return estimated_state(readings, estimate)
-
-    def _balance(self, state: RobotState, x_dot: Array, dt: float) -> PostureFeedback:
-        """Advance the body's mode, and balance where it stands."""
-        body = self.body
-        self.mode = body.step(
-            self.mode, state, self.x, x_dot, self.r, self.posture_state.activity
-        )
-        if not body.balances(self.mode):
-            self.posture_state = self.posture.initial_state()
-            return body.feedback(self.mode, state)
-        self.posture_state, feedback = self.posture.step(
-            self.posture_state, state, self.x, x_dot, self.r, dt
-        )
-        return body.labelled(self.mode, feedback)
-
-    def _leg(
-        self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float
-    ) -> JointTargets:
-        leg = self.legs[i]
-        self.motion_states[i] = None
-        self.leg_states[i], goal, goal_velocity = leg.step(
-            self.leg_states[i],
-            self.x[i],
-            x_dot[i],
-            self.r,
-            feedback.of_leg(i),
-            dt,
-        )
-        return self._targets(i, state, goal, goal_velocity, feedback)
-
-    def _moved_leg(
-        self, i: int, state: RobotState, body: BodyCommand, feedback: PostureFeedback, dt: float
-    ) -> JointTargets:
-        """Targets of a leg while the gait's primitive does not move it."""
-        joints = slice(3 * i, 3 * i + 3)
-        self.motion_states[i], self.leg_states[i], goal, goal_velocity = self.motions[i].step(
-            self.motion_states[i], self.leg_states[i], body, feedback.measured[joints], dt
-        )
-        return self._targets(i, state, goal, goal_velocity, feedback)
-
-    def _targets(
-        self, i: int, state: RobotState, goal: Array, goal_velocity: Array,
-        feedback: PostureFeedback,
-    ) -> JointTargets:
-        leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
-        measured = None
-        if leg.parameters.reading == 'torque':
-            measured = TransformationState(
-                state.joint_position[joints], state.joint_velocity[joints]
-            )
-        return leg.targets(
-            self.leg_states[i], goal, goal_velocity, feedback.torque[joints], measured
-        )
-
-
-def initial_canonical_state(network: GaitNetwork, parameters: InhibitionParameters) -> Array:
-    """States (4, 2) at which the oscillators start: at rest under inhibition, or in their
-    places.
-    """
-    return (
-        network.rest_state(initial_inhibition(parameters))
-        if parameters.start_inhibited
-        else (network.locked_state())
-    )

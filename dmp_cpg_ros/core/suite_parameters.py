@@ -7,16 +7,21 @@ Which node has which is said by :mod:`dmp_cpg_ros.suite_table`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, cast
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
+from dmp_cpg_ros.core.inhibition.voting_parameters import (
+    VoteSourceParameters,
+    VotingParameters,
+)
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -41,6 +46,15 @@ class SuiteParameters:
     mode: ModeParameters = field(default_factory=ModeParameters)
     gait_change: GaitChangeParameters = field(default_factory=GaitChangeParameters)
     gait_choice: GaitChoiceParameters = field(default_factory=GaitChoiceParameters)
+    voting: VotingParameters = field(default_factory=VotingParameters)
+
+    @classmethod
+    def of(cls, sets: Mapping[type[Parameters], Any]) -> SuiteParameters:
+        """Parameters of the parts from parameter sets by their class; defaults for what is not
+        among them.
+        """
+        given = ((part.name, sets.get(cast(Any, part.default_factory))) for part in fields(cls))
+        return cls(**{name: value for name, value in given if value is not None})
 
 
 @dataclass(frozen=True)
@@ -169,6 +183,7 @@ class CertificateParameters(Parameters):
 CERTIFIED: tuple[type[Parameters], ...] = (
     CanonicalParameters,
     InhibitionParameters,
+    VotingParameters,
     ReferenceParameters,
     LegParameters,
     PostureParameters,
@@ -189,6 +204,17 @@ REFERENCE, CANONICAL, INHIBITION = 'reference_filter', 'canonical_oscillators', 
 
 UNCERTIFIED_VOTES = ('vote_fade', 'vote_resume')
 """Parameters of the counting of votes that no inequality depends on."""
+
+PART_OF: dict[str, tuple[type[Parameters], ...]] = {
+    REFERENCE: (ReferenceParameters,),
+    CANONICAL: (CanonicalParameters, GaitChangeParameters, GaitChoiceParameters),
+    'leg_transformation': (LegParameters,),
+    INHIBITION: (InhibitionParameters, VotingParameters, VoteSourceParameters),
+    'posture_control': (
+        PostureParameters, EstimationParameters, StateSourceParameters, ModeParameters,
+    ),
+}
+"""Parameter sets of the part of the core that a node runs; others it declares for certificates."""
 
 VOTE_SOURCES = (
     'footing_weight',

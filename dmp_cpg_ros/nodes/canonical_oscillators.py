@@ -22,12 +22,9 @@ from dmp_cpg_ros.core.canonical.inhibition import (
 from dmp_cpg_ros.core.certificates.lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
-from dmp_cpg_ros.core.gait.contact_feedback import ContactPhase, initial_contact_state
 from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait.running_network import RunningNetwork
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
-from dmp_cpg_ros.core.loop import initial_canonical_state
 from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
@@ -38,7 +35,7 @@ from dmp_cpg_ros.core.suite_parameters import (
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, read_reference
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_changes import check_gait, take_gait
+from dmp_cpg_ros.nodes.gait_changes import check_gait
 from dmp_cpg_ros.nodes.gait_setup import certificate_words, description_of, gait_name
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionMessage, read_inhibition_state
 from dmp_cpg_ros.nodes.message_values import header_ns
@@ -62,13 +59,8 @@ class CanonicalOscillators(CertifiedNode):
         self.prepare_certificate()
         if not self.certificate.holds:
             self._without_certificate(self.certificate.explained())
-        self._running_network = RunningNetwork(
-            self.new_networks(),
-            self.gaits.named(gait_name(self)),
-            self.parameters_of(GaitChoiceParameters),
-        )
-        network = self._running_network.network
-        self._x = initial_canonical_state(network, inhibition)
+        self._canonical = self.new_running(quarter_weight(description_of(self)))
+        self._state = self._canonical.initial_state(self.gaits.named(gait_name(self)), inhibition)
         self._inhibition = initial_inhibition(inhibition)
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
@@ -98,18 +90,18 @@ class CanonicalOscillators(CertifiedNode):
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
-        running = self._running_network
-        running.change(
-            self.parameters_of(CanonicalParameters), self.parameters_of(GaitChangeParameters)
-        )
-        take_gait(
-            running, self.parameters_of(GaitParameters), self.parameters_of(GaitChoiceParameters)
-        )
+        choice = self.parameters_of(GaitChoiceParameters)
+        self._canonical = self._canonical.with_parameters(
+            self.parameters_of(CanonicalParameters), self.parameters_of(GaitChangeParameters),
+            choice)
+        if not choice.auto_gait:
+            self._state = self._canonical.want(
+                self._state, self.parameters_of(GaitParameters).gait)
 
     def check_parameters(self, sets: Sets) -> None:
         """Refuse a gait that there is not, and a change of gait that is not certified."""
         if self.configured:
-            check_gait(self._running_network, sets, self._accepted)
+            check_gait(self._canonical, self._state, sets, self._accepted)
         super().check_parameters(sets)
 
     def others_changed(self) -> None:
@@ -122,24 +114,23 @@ class CanonicalOscillators(CertifiedNode):
         """Advance the oscillators to the stamp of the reference."""
         dt = self.elapsed
         self._inhibition = values['inhibition_state'] or self._inhibition
-        r, running = values['reference'], self._running_network
-        self._x = running.begin_tick(self._x, r, self._inhibition, dt)
-        offset = self._contact_offset(stamp_ns, values, running.network, dt)
-        self._x = running.advance(self._x, r, self._inhibition, dt, offset)
-        x_dot = running.network.rate(self._x, r, self._inhibition, offset)
-        word = self._running_network.word
-        self._publisher.publish(self._writer.fill(stamp_ns, self._x, x_dot, word))
-        self._watch_phases(self._running_network.network, r, dt)
+        r = values['reference']
+        self._state = state = self._canonical.step(
+            self._state, r, self._inhibition, dt, self._foot_force(stamp_ns, values),
+            self.certificate.contact)
+        self._publisher.publish(
+            self._writer.fill(stamp_ns, state.x, state.x_dot, state.gait.word))
+        self._watch_phases(self._canonical.network(state.gait), r, dt)
 
     def _watch_phases(self, network: GaitNetwork, r: Any, dt: float) -> None:
         """Compare the phases with their bound; an alarm is published at once."""
         acting = self._inhibition.gains.any() and self._inhibition.acting_gains(
-            self._x, network.target
+            self._state.x, network.target
         ).any()
         former = LOCKED if self._lock is None else self._lock.level
         limits = self.certificate.contact
         own = 0.0 if limits is None else limits.own
-        self._lock = self._watch.step(self._lock, network, r, self._x, not acting, dt, own)
+        self._lock = self._watch.step(self._lock, network, r, self._state.x, not acting, dt, own)
         if self._lock.level > former:
             self.warn('phase_lock', self._lock.alarm, error=self._lock.level == LOST)
         elif self._lock.level == LOCKED != former:
@@ -147,11 +138,9 @@ class CanonicalOscillators(CertifiedNode):
 
     def _read_contacts(self) -> tuple[str, ...]:
         """Listen to the feet where they are fed back; returns the topics."""
-        self._contact: ContactPhase | None = None
         if not self.parameters_of(CanonicalParameters).contact_feedback:
             return ()
-        self._contact = ContactPhase(quarter_weight(description_of(self)))
-        self._contact_state, reader = initial_contact_state(), FootContactsReader(strict=False)
+        reader = FootContactsReader(strict=False)
         self.listen(
             'foot_contacts',
             lambda message: self._ticks.add(
@@ -160,18 +149,11 @@ class CanonicalOscillators(CertifiedNode):
         )
         return ('foot_contacts',)
 
-    def _contact_offset(
-        self, stamp_ns: int, values: dict[str, Any], network: GaitNetwork, dt: float
-    ) -> Array | float:
-        """Frequency offsets from the contacts of this tick; a lost message gives none [rad/s]."""
-        if self._contact is None:
-            return 0.0
-        feet, self._contact.limits = values['foot_contacts'], self.certificate.contact
-        force = feet[1] if feet and feet[0] == stamp_ns else np.full(len(LEGS), np.nan)
-        self._contact_state, offset = self._contact.step(
-            self._contact_state, force, network, self._x, values['reference'], self._inhibition, dt
-        )
-        return offset
+    @staticmethod
+    def _foot_force(stamp_ns: int, values: dict[str, Any]) -> Array:
+        """Forces of the feet at this tick; of a lost message none are known [N]."""
+        feet = values.get('foot_contacts')
+        return feet[1] if feet and feet[0] == stamp_ns else np.full(len(LEGS), np.nan)
 
     def _without_certificate(self, reason: str) -> None:
         """Refuse to walk without a certificate, or say loudly that nothing is guaranteed."""
@@ -188,9 +170,9 @@ class CanonicalOscillators(CertifiedNode):
         return {
             'phase_error_rad': nan if self._lock is None else self._lock.error,
             'phase_error_bound_rad': nan if self._lock is None else self._lock.bound,
-            'gait': self._running_network.word,
-            'gait_wanted': self._running_network.wanted.name,
-            'highest_speed': self._running_network.network.highest_speed,
+            'gait': self._state.gait.word,
+            'gait_wanted': self._state.wanted.name,
+            'highest_speed': self._canonical.network(self._state.gait).highest_speed,
             'certificate': certificate_words(self.certificate),
         }
 

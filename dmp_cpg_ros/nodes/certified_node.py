@@ -14,8 +14,6 @@ from typing import Any, cast
 
 from rclpy.parameter import Parameter
 
-from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import Certificate
 from dmp_cpg_ros.core.certificates.gate import (
     UNCERTIFIED,
@@ -26,8 +24,8 @@ from dmp_cpg_ros.core.certificates.gate import (
 )
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
-from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import (
@@ -39,7 +37,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     SuiteParameters,
     TickParameters,
 )
-from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale
+from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.nodes.conversions import read_twist
 from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
@@ -101,10 +99,11 @@ class CertifiedNode(ManagedNode):
         others = {node: names for node, names in CHANGEABLE.items() if node != self.KIND}
         self._follower = ParameterFollower(self, others, self.follow)
 
-    def new_networks(self) -> GaitNetworks:
-        """Networks of all gaits with the parameters in effect, without reading any file."""
-        return GaitNetworks(self.parameters_of(CanonicalParameters), self._scale,
-                            self.parameters_of(GaitChangeParameters), self.gaits)
+    def new_running(self, quarter: float = float('nan')) -> RunningGait:
+        """Canonical block of all gaits with the parameters in effect, without reading any file."""
+        return RunningGait(self.parameters_of(CanonicalParameters), self._scale, self.gaits,
+                           self.parameters_of(GaitChangeParameters),
+                           self.parameters_of(GaitChoiceParameters), quarter)
 
     def new_gate(self) -> CommandGate:
         """Gate of commands with the limits in effect."""
@@ -114,10 +113,9 @@ class CertifiedNode(ManagedNode):
 
     def limit(self, gate: CommandGate) -> None:
         """Let a gate of commands follow the limits in effect, those of the gait included."""
-        gate.parameters = self.parameters_of(ReferenceParameters)
-        gate.highest_speed = highest_speed(
+        gate.follow(self.parameters_of(ReferenceParameters), highest_speed(
             self.parameters_of(GaitChoiceParameters), self.parameters_of(GaitParameters).gait,
-            self.gaits.named)
+            self.gaits.named))
 
     def listen_to_commands(self, gate: CommandGate) -> None:
         """Let a gate take what comes on ``cmd_vel``."""
@@ -157,12 +155,8 @@ class CertifiedNode(ManagedNode):
         chosen = choice.auto_gaits if choice.auto_gait else ()
         names = names or (of(GaitParameters).gait, *chosen)
         gait, *others = [self.gaits.named(name) for name in dict.fromkeys(names)]
-        parameters = SuiteParameters(of(ReferenceParameters), of(CanonicalParameters),
-                                     of(InhibitionParameters), of(LegParameters),
-                                     of(PostureParameters), gait_change=of(GaitChangeParameters),
-                                     gait_choice=choice)
-        return Running(parameters, gait, self._scale, of(TickParameters).tick_ns * 1e-9,
-                       tuple(others))
+        return Running(SuiteParameters.of(sets), gait, self._scale,
+                       of(TickParameters).tick_ns * 1e-9, tuple(others))
 
     # Own changes -------------------------------------------------------------------------------
 

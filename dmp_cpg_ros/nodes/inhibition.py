@@ -15,6 +15,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.certificates.certify import Certificate
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
@@ -46,18 +47,13 @@ class InhibitionNode(CertifiedNode):
 
     def configure(self) -> None:
         """Build the supervisor and its topics and service."""
-        parameters, reference = (
-            self.parameters_of(InhibitionParameters),
-            self.parameters_of(ReferenceParameters),
-        )
         self.prepare_certificate()
         gaits = self.gaits
-        self._networks = self.new_networks()
-        network = self._networks.of(gaits.read(''))
-        self._supervisor = GaitSupervisor(
-            parameters, network, self.parameters_of(LegParameters).activity_rate
-        )
-        self._gate, self._reference = self.new_gate(), ReferenceSystem(reference)
+        self._running_gait = self.new_running()
+        self._network = self._running_gait.network(gaits.read(''))
+        self._supervisor = self._new_supervisor()
+        self._gate = self.new_gate()
+        self._reference = ReferenceSystem(self.parameters_of(ReferenceParameters))
         self._state = self._supervisor.initial_state()
         self._acting = self._supervisor.inhibition(self._state)
         self._x: Any = None
@@ -66,7 +62,7 @@ class InhibitionNode(CertifiedNode):
         self._told: tuple[Any, ...] = ()
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = InhibitionStateWriter(), self.publisher('inhibition_state')
-        self._votes = NodeVotes(self, network)
+        self._votes = NodeVotes(self, self._network)
         self._body_mode = 'standing'
         inputs = ('canonical_state', 'reference', *self._votes.inputs)
         self._ticks = self.match(
@@ -108,30 +104,35 @@ class InhibitionNode(CertifiedNode):
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
-        self._supervisor.parameters = self.parameters_of(InhibitionParameters)
+        self._supervisor = self._new_supervisor()
         self.limit(self._gate)
-        self._reference.parameters = self.parameters_of(ReferenceParameters)
-        self._networks = self.new_networks()
-        self._supervisor.network = self._networks.of(self._supervisor.network.gait)
+        self._reference = ReferenceSystem(self.parameters_of(ReferenceParameters))
+        self._running_gait = self.new_running()
+        self._network = self._running_gait.network(self._network.gait)
         self._votes.follow()
+
+    def _new_supervisor(self) -> GaitSupervisor:
+        return GaitSupervisor(
+            self.parameters_of(InhibitionParameters), self.parameters_of(VotingParameters),
+            self.parameters_of(LegParameters).activity_rate)
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the state of the stop to the stamp of the canonical state."""
         self._x, x_dot, gait = values['canonical_state']
         self._r = values['reference']
-        if gait is not self._supervisor.network.gait:
-            self._supervisor.network = self._networks.of(gait)
+        self._network = network = self._running_gait.network(gait)
         before = self._state
         self._body_mode = values['body_mode'] or self._body_mode
-        ballot = self._votes.count(stamp_ns, values, self._supervisor.network, before.word)
+        tally = self._votes.count(stamp_ns, values, network, before.word)
         self._state = self._supervisor.step(
             before,
             stamp_ns,
+            network,
             self._x,
             x_dot,
             self._r,
             self._gate.at(stamp_ns),
-            ballot,
+            tally,
             self._body_mode,
         )
         self._acting = self._supervisor.inhibition(self._state)
@@ -141,7 +142,7 @@ class InhibitionNode(CertifiedNode):
             self._publish()
 
     def _certificate_in_force(self) -> Certificate:
-        return self.certificate_in(self._supervisor.network.gait)
+        return self.certificate_in(self._network.gait)
 
     def _words(self) -> str:
         return certificate_words(self._certificate_in_force())
@@ -189,7 +190,7 @@ class InhibitionNode(CertifiedNode):
         self._state = self._supervisor.request(self._state, request.data)
         response.success = request.data == self._state.requested
         if not response.success:
-            response.message = f'held by votes: {self._state.ballot.cause}; ask again without them'
+            response.message = f'held by votes: {self._state.tally.cause}; ask again without them'
             return response
         if already:
             response.message = f'already {self._state.word}'
@@ -209,6 +210,7 @@ class InhibitionNode(CertifiedNode):
             self._reference,
             self._state,
             published,
+            self._network,
             self._x,
             self._r,
             self._gate.at(self._state.time_ns),
@@ -220,7 +222,7 @@ class InhibitionNode(CertifiedNode):
             certificate.time_to_rest if self._state.requested else certificate.time_to_walking
         )
         if self._state.voted:
-            self._bound = self._votes.bound(self._supervisor, self._state)
+            self._bound = self._votes.bound(self._supervisor, self._network, self._state)
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()

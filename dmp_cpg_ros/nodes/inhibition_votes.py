@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.ballot import Ballot
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
-from dmp_cpg_ros.core.inhibition.vote_counter import VoteCounter
-from dmp_cpg_ros.core.inhibition.voting_sensors import VoteSensors
+from dmp_cpg_ros.core.inhibition.voters import VoteSensors
+from dmp_cpg_ros.core.inhibition.votes import Tally, VoteInbox
+from dmp_cpg_ros.core.inhibition.voting import Voting
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -49,17 +50,17 @@ class NodeVotes:
 
     def __init__(self, node: ManagedNode, network: GaitNetwork) -> None:
         """Compute the clamp."""
-        of = node.parameters_of
-        self.counter = VoteCounter(of(InhibitionParameters), of(VoteSourceParameters), network,
-                                   of(ReferenceParameters), description_of(node).mass)
-        self.inputs: tuple[str, ...] = (CONTACTS, IMU) if self.counter.voting else ()
         self._node, self._contacts = node, FootContactsReader(strict=False)
+        self._weight, self.inbox = description_of(node).mass * GRAVITY, VoteInbox()
+        self.follow()
+        self._state = self.voting.initial_state(network)
+        self.inputs: tuple[str, ...] = (CONTACTS, IMU) if self.voting.voting.voting else ()
 
     def listen(self, ticks: TickInputs) -> None:
         """Listen to the sensors of the ticks, and to votes from outside."""
         if not self.inputs:
             return
-        box, node = self.counter.box, self._node
+        box, node = self.inbox, self._node
 
         def contacts(message: Any) -> None:
             stamp_ns = header_ns(message)
@@ -76,11 +77,11 @@ class NodeVotes:
     def follow(self) -> None:
         """Take over changed parameters."""
         of = self._node.parameters_of
-        self.counter.follow(of(InhibitionParameters), of(ReferenceParameters),
-                            of(VoteSourceParameters))
+        self.voting = Voting(of(InhibitionParameters), of(VotingParameters),
+                             of(VoteSourceParameters), of(ReferenceParameters), self._weight)
 
     def count(self, stamp_ns: int, values: dict[str, Any], network: GaitNetwork,
-              word: str) -> Ballot:
+              word: str) -> Tally:
         """Count the votes of a tick.
 
         Parameters
@@ -96,26 +97,28 @@ class NodeVotes:
 
         Returns
         -------
-        Ballot
+        Tally
         """
         nothing = np.full(3, np.nan)
         contact_ns, load = values.get(CONTACTS) or (stamp_ns, np.full(len(LEGS), np.nan))
         imu_ns, rate, force = values.get(IMU) or (stamp_ns, nothing, nothing)
         sensors = VoteSensors(contact_ns, imu_ns, load, rate, force)
         x, r = values['canonical_state'][0], values['reference']
-        return self.counter.count(stamp_ns, sensors, network, x, r, word)
+        self._state = self.voting.step(self._state, stamp_ns, network, sensors, x, r,
+                                       word in ('walking', 'free'), self.inbox.take())
+        return self._state.tally
 
     def news(self, state: SupervisorState) -> tuple[Any, ...]:
         """What is told when it changes."""
-        return state.voted, state.ballot.causes, state.ballot.weights.tobytes()
+        return state.voted, state.tally.causes, state.tally.weights.tobytes()
 
-    def bound(self, supervisor: GaitSupervisor, state: SupervisorState) -> float:
+    def bound(self, supervisor: GaitSupervisor, network: GaitNetwork, state: SupervisorState
+              ) -> float:
         """Bound on the time from now to rest under the votes [s]."""
         of, p = self._node.parameters_of, supervisor.parameters
         gains = supervisor.inhibition(replace(state, armed=True)).gains
         return vote_bound(
-            supervisor.network, gains, p.region_radius,
-            operating_range(supervisor.network, p, of(ReferenceParameters)),
+            network, gains, p.region_radius, operating_range(network, p, of(ReferenceParameters)),
             of(ReferenceParameters).alpha_r, supervisor.activity_rate,
             of(TickParameters).tick_ns * 1e-9)
 
@@ -123,9 +126,9 @@ class NodeVotes:
         """Values of ``inhibition_state`` about the votes."""
         if not self.inputs:
             return {}
-        ballot = state.ballot
+        tally = state.tally
         values: dict[str, Any] = {
             f'vote_{leg}': weight
-            for leg, weight in zip(LEGS, ballot.weights.tolist(), strict=True)
+            for leg, weight in zip(LEGS, tally.weights.tolist(), strict=True)
         }
-        return {**values, 'voted': state.voted, 'asked': state.asked, 'cause': ballot.cause}
+        return {**values, 'voted': state.voted, 'asked': state.asked, 'cause': tally.cause}

@@ -8,13 +8,13 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dmp_cpg_ros.core.modes.body_command import BodyCommand
-from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
+import numpy as np
+
+from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.modes.movements import Movements
-from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.core.suite_parameters import LegChoice
-from dmp_cpg_ros.core.transformation.joint_system import TransformationState
-from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive
+from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.conversions import (
     CanonicalStateReader,
     JointTargetsWriter,
@@ -24,10 +24,13 @@ from dmp_cpg_ros.nodes.conversions import (
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, gait_reader
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import Array, frame_of, header_ns
+from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 from dmp_cpg_ros.suite_table import KINDS, LEG
+
+NO_JOINTS = (np.full(len(JOINT_NAMES), np.nan),) * 3
+"""Measured joints where they are not read."""
 
 
 class LegTransformation(ManagedNode):
@@ -48,18 +51,9 @@ class LegTransformation(ManagedNode):
     def configure(self) -> None:
         """Build the leg's primitive and its topics."""
         leg, parameters = self.parameters_of(LegChoice).leg, self.parameters_of(LegParameters)
-        self._place = LEGS.index(leg)
-        self._joints = slice(
-            len(JOINTS_OF_LEG) * self._place, len(JOINTS_OF_LEG) * (self._place + 1)
-        )
         gaits, description = gait_reader(self), description_of(self)
-        self._primitive = LegPrimitive(leg, description, gaits.read(''), parameters)
-        self._motion = LegMotion(
-            self._joints, Movements(description), self._primitive.transformation
-        )
-        self._motion_state: MotionState | None = None
-        self._body = BodyCommand()
-        self._state = self._primitive.initial_state()
+        self._leg = LegControl(leg, description, parameters, Movements(description))
+        self._state = self._leg.initial_state()
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
         inputs = ['canonical_state', 'reference', 'posture_feedback']
         canonical, feedback = CanonicalStateReader(), PostureFeedbackReader()
@@ -98,48 +92,21 @@ class LegTransformation(ManagedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the leg to the stamp of the canonical state."""
-        dt = self.elapsed
-        feedback, joints = values['posture_feedback'], self._joints
-        if feedback.mode != self._body.text:
-            self._body = BodyCommand.from_text(feedback.mode)
-        if self._body.balanced:
-            goal, goal_velocity = self._walk(values, dt)
-        else:
-            self._motion_state, self._state, goal, goal_velocity = self._motion.step(
-                self._motion_state, self._state, self._body, feedback.measured[joints], dt
-            )
-        measured = None
-        if 'joint_states' in values:
-            position, velocity, _ = values['joint_states']
-            measured = TransformationState(position[joints], velocity[joints])
-        targets = self._primitive.targets(
-            self._state, goal, goal_velocity, feedback.torque[joints], measured
-        )
+        x, x_dot, gait = values['canonical_state']
+        position, velocity, _ = values.get('joint_states', NO_JOINTS)
+        self._state, targets = self._leg.step(
+            self._state, gait, x, x_dot, values['reference'], values['posture_feedback'], position,
+            velocity, self.elapsed)
+        follow_gait(self, gait)
         self._publisher.publish(self._writer.fill(stamp_ns, targets))
-
-    def _walk(self, values: dict[str, Any], dt: float) -> tuple[Array, Array]:
-        """Advance the gait's primitive; returns its goals."""
-        self._motion_state = None
-        x, x_dot, self._primitive.gait = values['canonical_state']
-        follow_gait(self, self._primitive.gait)
-        feedback = values['posture_feedback']
-        self._state, goal, goal_velocity = self._primitive.step(
-            self._state,
-            x[self._place],
-            x_dot[self._place],
-            values['reference'],
-            feedback.of_leg(self._place),
-            dt,
-        )
-        return goal, goal_velocity
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Which leg, and how much it swings."""
         return {
-            'leg': LEGS[self._place],
-            'activity': self._state.activity,
-            'body_mode': self._body.mode,
-            'movement': self._body.movement or 'none',
+            'leg': self.parameters_of(LegChoice).leg,
+            'activity': self._state.leg.activity,
+            'body_mode': self._state.command.mode,
+            'movement': self._state.command.movement or 'none',
         }
 
 

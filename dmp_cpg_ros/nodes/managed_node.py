@@ -19,6 +19,7 @@ from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
+from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.nodes.interfaces import Interface, interface, partners
 from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, SuitePublisher
 from dmp_cpg_ros.nodes.parameterized_node import ParameterizedNode
@@ -26,9 +27,6 @@ from dmp_cpg_ros.nodes.readiness import missing_connections
 from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
 from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
 from dmp_cpg_ros.nodes.tick_inputs import TickInputs, drain
-
-LONGEST_GAP_S = 1.0
-"""Time between two ticks that is made up at most [s]: a false stamp may claim any."""
 
 
 class ManagedNode(ParameterizedNode):
@@ -175,7 +173,7 @@ class ManagedNode(ParameterizedNode):
 
     def match(self, inputs: Sequence[str], trigger: str, **options: Any) -> TickInputs:
         """Make a :class:`~dmp_cpg_ros.nodes.tick_inputs.TickInputs` that runs :meth:`on_tick`."""
-        self._last_ns = -1
+        self._clock_of_ticks = TickClock()
         return TickInputs(self._run_tick, inputs, trigger, **options)
 
     def begin_tick(self, stamp_ns: int) -> None:
@@ -196,9 +194,7 @@ class ManagedNode(ParameterizedNode):
             self.report(periodic=True)
 
     def _run_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
-        last, self._last_ns = self._last_ns, stamp_ns
-        gap = (stamp_ns - last) * 1e-9 if 0 <= last < stamp_ns else 0.0
-        self.elapsed = min(gap, LONGEST_GAP_S)
+        self.elapsed = self._clock_of_ticks.step(stamp_ns)
         self.begin_tick(stamp_ns)
         self.on_tick(stamp_ns, values)
         self.end_tick()

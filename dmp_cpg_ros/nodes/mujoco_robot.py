@@ -17,9 +17,9 @@ from rclpy.clock_type import ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from dmp_cpg_ros.configuration import find_config
-from dmp_cpg_ros.core.canonical.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.modes.body_command import BALANCED
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
+from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.body_mode import ModeParameters
@@ -48,13 +48,11 @@ class PostureControl(ManagedNode):
         gaits, canonical = gait_reader(self), CanonicalStateReader()
         description = description_of(self)
         legs = RobotLegs(description)
-        self._controller = PostureController(
-            description, gaits.read(''), self.parameters_of(PostureParameters), legs
-        )
         self._body = BodyState(self, description, legs)
-        self._memory = self._controller.initial_state()
-        self._modes = BodyControl(description, self.parameters_of(ModeParameters), legs)
-        self._mode, self._told = self._modes.initial_state(), ''
+        self._control = BodyControl(
+            description, self.parameters_of(PostureParameters),
+            self.parameters_of(ModeParameters), legs)
+        self._state, self._told = self._control.initial_state(), ''
         self._mode_writer, self._mode_publisher = BodyModeWriter(), self.publisher('body_mode')
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
@@ -87,40 +85,31 @@ class PostureControl(ManagedNode):
 
     def on_parameters(self) -> None:
         """Take over the gains."""
-        self._controller.parameters = self.parameters_of(PostureParameters)
+        self._control = self._control.with_posture(self.parameters_of(PostureParameters))
         self._body.on_parameters()
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Compute the feedback for the stamp of the canonical state."""
-        dt = self.elapsed
         state = self._body.state(stamp_ns, values)
-        x, x_dot, self._controller.gait = values['canonical_state']
-        follow_gait(self, self._controller.gait)
-        r, modes = values['reference'], self._modes
-        self._mode = modes.step(self._mode, state, x, x_dot, r, self._memory.activity)
-        if modes.balances(self._mode):
-            self._memory, feedback = self._controller.step(self._memory, state, x, x_dot, r, dt)
-            feedback = modes.labelled(self._mode, feedback)
-        else:
-            self._memory, feedback = (
-                self._controller.initial_state(),
-                modes.feedback(self._mode, state),
-            )
+        x, x_dot, gait = values['canonical_state']
+        follow_gait(self, gait)
+        self._state, feedback = self._control.step(
+            self._state, state, gait, x, x_dot, values['reference'], self.elapsed)
         self._publisher.publish(self._writer.fill(stamp_ns, feedback))
-        if self._lock_step or self._mode.mode != self._told:
+        if self._lock_step or self._state.mode.mode != self._told:
             self._tell()
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """What the body does and why, and what the estimator found out."""
-        condition = self._mode.condition
+        condition = self._state.mode.condition
         measured = {} if condition is None else {
             'tilt': condition.tilt,
             'height': condition.height,
             'support': condition.support,
         }
         return {
-            'body_mode': self._mode.mode,
-            'reason': self._mode.reason,
+            'body_mode': self._state.mode.mode,
+            'reason': self._state.mode.reason,
             **measured,
             **self._body.diagnostic_values(),
         }
@@ -133,7 +122,7 @@ class PostureControl(ManagedNode):
                 response.success = False
                 response.message = f'posture_control is {self.state_label}, not active'
                 return response
-            self._mode, given = self._modes.request(self._mode, what)
+            self._state, given = self._control.request(self._state, what)
             response.success, response.message = given.accepted, given.text
             return response
 
@@ -141,8 +130,8 @@ class PostureControl(ManagedNode):
 
     def _tell(self) -> None:
         """Publish the mode; a new one is logged, a fall is an error until it is over."""
-        self._mode_publisher.publish(self._mode_writer.fill(self._mode))
-        mode, reason = self._mode.mode, self._mode.reason
+        self._mode_publisher.publish(self._mode_writer.fill(self._state.mode))
+        mode, reason = self._state.mode.mode, self._state.mode.reason
         if mode == self._told:
             return
         if self._told:

@@ -59,7 +59,7 @@ class ReferenceFilter(CertifiedNode):
     def on_parameters(self) -> None:
         """Take over limits and rates."""
         self.limit(self._gate)
-        self._system.parameters = self.parameters_of(ReferenceParameters)
+        self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""

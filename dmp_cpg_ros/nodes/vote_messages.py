@@ -16,7 +16,7 @@ def read_votes(message: JointState) -> tuple[dict[str, float], str]:
     ------
     DataError
         If names and numbers do not match; what the names and numbers say is checked by
-        :meth:`~dmp_cpg_ros.core.inhibition.vote_box.VoteBox.accept`.
+        :meth:`~dmp_cpg_ros.core.inhibition.votes.VoteInbox.accept`.
     """
     names = list(message.name)
     weights = message.effort or message.position

@@ -76,7 +76,7 @@ def hopf_tube(oscillator: AndronovHopf, omega: float, disturbance: float
         The smallest annulus around the cycle that the disturbed state cannot leave; None for both
         when the disturbance can push the state through the origin.
     """
-    rho, r = oscillator.rho, oscillator.radius
+    rho, r = float(oscillator.rho), float(oscillator.radius)
     # ρ(r² − s²)s = w̄ between its maximum at r/√3 and r; −ρ(r² − s²)s = w̄ beyond r.
     roots = np.sort(np.roots([1.0, 0.0, -r * r, disturbance / rho]).real)
     if disturbance >= rho * 2.0 * r**3 / (3.0 * 3.0**0.5):

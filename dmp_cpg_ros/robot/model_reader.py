@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.foot_load import rolling_radius
@@ -29,7 +30,6 @@ from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_f
 
 Vector = NDArray[np.float64]
 
-GRAVITY = 9.81  # [m/s^2]
 STANCE_LEG_SHARE = 0.7  # distance hip-foot over leg length when the model has no usable home pose
 USUAL_VELOCITY_LIMIT = 30.0  # [rad/s] Unitree Go1's published figure, for models that say nothing
 GAIN_OVER_WEIGHT = 1.7  # kp / (m g L); gives 60 N m/rad for 9 kg and legs of 0.4 m

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.modes.postures import lying_posture
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
@@ -18,7 +19,6 @@ from dmp_cpg_ros.robot.port import steps_per_tick
 
 Vector = NDArray[np.float64]
 
-GRAVITY = 9.81  # [m/s^2]
 CONTACT_HEIGHT = 0.002  # [m] over the lowest foot within which a foot counts as standing
 
 

@@ -120,7 +120,8 @@ def parts_of_a_tick() -> list[Row]:
     x, r, dt, zero = loop.x, loop.r, suite.tick_ns * 1e-9, np.zeros(3)
     x_dot = loop.network.rate(x, r, loop.inhibition)
     stopping = loop.supervisor.request(loop.stop, True)
-    leg, command = loop.legs[0], (0.5, 0.0, 0.0)
+    leg, command = loop.legs[0].primitive, (0.5, 0.0, 0.0)
+    network, gait = loop.network, loop.canon.gait
     estimator = BodyEstimator(robot.description, suite.parameters.estimation)
     known, readings = loop.estimator_state, readings_of(state)
     asked = LegFeedback(state.joint_position[:3], zero, zero[:2], zero)
@@ -135,12 +136,15 @@ def parts_of_a_tick() -> list[Row]:
         ('reference', lambda: loop.reference.step(r, zero, dt)),
         ('oscillators', lambda: loop.network.step(x, r, loop.inhibition, dt)),
         ('state of the stop', lambda: loop.supervisor.step(
-            loop.stop, loop.stop.time_ns, x, x_dot, r, command)),
+            loop.stop, loop.stop.time_ns, network, x, x_dot, r, command)),
         ('estimate of the body', lambda: estimator.step(known, readings)),
-        ('balance', lambda: loop.posture.step(loop.posture_state, state, x, x_dot, r, dt)),
-        ('one leg', lambda: leg.step(loop.leg_states[0], x[0], x_dot[0], r, asked, dt)),
+        ('balance', lambda: loop.body.posture.step(
+            loop.posture.balance, state, gait, x, x_dot, r, dt)),
+        ('one leg', lambda: leg.step(
+            loop.leg_states[0].leg, gait, x[0], x_dot[0], r, asked, dt)),
         ('prediction of a stop', lambda: predict(
-            loop.supervisor, loop.reference, stopping, loop.inhibition, x, r, command, dt)),
+            loop.supervisor, loop.reference, stopping, loop.inhibition, network, x, r, command,
+            dt)),
     ])
 
 

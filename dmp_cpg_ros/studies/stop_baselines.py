@@ -48,21 +48,20 @@ class FreezingLoop(WalkingLoop):
         """Run all parts on the robot's state of one tick, as :meth:`WalkingLoop.tick`."""
         if self._frozen is None:
             return super().tick(state)
-        dt = 0.0 if self._time_ns is None else (state.time_ns - self._time_ns) * 1e-9
-        self._time_ns = state.time_ns
+        dt = self._clock.step(state.time_ns)
         self.stop = replace(self.stop, time_ns=state.time_ns)
         self.r = self.reference.step(self.r, np.zeros(3), dt)
         self._frozen = self._frozen | ~(self._finish_swing & self._swinging())
         omega = np.where(self._frozen, 0.0, self.network.omega(self.r))
         radius = np.hypot(self.x[:, 0], self.x[:, 1])
-        self.x = state_at(phase(self.x) + omega * dt, radius)
-        x_dot = omega[:, None] * (self.x @ phase_generator().T)
-        self.posture_state, feedback = self.posture.step(self.posture_state, state, self.x, x_dot,
-                                                         self.r, dt)
-        targets = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
-        return Tick(state.time_ns, self.r, self.x, x_dot, self.stop, feedback, JointTargets(
-            *(np.concatenate([getattr(target, name) for target in targets])
-              for name in ('position', 'velocity', 'effort'))), self.mode)
+        x = state_at(phase(self.x) + omega * dt, radius)
+        x_dot = omega[:, None] * (x @ phase_generator().T)
+        self.canon = replace(self.canon, x=x, x_dot=x_dot)
+        balance, feedback = self.body.posture.step(
+            self.posture.balance, state, self.canon.gait, x, x_dot, self.r, dt)
+        self.posture = replace(self.posture, balance=balance)
+        targets = self._joint_targets(state, x_dot, feedback, dt)
+        return Tick(state.time_ns, self.r, x, x_dot, self.stop, feedback, targets, self.mode)
 
     def _swinging(self) -> NDArray[np.bool_]:
         """Which legs are in the swing of their cycle, (4,)."""
@@ -75,12 +74,12 @@ class FreezingLoop(WalkingLoop):
         """Targets of one leg: those of its primitive, or those that it froze with."""
         if self._frozen is None or not self._frozen[i]:
             return super()._leg(i, state, x_dot, feedback, dt)
-        leg, joints = self.legs[i], slice(3 * i, 3 * i + 3)
-        position, zero = self.leg_states[i].joints.position, np.zeros(3)
-        held = TransformationState(position, zero)
-        self.leg_states[i] = replace(self.leg_states[i], joints=held)
+        leg, joints = self.legs[i].primitive, self.legs[i].joints
+        position, zero = self.leg_states[i].leg.joints.position, np.zeros(3)
+        held = replace(self.leg_states[i].leg, joints=TransformationState(position, zero))
+        self.leg_states[i] = replace(self.leg_states[i], leg=held)
         measured = None
         if leg.parameters.reading == 'torque':
             measured = TransformationState(state.joint_position[joints],
                                            state.joint_velocity[joints])
-        return leg.targets(self.leg_states[i], position, zero, feedback.torque[joints], measured)
+        return leg.targets(held, position, zero, feedback.torque[joints], measured)

@@ -99,7 +99,7 @@ def _bound_of(file: str | None, leg: str, gait: str, cadence: float) -> float:
     p = suite.parameters
     network = GaitNetwork(p.canonical, load_gait(gait).scaled(cadence), scale)
     return certify(network, p.inhibition, p.reference, p.leg, p.posture,
-                   suite.tick_ns * 1e-9).time_to_rest
+                   suite.tick_ns * 1e-9, voting=p.voting).time_to_rest
 
 
 def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:

@@ -131,7 +131,7 @@ def stop_times(graph: str, phases: int = 12) -> tuple[float, float]:
     gait = GaitNetwork(CanonicalParameters(coupling_graph=graph), load_gait('amble'),
                        BodyScale(0.28, 0.22))
     bound = certify(gait, p.inhibition, p.reference, p.leg, p.posture, tick).time_to_rest
-    supervisor = GaitSupervisor(p.inhibition, gait, p.leg.activity_rate)
+    supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
     fastest = np.array([p.reference.max_speed, p.reference.max_lateral_speed,
                         p.reference.max_turn_rate])
     walking = replace(supervisor.initial_state(), word='walking', requested=False, armed=False,
@@ -139,7 +139,7 @@ def stop_times(graph: str, phases: int = 12) -> tuple[float, float]:
     published = supervisor.inhibition(walking)
     slowest = max(
         predict(supervisor, ReferenceSystem(p.reference), supervisor.request(walking, True),
-                published, gait.locked_state(float(phi)), fastest, (0.0, 0.0, 0.0), tick)
+                published, gait, gait.locked_state(float(phi)), fastest, (0.0, 0.0, 0.0), tick)
         for phi in np.linspace(0.0, 2.0 * np.pi, phases, endpoint=False))
     return bound, slowest
 

@@ -23,7 +23,7 @@ from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario, main
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.inhibition.vote_box import VoteBox
+from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, ReferenceWriter
@@ -179,7 +179,7 @@ def test_votes_are_read_by_name_from_effort_or_position() -> None:
     (JointState(name=['fl'], effort=[-1.0]), 'at least 0'),
 ])
 def test_bad_votes_are_refused_and_leave_nothing(message: JointState, text: str) -> None:
-    box = VoteBox()
+    box = VoteInbox()
     with pytest.raises(DataError, match=text):
         box.accept(*read_votes(message))
     assert box.take() == ()

@@ -42,7 +42,7 @@ LAYERS = {
     '': (set(), set()),  # the package itself: its version
 }
 
-CORE = ['errors', 'maths', 'parameters', 'robot_model', 'canonical', 'gait', 'reference',
+CORE = ['errors', 'maths', 'clock', 'parameters', 'robot_model', 'canonical', 'gait', 'reference',
         'primitives', 'learning', 'transformation', 'contraction', 'inhibition', 'balance',
         'estimation', 'modes', 'suite_parameters', 'certificates', 'scenario', 'loop']
 """Folders and files of the core, each above all that it may import."""

@@ -31,8 +31,8 @@ from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
 from dmp_cpg_ros.core.gait.foot_contact import believed
-from dmp_cpg_ros.core.gait.gait import GRAVITY
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import (
     Matrix,
     Triple,
@@ -116,20 +116,18 @@ class PostureController:
     ----------
     description : RobotDescription
         The robot.
-    gait : Gait
-        The gait in force; the attribute is set when it changes.
     parameters : PostureParameters
-        Gains; the attribute is set when they change.
+        Gains.
     legs : RobotLegs, optional
         The robot's legs, where others ask them too.
     """
 
     def __init__(
-        self, description: RobotDescription, gait: GaitInForce, parameters: PostureParameters,
+        self, description: RobotDescription, parameters: PostureParameters,
         legs: RobotLegs | None = None,
     ) -> None:
         """Scale all parts by the robot's lengths, mass and inertia."""
-        self.description, self.gait, self.parameters = description, gait, parameters
+        self.description, self.parameters = description, parameters
         self.legs = legs or RobotLegs(description)
         self.kinematics = self.legs.kinematics
         self.scale = body_scale(description)
@@ -151,7 +149,8 @@ class PostureController:
             np.zeros(len(self.kinematics)), SpeedKeeping((0.0, 0.0), 0.0, float('nan')))
 
     def step(
-        self, memory: PostureState, state: RobotState, x: Array, x_dot: Array, r: Array, dt: float
+        self, memory: PostureState, state: RobotState, gait: GaitInForce, x: Array, x_dot: Array,
+        r: Array, dt: float,
     ) -> tuple[PostureState, PostureFeedback]:
         """Compute the feedback of one tick.
 
@@ -161,6 +160,8 @@ class PostureController:
             The controller's state one tick before.
         state : RobotState
             Measured state.
+        gait : Gait or BlendedGait
+            In force.
         x, x_dot : ndarray (4, 2)
             Canonical states and rates.
         r : ndarray (3,)
@@ -173,7 +174,7 @@ class PostureController:
         memory : PostureState
         feedback : PostureFeedback
         """
-        p, leg_length, gait = self.parameters, self.scale.leg_length, self.gait
+        p, leg_length = self.parameters, self.scale.leg_length
         reference = gait.limited(triple(r.tolist()), self.scale)
         speed = self.scale.foot_speed(*reference)
         omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
@@ -204,7 +205,7 @@ class PostureController:
         feet = [
             times(R_ground_base, minus(foot, self._com_in_base)) for foot, _ in legs]
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
-        bounce = self._bounce(positions, duty, omega, moving)
+        bounce = self._bounce(gait, positions, duty, omega, moving)
         return PostureState(activity, keeping), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, sway.acceleration),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
@@ -223,10 +224,10 @@ class PostureController:
         return self.foot_radius - carried / total
 
     def _bounce(
-        self, positions: list[float], duty: float, omega: float, moving: float
+        self, gait: GaitInForce, positions: list[float], duty: float, omega: float, moving: float
     ) -> Bounce:
         """Planned bounce of the body: what the legs give way to, in the mean."""
-        each = [self.gait.bounce(position, duty, omega) for position in positions]
+        each = [gait.bounce(position, duty, omega) for position in positions]
         if all(one is LEVEL for one in each):
             return LEVEL
         share = moving / len(each)

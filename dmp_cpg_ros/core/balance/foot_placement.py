@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, dot, triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 

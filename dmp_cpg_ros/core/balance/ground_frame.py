@@ -11,8 +11,14 @@ from __future__ import annotations
 
 from math import sqrt
 
-from dmp_cpg_ros.core.maths.levelling import frame_of
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, rotation, times, transposed_times
+from dmp_cpg_ros.core.maths.vec3 import (
+    Matrix,
+    Triple,
+    heading_frame,
+    rotation,
+    times,
+    transposed_times,
+)
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
 SLIGHT = 0.03
@@ -42,14 +48,14 @@ def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Matrix,
     R_world_base = rotation(state.base_quaternion.tolist())
     normal, vertical = state.ground_normal_in_world, R_world_base[2]
     if normal is None or following == 0.0:
-        return frame_of(vertical), (0.0, 0.0, 1.0)
+        return heading_frame(vertical), (0.0, 0.0, 1.0)
     x, y, z = normal.tolist()
     x, y = x / z, y / z
     squared = x * x + y * y
     share = following * squared / (squared + SLIGHT**2)
     length = sqrt(share * share * squared + 1.0)
     leaning = (share * x / length, share * y / length, 1.0 / length)
-    R_ground_base = frame_of(transposed_times(R_world_base, leaning))
+    R_ground_base = heading_frame(transposed_times(R_world_base, leaning))
     return R_ground_base, times(R_ground_base, vertical)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from math import atan2, exp, hypot, isnan, pi
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
 
 SLOWEST = 0.3

@@ -35,7 +35,7 @@ from collections.abc import Sequence
 from math import cos, pi, sin
 from typing import NamedTuple
 
-from dmp_cpg_ros.core.gait.com_height import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 LEFT, RIGHT = (

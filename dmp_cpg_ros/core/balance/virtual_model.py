@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
-from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 

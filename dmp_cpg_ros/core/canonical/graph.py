@@ -8,21 +8,17 @@ i leads j (paper, Section 5; Wang & Slotine 2005 for the block Laplacian).
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical.phase import phase_rotation, wrapped
+from dmp_cpg_ros.core.canonical.phase import phase_rotation
 from dmp_cpg_ros.core.errors import ParameterError
 
 Array = NDArray[np.float64]
 Edges = tuple[tuple[int, int], ...]
-
-TOLERANCE = 1e-9
-"""Largest inconsistency of phase offsets around a loop that is taken for rounding [rad]."""
 
 
 @dataclass(frozen=True)
@@ -102,10 +98,6 @@ class CouplingGraph:
         )
         return -self._block_matrix(turned.reshape(-1, 2, 2), lambda i, j: np.eye(2))
 
-    def with_phases(self, phases: Array) -> CouplingGraph:
-        """Return the same couplings locked at other phases."""
-        return CouplingGraph(self.size, self.edges, self.gains, np.asarray(phases, dtype=float))
-
     def _block_matrix(self, gains: Array, seen_from: Callable[[int, int], Array]) -> Array:
         matrix = np.zeros((2 * self.size, 2 * self.size))
         for (i, j), gain in zip(self.edges, gains, strict=True):
@@ -115,7 +107,7 @@ class CouplingGraph:
 
 
 def graph_from_edges(
-    size: int, edges: Edges, gain: float | Array, phases: Array | None = None
+    size: int, edges: Edges, gain: float | Array, phases: Array | None = None,
 ) -> CouplingGraph:
     """Graph in which every edge has the same gain.
 
@@ -169,70 +161,9 @@ def topology(name: str, size: int) -> Edges:
     return tuple(edge for i, j in undirected[name] for edge in ((i, j), (j, i)))
 
 
-def phases_from_offsets(size: int, offsets: dict[tuple[int, int], float]) -> Array:
-    """Locked phases from offsets given edge by edge, when they agree around every loop.
-
-    Parameters
-    ----------
-    size : int
-        Number of oscillators.
-    offsets : dict of (int, int) → float
-        φ_ij: the phase by which i leads j [rad].
-
-    Returns
-    -------
-    ndarray (N,)
-        Phases relative to node 0 [rad].
-
-    Raises
-    ------
-    ParameterError
-        If the offsets around a loop do not add up to a multiple of 2π (the loop is named), a node
-        is not connected, an edge names a node that is not there, or an offset is not finite.
-    """
-    _check_edges(offsets, size)
-    if not np.all(np.isfinite(list(offsets.values()))):
-        raise ParameterError('phase offsets must be finite')
-    neighbours: dict[int, list[tuple[int, float]]] = {i: [] for i in range(size)}
-    for (i, j), offset in offsets.items():
-        neighbours[j].append((i, offset))
-        neighbours[i].append((j, -offset))
-    phases, parent, queue = {0: 0.0}, {0: 0}, deque([0])
-    while queue:
-        j = queue.popleft()
-        for i, offset in neighbours[j]:
-            if i not in phases:
-                phases[i], parent[i] = phases[j] + offset, j
-                queue.append(i)
-            elif abs(float(wrapped(phases[j] + offset - phases[i]))) > TOLERANCE:
-                loop = _loop_through(parent, i, j)
-                error = float(wrapped(phases[j] + offset - phases[i]))
-                raise ParameterError(
-                    f'phase offsets around the loop {" - ".join(map(str, loop))} add up to '
-                    f'{error:.4g} rad instead of a multiple of 2 pi'
-                )
-    missing = [i for i in range(size) if i not in phases]
-    if missing:
-        raise ParameterError(f'nodes {missing} are not connected to node 0')
-    return np.array([phases[i] for i in range(size)])
-
-
 def _check_edges(edges: Iterable[tuple[int, int]], size: int) -> None:
     for i, j in edges:
         if not (0 <= i < size and 0 <= j < size and i != j):
             raise ParameterError(
                 f'edge ({i}, {j}) is not between two of the nodes 0 to {size - 1}'
             )
-
-
-def _loop_through(parent: dict[int, int], i: int, j: int) -> list[int]:
-    """Nodes of the loop that the edge (i, j) closes in the tree, first node repeated at the
-    end.
-    """
-    up_i, up_j = [i], [j]
-    while up_i[-1] != parent[up_i[-1]]:
-        up_i.append(parent[up_i[-1]])
-    while up_j[-1] not in up_i:
-        up_j.append(parent[up_j[-1]])
-    common = up_j[-1]
-    return up_i[: up_i.index(common) + 1] + up_j[-2::-1] + [i]

@@ -1,13 +1,11 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The Andronov-Hopf oscillator, the canonical system of a rhythmic primitive (paper eqs.
-
-hopf1, hopf2).
-"""
+"""Limit-cycle oscillators of the canonical system: the protocol, and the Andronov-Hopf family."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +16,44 @@ from dmp_cpg_ros.core.errors import ParameterError
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class AndronovHopf:
-    """ẋ = ω S x + ρ (r² − |x|²) x, with S the generator of the phase rotation.
+class Oscillators(Protocol):
+    """What :class:`~dmp_cpg_ros.core.canonical.system.CanonicalSystem` needs of a family.
+
+    A class with these members is all that a new family takes, inside of this package or outside.
+    Phases, locked states and gaits read x with :mod:`~dmp_cpg_ros.core.canonical.phase`: where
+    they are used, the family must turn clockwise and commute with rotations.
 
     Attributes
     ----------
-    rho : float
+    radius : float or ndarray (N,)
+        Radius of the limit cycle, of all oscillators or of each.
+    """
+
+    @property
+    def radius(self) -> float | Array:
+        """Radius of the limit cycle."""
+        ...
+
+    def field(self, x: Array, omega: float | Array) -> Array:
+        """ẋ of uncoupled oscillators, ndarray (N, 2) → (N, 2) [1/s], at frequencies ω [rad/s]."""
+        ...
+
+    def jacobian(self, x: Array, omega: float | Array) -> Array:
+        """∂ẋ_i/∂x_i, ndarray (N, 2) → (N, 2, 2) [1/s]."""
+        ...
+
+
+@dataclass(frozen=True)
+class AndronovHopf:
+    """Andronov-Hopf oscillators ẋ = ω S x + ρ (r² − |x|²) x (paper eqs. hopf1, hopf2).
+
+    S is the generator of the phase rotation.
+
+    Attributes
+    ----------
+    rho : float or ndarray (N,)
         Attraction to the limit cycle ρ > 0 [1/s at radius 1]; the radius recovers at 2ρr².
-    radius : float
+    radius : float or ndarray (N,)
         Radius r > 0 of the limit cycle.
 
     Raises
@@ -35,18 +62,18 @@ class AndronovHopf:
         If ρ or r is not a positive finite number.
     """
 
-    rho: float
-    radius: float = 1.0
+    rho: float | Array
+    radius: float | Array = 1.0
 
     def __post_init__(self) -> None:
         """Validate."""
         for name in ('rho', 'radius'):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
+            if not (np.all(np.isfinite(value)) and np.all(np.greater(value, 0.0))):
                 raise ParameterError(f'{name} = {value!r} must be a positive finite number')
 
     def field(self, x: Array, omega: float | Array) -> Array:
-        """Vector field.
+        """Vector field, as one product with the complex number x₁ + i x₂.
 
         Parameters
         ----------
@@ -60,9 +87,10 @@ class AndronovHopf:
         ndarray (..., 2)
             ẋ [1/s].
         """
-        turned = x @ phase_generator().T
-        growth = self.rho * (self.radius**2 - np.sum(x * x, axis=-1))
-        return np.asarray(omega)[..., None] * turned + growth[..., None] * x
+        z = np.ascontiguousarray(x).view(complex)[..., 0]
+        linear = self.rho * self.radius**2 - 1j * omega
+        rate = (linear - self.rho * (z.real * z.real + z.imag * z.imag)) * z
+        return np.ravel(rate).view(float).reshape(x.shape)
 
     def jacobian(self, x: Array, omega: float | Array) -> Array:
         """Jacobian A = ∂f/∂x = ω S + ρ (r² − |x|²) I − 2ρ x xᵀ.
@@ -78,23 +106,9 @@ class AndronovHopf:
         -------
         ndarray (..., 2, 2)
         """
-        growth = self.rho * (self.radius**2 - np.sum(x * x, axis=-1))
+        growth = np.asarray(self.rho * (self.radius**2 - np.sum(x * x, axis=-1)))
         return (
             np.asarray(omega)[..., None, None] * phase_generator()
             + growth[..., None, None] * np.eye(2)
-            - 2.0 * self.rho * x[..., :, None] * x[..., None, :]
-        )
-
-    def symmetric_eigenvalues(self, x: Array) -> Array:
-        """Eigenvalues of A_s: ρ(r² − |x|²) along the flow and ρ(r² − 3|x|²) along the radius.
-
-        Returns
-        -------
-        ndarray (..., 2)
-            The larger one first; their supremum over the plane is ρr².
-        """
-        squared = np.sum(x * x, axis=-1)
-        return np.stack(
-            [self.rho * (self.radius**2 - squared), self.rho * (self.radius**2 - 3.0 * squared)],
-            axis=-1,
+            - 2.0 * np.asarray(self.rho)[..., None, None] * x[..., :, None] * x[..., None, :]
         )

@@ -12,17 +12,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.parameters import parameter
+from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class InhibitionParameters(VotingParameters):
-    """Parameters of the inhibition, with those that say how votes are counted."""
+class InhibitionParameters(Parameters):
+    """Parameters of the inhibition g(x_i): gain, region, legs, and when it is armed."""
 
     inhibition_gain: float = parameter(
         400.0, 'gain k_inh of the inhibition', unit='1/s', minimum=0.0, maximum=1e5

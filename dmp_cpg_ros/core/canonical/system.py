@@ -1,7 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The canonical system: N coupled Andronov-Hopf oscillators with sparse inhibition (paper,
-Sections 4.2 and 5).
+"""The canonical system: N coupled oscillators with sparse inhibition (paper, Sections 4.2 and 5).
 
     ẋ_i = f_x(x_i; ω_i) + Σ_j K_ij (R(φ_ij) x_j − x_i) + α_i (x_{i,d} − x_i)
 
@@ -10,13 +9,13 @@ with α_i = 0 except where inhibition is switched on.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph
-from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 
@@ -37,40 +36,51 @@ class CanonicalSystem:
     ----------
     graph : CouplingGraph
         Couplings of the N oscillators.
-    oscillators : AndronovHopf or sequence of AndronovHopf
-        One for all, or one per node.
+    oscillators : Oscillators
+        The uncoupled oscillators: any family with a field, a Jacobian and a radius.
     target : ndarray (N, 2), optional
         x_{i,d}, where inhibition pulls each node; the paper's [1, 0] scaled to the radius without.
     """
 
     def __init__(
-        self,
-        graph: CouplingGraph,
-        oscillators: AndronovHopf | tuple[AndronovHopf, ...],
-        target: Array | None = None,
+        self, graph: CouplingGraph, oscillators: Oscillators, target: Array | None = None,
     ) -> None:
         """Collect the constant matrices."""
-        self.graph = graph
-        self.oscillators = (
-            (oscillators,) * graph.size
-            if isinstance(oscillators, AndronovHopf)
-            else tuple(oscillators)
-        )
-        if len(self.oscillators) != graph.size:
-            raise ParameterError(
-                f'{graph.size} nodes need {graph.size} oscillators, not {len(self.oscillators)}'
-            )
-        self.rho = np.array([oscillator.rho for oscillator in self.oscillators])
-        self.radius = np.array([oscillator.radius for oscillator in self.oscillators])
+        self.graph, self.oscillators = graph, oscillators
+        self.radius = self._one_per_node('radius')
         self.target = (
             np.stack([self.radius, np.zeros(graph.size)], axis=1)
             if target is None
             else np.asarray(target, dtype=float)
         )
-        self._growth_at_origin = self.rho * self.radius**2
         self._coupling = graph.coupling_matrix()
         self._steps: dict[tuple[bytes, float], ExponentialStep] = {}
         self._linear: dict[bytes, tuple[Array, Array]] = {}
+
+    @cached_property
+    def rho(self) -> Array:
+        """Attraction ρ of each Andronov-Hopf oscillator, ndarray (N,) [1/s], for proofs.
+
+        Raises
+        ------
+        ParameterError
+            If the oscillators are of another family, of which no bound is known.
+        """
+        if not isinstance(self.oscillators, AndronovHopf):
+            raise ParameterError(
+                f'no bounds are known of {type(self.oscillators).__name__}; they are of '
+                'AndronovHopf'
+            )
+        return self._one_per_node('rho')
+
+    def _one_per_node(self, name: str) -> Array:
+        values = getattr(self.oscillators, name)
+        if np.shape(values) not in ((), (self.graph.size,)):
+            raise ParameterError(
+                f'{self.graph.size} nodes need one {name} or {self.graph.size}, not '
+                f'{np.size(values)}'
+            )
+        return np.broadcast_to(np.asarray(values, dtype=float), self.graph.size)
 
     def linear_part(self, gains: Array) -> tuple[Array, Array]:
         """Matrix and constant of −L x + α (x_d − x).
@@ -112,7 +122,7 @@ class CanonicalSystem:
                 self._linear.clear()
             linear = self._linear[key] = self.linear_part(gains)
         (M, c), state = linear, x.ravel()
-        return (M.dot(state) + c + self._nonlinear(omega)(state)).reshape(x.shape)
+        return (M.dot(state) + c).reshape(x.shape) + self.oscillators.field(x, omega)
 
     def jacobian(self, x: Array, omega: float | Array, gains: Array) -> Array:
         """Jacobian of :meth:`field`.
@@ -122,9 +132,9 @@ class CanonicalSystem:
         ndarray (2N, 2N)
         """
         matrix, _ = self.linear_part(gains)
-        omega = np.broadcast_to(omega, (self.graph.size,))
-        for i, oscillator in enumerate(self.oscillators):
-            matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += oscillator.jacobian(x[i], omega[i])
+        own = self.oscillators.jacobian(x, np.broadcast_to(omega, (self.graph.size,)))
+        for i, block in enumerate(own):
+            matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += block
         return matrix
 
     def step(self, x: Array, omega: float | Array, gains: Array, dt: float) -> Array:
@@ -151,14 +161,4 @@ class CanonicalSystem:
             if len(self._steps) > MOST_KEPT:
                 self._steps.clear()
             step = self._steps[key] = ExponentialStep(*self.linear_part(gains), dt)
-        return step(x.ravel(), self._nonlinear(omega)).reshape(x.shape)
-
-    def _nonlinear(self, omega: float | Array) -> Callable[[Array], Array]:
-        """N(x) = ω S x + ρ(r² − |x|²) x as one product with the complex number x₁ + i x₂."""
-        rho, linear = self.rho, self._growth_at_origin - 1j * omega
-
-        def nonlinear(x: Array) -> Array:
-            z = x.view(complex)
-            return ((linear - rho * (z.real * z.real + z.imag * z.imag)) * z).view(float)
-
-        return nonlinear
+        return step(x, partial(self.oscillators.field, omega=omega))

@@ -31,6 +31,7 @@ from dmp_cpg_ros.core.contraction.finding import PROVED, weakest
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.transformation.leg import LegParameters
@@ -128,7 +129,8 @@ class Certificate:
 
 def certify(network: GaitNetwork, inhibition: InhibitionParameters,
             reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
-            tick_s: float, span: OperatingRange | None = None) -> Certificate:
+            tick_s: float, span: OperatingRange | None = None,
+            voting: VotingParameters | None = None) -> Certificate:
     """Compute the certificate of running parameters.
 
     Parameters
@@ -145,6 +147,8 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
         Control tick [s].
     span : OperatingRange, optional
         Cadences to hold for, when they are not those of the gait.
+    voting : VotingParameters, optional
+        Stopping by vote; without, nothing is certified about it.
 
     Returns
     -------
@@ -180,8 +184,9 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     rows += [entry for entry in network_rows if entry.name == 'frequency_mismatch']
     rows += [contact_row] if p.contact_feedback else []
     rows += _time_inequalities(stop, start)
-    rows += vote_inequalities(network, inhibition, span, reference.alpha_r, leg.activity_rate,
-                              tick_s)
+    if voting is not None:
+        rows += vote_inequalities(network, inhibition, voting, span, reference.alpha_r,
+                                  leg.activity_rate, tick_s)
     rest = analysis.rest
     return Certificate(
         tuple(rows), analysis.contraction.reach, span.omega[1], stop, start,

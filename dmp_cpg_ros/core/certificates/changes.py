@@ -58,8 +58,7 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     ways = [GaitTransition(one, other) for one, other in combinations(gaits, 2)]
     share = max((way.fastest(rate) for way in ways), default=0.0)
     span = _widened([operating_range(one, p.inhibition, p.reference) for one in networks], share)
-    unvoted = replace(p.inhibition, voting=False)
-    whole = certify(networks[0], unvoted, p.reference, p.leg, p.posture, tick_s, span)
+    whole = certify(networks[0], p.inhibition, p.reference, p.leg, p.posture, tick_s, span)
     pause = math.log(span.omega[1] / (STANDING * span.omega[0])) / SETTLING_RATE + tick_s
     bound = whole.time_to_rest + pause
     rows = [_changed(row, bound, p.leg) for row in whole.inequalities]
@@ -101,7 +100,8 @@ def _votes(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: float
     worst: dict[str, Inequality] = {}
     for network in networks:
         for row in vote_inequalities(
-                network, p.inhibition, operating_range(network, p.inhibition, p.reference),
+                network, p.inhibition, p.voting,
+                operating_range(network, p.inhibition, p.reference),
                 p.reference.alpha_r, p.leg.activity_rate, tick_s):
             known = worst.get(row.name)
             if known is None or not row.margin > known.margin:

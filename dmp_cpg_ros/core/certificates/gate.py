@@ -62,7 +62,8 @@ class Running:
         if self.others:
             return certify_changes(p, (self.gait, *self.others), self.scale, self.tick_s)
         network = GaitNetwork(p.canonical, self.gait, self.scale)
-        return certify(network, p.inhibition, p.reference, p.leg, p.posture, self.tick_s)
+        return certify(network, p.inhibition, p.reference, p.leg, p.posture, self.tick_s,
+                       voting=p.voting)
 
     def differences(self, other: Running) -> dict[str, tuple[Any, Any]]:
         """Names of parameters that differ, with this value and the other one."""

@@ -5,10 +5,15 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
+import numpy as np
+
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
+from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 
 STEP_ERROR = 0.025
 """c: with s = tick · ℓ, a mode that decays by more than c s⁴ per tick decays in the step too."""
@@ -65,7 +70,8 @@ def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -
     """Share by which the integrated limit cycle's radius differs from r.
 
     A locked network feels no coupling, so that each oscillator is stepped as if it were alone: by
-    Kutta's third-order method, whose circle is found by bisection.
+    the method of the suite without a linear part, which is Kutta's third-order one. Its circle is
+    found by bisection.
 
     Parameters
     ----------
@@ -79,14 +85,11 @@ def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -
     float
         |R/r − 1|; infinite when the step has no cycle near r.
     """
-    def rate(z: complex) -> complex:
-        return complex(rho * (radius**2 - abs(z) ** 2), -omega) * z
+    step = ExponentialStep(np.zeros((2, 2)), np.zeros(2), tick_s)
+    field = partial(AndronovHopf(rho, radius).field, omega=omega)
 
     def change(R: float) -> float:
-        first = rate(complex(R))
-        second = rate(R + 0.5 * tick_s * first)
-        third = rate(R + tick_s * (2.0 * second - first))
-        return abs(R + tick_s / 6.0 * (first + 4.0 * second + third)) - R
+        return float(np.hypot(*step(np.array((R, 0.0)), field))) - R
 
     low, high = 0.5 * radius, 1.5 * radius
     if not change(low) > 0.0 > change(high):

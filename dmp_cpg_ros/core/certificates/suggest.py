@@ -11,7 +11,8 @@ from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
@@ -48,7 +49,8 @@ class Suggestion:
 
 def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
                   reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
-                  tick_s: float) -> Suggestion | None:
+                  tick_s: float, voting: VotingParameters | None = None
+                  ) -> Suggestion | None:
     """Raise the gains, inhibition before coupling, until the certificate holds.
 
     Parameters are those of :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
@@ -59,13 +61,13 @@ def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
         The present gains when they hold; None when an inequality fails that gains cannot mend, or
         no gains within the parameters' ranges are enough.
     """
-    def at(k: float, k_inh: float, voting: bool = False) -> Certificate:
-        return certify(_with_coupling(network, k),
-                       replace(inhibition, inhibition_gain=k_inh, voting=voting),
-                       reference, leg, posture, tick_s)
+    def at(k: float, k_inh: float, voting: VotingParameters | None = None) -> Certificate:
+        return certify(network.with_parameters(replace(network.parameters, coupling_gain=k)),
+                       replace(inhibition, inhibition_gain=k_inh), reference, leg, posture,
+                       tick_s, voting=voting)
 
     k0, k_inh0 = network.parameters.coupling_gain, inhibition.inhibition_gain
-    present = at(k0, k_inh0, inhibition.voting)
+    present = at(k0, k_inh0, voting)
     if present.holds:
         return Suggestion(k0, k_inh0, present, False)
     k = k0
@@ -74,7 +76,7 @@ def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
         while k_inh <= _LARGEST_INHIBITION:
             found = at(k, k_inh)
             if found.holds and (k == k0 or _has_margin(found)):
-                found = at(k, k_inh, True) if inhibition.voting else found
+                found = at(k, k_inh, voting)
                 if found.holds:
                     return Suggestion(k, k_inh, found, True)
                 break  # the votes of some legs may still need stronger couplings
@@ -114,11 +116,6 @@ def nearest_value(holds: Callable[[float], bool], working: float, wanted: float)
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low
-
-
-def _with_coupling(network: GaitNetwork, gain: float) -> GaitNetwork:
-    parameters: CanonicalParameters = replace(network.parameters, coupling_gain=gain)
-    return GaitNetwork(parameters, network.gait, network.scale)
 
 
 def _has_margin(found: Certificate) -> bool:

@@ -35,6 +35,7 @@ from dmp_cpg_ros.core.contraction.voting import (
 )
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.threshold import VoteClamp, majority, vote_clamp
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -75,7 +76,7 @@ class VotesNeeded:
         return weak.index(False) if False in weak else len(weak)
 
 
-def votes_needed(network: GaitNetwork, inhibition: InhibitionParameters,
+def votes_needed(network: GaitNetwork, inhibition: InhibitionParameters, voting: VotingParameters,
                  span: OperatingRange) -> VotesNeeded:
     """Find out how many legs can stop the gait.
 
@@ -84,7 +85,9 @@ def votes_needed(network: GaitNetwork, inhibition: InhibitionParameters,
     network : GaitNetwork
         Oscillators.
     inhibition : InhibitionParameters
-        Gain, region, clamp.
+        Gain and region.
+    voting : VotingParameters
+        Rule, majority, clamp.
     span : OperatingRange
         Cadences.
 
@@ -94,7 +97,7 @@ def votes_needed(network: GaitNetwork, inhibition: InhibitionParameters,
     """
     system, r0, counts = network.system, inhibition.region_radius, range(1, len(LEGS) + 1)
     return VotesNeeded(
-        vote_clamp(network, inhibition, span),
+        vote_clamp(network, inhibition, voting, span),
         tuple(max(certified_threshold(system, span.omega_armed[1], voters, r0)
                   for voters in different_voters(system, count)) for count in counts),
         tuple(min(rest_threshold(system, span.omega[0], voters, r0)
@@ -134,13 +137,13 @@ def vote_bound(network: GaitNetwork, gains: Array, region_radius: float, span: O
 
 
 def vote_inequalities(network: GaitNetwork, inhibition: InhibitionParameters,
-                      span: OperatingRange, alpha_r: float, activity_rate: float,
-                      tick_s: float) -> list[Inequality]:
+                      voting: VotingParameters, span: OperatingRange, alpha_r: float,
+                      activity_rate: float, tick_s: float) -> list[Inequality]:
     """Inequalities of voting; none when there is no voting.
 
     Parameters
     ----------
-    network, inhibition, span
+    network, inhibition, voting, span
         As of :func:`votes_needed`.
     alpha_r, activity_rate, tick_s : float
         As of :func:`vote_bound`.
@@ -150,9 +153,9 @@ def vote_inequalities(network: GaitNetwork, inhibition: InhibitionParameters,
     list of Inequality
         All required: who lets legs vote relies on them.
     """
-    if not inhibition.voting:
+    if not voting.voting:
         return []
-    clamp, count = vote_clamp(network, inhibition, span), majority(inhibition)
+    clamp, count = vote_clamp(network, inhibition, voting, span), majority(voting)
     system, r0 = network.system, inhibition.region_radius
     worst: InhibitedContraction | None = None
     needed = bound = 0.0

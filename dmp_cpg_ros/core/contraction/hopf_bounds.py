@@ -90,7 +90,7 @@ def transverse_contraction(oscillator: AndronovHopf, omega: float, annulus: Annu
         Grade ``proved``. The rate rises with |x|² up to √(r⁴ + ω²/ρ²) and falls beyond, so that
         its minimum lies at an end.
     """
-    rho, r_squared = oscillator.rho, oscillator.radius**2
+    rho, r_squared = float(oscillator.rho), float(oscillator.radius) ** 2
 
     def rate(s: float) -> float:
         slip = rho * (r_squared - s)

@@ -45,7 +45,7 @@ from dmp_cpg_ros.core.estimation.velocity_filter import (
     settle,
     update,
 )
-from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.rotations import levelled
 from dmp_cpg_ros.core.maths.vec3 import (
     Triple,

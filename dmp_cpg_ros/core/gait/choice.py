@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.gait import GRAVITY, BodyScale, Gait
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ class GaitChoiceParameters(Parameters):
 
 
 def highest_speed(
-    parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait]
+    parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
 ) -> float:
     """Dimensionless foot speed up to which commands are followed.
 
@@ -83,9 +84,7 @@ def highest_speed(
     return max(named(each).highest_speed for each in names)
 
 
-def chosen_gait(
-    parameters: GaitChoiceParameters, present: str, r: Array, scale: BodyScale
-) -> str:
+def chosen_gait(parameters: GaitChoiceParameters, present: str, r: Array, scale: BodyScale) -> str:
     """Gait for a reference.
 
     Parameters

@@ -18,8 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-GRAVITY = 9.81
-"""Standard gravity [m/s^2]."""
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 
 
 class Bounce(NamedTuple):

@@ -13,8 +13,8 @@ legs' frequencies, bounded by what the certificate leaves free:
 - c is common to all legs: what the legs ask for together. A frequency that all legs share does not
   pull them apart (it leaves x_i − x_j to the couplings), whatever it is and however it jumps.
 - d_i is what is left of the leg's own request. δ̄ is a share of the margin for unequal frequencies
-  (:func:`~dmp_cpg_ros.core.contact_margin.contact_margin`): within it phases, radii and distances
-  stay inside what phase lock and capture assume, under every sequence of contacts.
+  (:func:`~dmp_cpg_ros.core.certificates.contact.contact_margin`): within it phases, radii and
+  distances stay inside what phase lock and capture assume, under every sequence of contacts.
 - While a stop is requested, and after a release until the legs are certified to be in their
   places, there is no feedback: capture, rest and start, their bounds and their predictions are
   those without it. A stop begins with legs that are as far from their places as δ̄ allows, and one
@@ -85,73 +85,52 @@ class ContactState:
     released: float
 
 
-class ContactPhase:
-    """Frequency offsets from the contacts of the feet; state in, state out.
+def contact_feedback(
+    state: ContactState, force: Array, quarter: float, limits: ContactLimits | None,
+    network: GaitNetwork, x: Array, r: Array, inhibition: Inhibition, dt: float,
+) -> tuple[ContactState, Array]:
+    """Frequency offsets of one tick from the contacts of the feet.
 
     Parameters
     ----------
+    state : ContactState
+        State one tick before.
+    force : ndarray (4,)
+        Normal force of each foot now [N]; a foot without a number gives no feedback.
     quarter : float
         Force on each foot of the standing robot [N].
-
-    Attributes
-    ----------
     limits : ContactLimits or None
         What feedback may do; None, before a certificate says so: nothing.
+    network : GaitNetwork
+        Oscillators with the gait and the parameters that act.
+    x : ndarray (4, 2)
+        Canonical states before the step that the feedback will act on.
+    r : ndarray (3,)
+        Reference of the step.
+    inhibition : Inhibition
+        That acts during the step.
+    dt : float
+        Time since the last tick [s].
+
+    Returns
+    -------
+    state : ContactState
+    feedback : ndarray (4,)
+        Added to ω of each leg [rad/s].
     """
-
-    def __init__(self, quarter: float) -> None:
-        """Give no feedback until there are limits."""
-        self.quarter = quarter
-        self.limits: ContactLimits | None = None
-
-    def step(
-        self,
-        state: ContactState,
-        force: Array,
-        network: GaitNetwork,
-        x: Array,
-        r: Array,
-        inhibition: Inhibition,
-        dt: float,
-    ) -> tuple[ContactState, Array]:
-        """Feedback of one tick.
-
-        Parameters
-        ----------
-        state : ContactState
-            State one tick before.
-        force : ndarray (4,)
-            Normal force of each foot now [N]; a foot without a number gives no feedback.
-        network : GaitNetwork
-            Oscillators with the gait and the parameters that act.
-        x : ndarray (4, 2)
-            Canonical states before the step that the feedback will act on.
-        r : ndarray (3,)
-            Reference of the step.
-        inhibition : Inhibition
-            That acts during the step.
-        dt : float
-            Time since the last tick [s].
-
-        Returns
-        -------
-        state : ContactState
-        feedback : ndarray (4,)
-            Added to ω of each leg [rad/s].
-        """
-        free = not (inhibition.requested or np.any(inhibition.gains))
-        released = state.released + dt if free else 0.0
-        state = ContactState(standing(state.stands, force, self.quarter), released)
-        limits, changing = self.limits, isinstance(network.gait, BlendedGait)
-        if limits is None or changing or not (free and released > limits.after):
-            return state, np.zeros(len(LEGS))
-        p, gait, scale = network.parameters, network.gait, network.scale
-        omega = network.omega(r)
-        duty = gait.duty(scale.foot_speed(float(r[0]), float(r[1]), float(r[2])), scale)
-        error = touchdown_error(gait.cycle_position(phase(x)), duty, state.stands)
-        wanted = 2.0 * pi * p.contact_gain * np.where(np.isfinite(force), error, 0.0)
-        fastest = max(0.0, limits.omega_max - omega)
-        return state, bounded(wanted, limits.own, -p.contact_hold * omega, fastest)
+    free = not (inhibition.requested or np.any(inhibition.gains))
+    released = state.released + dt if free else 0.0
+    state = ContactState(standing(state.stands, force, quarter), released)
+    changing = isinstance(network.gait, BlendedGait)
+    if limits is None or changing or not (free and released > limits.after):
+        return state, np.zeros(len(LEGS))
+    p, gait, scale = network.parameters, network.gait, network.scale
+    omega = network.omega(r)
+    duty = gait.duty(scale.foot_speed(float(r[0]), float(r[1]), float(r[2])), scale)
+    error = touchdown_error(gait.cycle_position(phase(x)), duty, state.stands)
+    wanted = 2.0 * pi * p.contact_gain * np.where(np.isfinite(force), error, 0.0)
+    fastest = max(0.0, limits.omega_max - omega)
+    return state, bounded(wanted, limits.own, -p.contact_hold * omega, fastest)
 
 
 def initial_contact_state() -> ContactState:

@@ -21,9 +21,10 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.com_height import GRAVITY, Bounce, planned_bounce, stance_groups
+from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups
 from dmp_cpg_ros.core.gait.gait_word import gait_word
 from dmp_cpg_ros.core.gait.speed_limit import within_limit
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -66,8 +67,34 @@ class BodyScale:
         )
 
 
+class CycleOfLegs:
+    """What a gait and a blend of two have in common.
+
+    Attributes
+    ----------
+    rest : float
+        Cycle position of fl at phase 0, where inhibition holds it: all legs are then as far from
+        their mid-swing as can be.
+    highest_speed : float
+        Dimensionless foot speed that is never exceeded.
+    """
+
+    rest: float
+    highest_speed: float
+
+    def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
+        """Velocity (v_x, v_y, γ) that the gait does of one that is asked for [m/s], [rad/s], see
+        :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
+        """
+        return limited(velocity, scale, self.highest_speed)
+
+    def scalar_cycle_position(self, phi: float) -> float:
+        """Where one leg is in its cycle at a phase φ [rad]: 0 at mid-swing, in [−1/2, 1/2)."""
+        return (phi / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
+
+
 @dataclass(frozen=True)
-class Gait:
+class Gait(CycleOfLegs):
     """One gait.
 
     Attributes
@@ -174,12 +201,6 @@ class Gait:
         )
         return scaled
 
-    def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
-        """Velocity (v_x, v_y, γ) that the gait does of one that is asked for [m/s], [rad/s], see
-        :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
-        """
-        return limited(velocity, scale, self.highest_speed)
-
     @property
     def phases(self) -> Array:
         """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
@@ -191,18 +212,30 @@ class Gait:
         return gait_word(self.name, self.cadence_scale)
 
     @property
+    def moving_phases(self) -> None:
+        """Offsets that move: none, other than while gaits change."""
+        return None
+
+    def following(self, omega: float, change_rate: float, pauses: bool, dt: float
+                  ) -> tuple[Gait, float]:
+        """Gait a time step later, and what the oscillators gain on ω meanwhile [rad]: the same
+        and nothing, other than while gaits change.
+        """
+        return self, 0.0
+
+    def oscillator_omegas(self, omega: float) -> float:
+        """Frequency of the oscillators when the gait's is ω: the same [rad/s]."""
+        return omega
+
+    @property
     def rest_rate(self) -> float:
         """Rate of the rest phase: 0, other than while gaits change [rad/s]."""
         return 0.0
 
-    def own_omega(self, leg: int, omega: float) -> float:
-        """Frequency with which one leg goes through its cycle when the gait's is ω: the same
+    def own_omegas(self, omega: float) -> list[float]:
+        """Frequencies with which the legs go through their cycles when the gait's is ω: the same
         [rad/s].
         """
-        return omega
-
-    def own_omegas(self, omega: float) -> list[float]:
-        """As :meth:`own_omega` for all legs [rad/s]."""
         return [omega] * len(LEGS)
 
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
@@ -237,10 +270,6 @@ class Gait:
         """
         return planned_bounce(cycle_position, self.groups, duty, omega)
 
-    def scalar_cycle_position(self, phi: float) -> float:
-        """As :meth:`cycle_position` for one leg, without arrays."""
-        return (phi / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
-
     def cycle_position(self, phi: Array | float) -> Array:
         """Where legs are in their cycle: 0 at mid-swing, in [−1/2, 1/2).
 
@@ -256,7 +285,7 @@ class Gait:
 
 
 def limited(
-    velocity: Triple, scale: BodyScale, highest_speed: float, largest_curve: float = inf
+    velocity: Triple, scale: BodyScale, highest_speed: float, largest_curve: float = inf,
 ) -> Triple:
     """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
     share of g, that goes with it [m/s], [rad/s].

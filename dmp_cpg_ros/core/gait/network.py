@@ -1,7 +1,13 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The four coupled oscillators of a gait: what the canonical node runs and what predictions are
-made with.
+"""The coupled oscillators of a gait or of a blend of two: what runs, and what predictions are made
+with.
+
+A blend is stepped in the locked coordinates y_i = R(φ_i)ᵀ x_i, in which neither the coupling nor
+the inhibition depends on the offsets (proof in :mod:`~dmp_cpg_ros.core.gait.transition`): turned
+back by the old offsets, advanced by one step of the network without offsets, turned forth by the
+new ones. That is ω_i = ω + φ̇_i fed forward exactly, also over a time step. Where the offsets stand
+still, nothing is turned and the network has the offsets of the gait.
 """
 
 from __future__ import annotations
@@ -9,23 +15,23 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from math import atan2, ceil, cos, pi, sin
+from math import atan2, ceil, cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
-from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.gait.gait import GRAVITY, BodyScale
-from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned, wrapped
+from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
+from dmp_cpg_ros.core.gait.gait import BodyScale
+from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
-
 
 LONGEST_STEP = 0.005
 """Longest time step of the oscillators [s]."""
@@ -74,6 +80,12 @@ class CanonicalParameters(Parameters):
     )
 
 
+    @property
+    def oscillators(self) -> Oscillators:
+        """Family of the uncoupled oscillators; that of a derived class may be another one."""
+        return AndronovHopf(self.rho, self.radius)
+
+
 def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalSystem:
     """Coupled oscillators that lock at given phases; inhibition pulls each leg to its place when
     fl has phase 0.
@@ -93,58 +105,82 @@ def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalS
     )
     return CanonicalSystem(
         graph,
-        AndronovHopf(parameters.rho, parameters.radius),
+        parameters.oscillators,
         state_at(phases, parameters.radius),
     )
 
 
 class GaitNetwork:
-    """Canonical system of one gait with its frequency taken from the reference.
+    """Canonical system of a gait, or of a blend, with its frequency taken from the reference.
 
     Parameters
     ----------
     parameters : CanonicalParameters
         Oscillators and coupling.
     gait : Gait
-        Phase offsets and cadence, before ``cadence_scale`` (a blend while gaits change).
+        Phase offsets and cadence, before ``cadence_scale``.
     scale : BodyScale
         The robot's lengths.
+    change_rate : float
+        Largest change of a leg's frequency while gaits change, as a fraction.
 
     Attributes
     ----------
-    gait : Gait
+    gait : Gait or BlendedGait
         With the cadence that acts: everything that asks a gait for ω must ask this one.
     """
 
     gait: GaitInForce
 
     def __init__(
-        self, parameters: CanonicalParameters, gait: GaitInForce, scale: BodyScale
+        self, parameters: CanonicalParameters, gait: GaitInForce, scale: BodyScale,
+        change_rate: float = GaitChangeParameters.gait_change_rate,
     ) -> None:
         """Keep the parts."""
-        self.parameters, self.scale = parameters, scale
+        self.parameters, self.scale, self.change_rate = parameters, scale, change_rate
         self.gait = gait.scaled(parameters.cadence_scale)
+        self._systems: dict[bytes, CanonicalSystem] = {}
+
+    def of(self, gait: GaitInForce) -> GaitNetwork:
+        """Return the same oscillators in a gait or blend, at the cadence that it has; what was
+        computed for its offsets is shared.
+        """
+        if gait is self.gait:
+            return self
+        other = copy(self)
+        other.gait = gait
+        for name in ('system', 'target', '_frame'):
+            other.__dict__.pop(name, None)
+        return other
+
+    def with_parameters(self, parameters: CanonicalParameters) -> GaitNetwork:
+        """Return other oscillators in the gait that acts, at its cadence."""
+        return GaitNetwork(parameters, self.gait, self.scale, self.change_rate).of(self.gait)
 
     @cached_property
     def system(self) -> CanonicalSystem:
         """The coupled system with the gait's offsets."""
-        return network_system(self.parameters, self.gait.phases)
+        return self._system(self.gait.phases)
+
+    def _system(self, phases: Array) -> CanonicalSystem:
+        key, known = phases.tobytes(), self._systems
+        if key not in known:
+            if len(known) > MOST_KEPT:
+                known.clear()
+            known[key] = network_system(self.parameters, phases)
+        return known[key]
+
+    @cached_property
+    def _frame(self) -> tuple[CanonicalSystem, Array | None]:
+        """System that is stepped, and the offsets by which its states are turned."""
+        moving = self.gait.moving_phases
+        return self.system if moving is None else self._system(np.zeros(len(LEGS))), moving
 
     @cached_property
     def target(self) -> Array:
         """x_d of every leg, ndarray (4, 2)."""
-        return self.system.target
-
-    def with_cadence_of(self, gait: GaitInForce) -> GaitNetwork:
-        """Return this network at the cadence of another gait with the same phases; what was
-        computed for the phases is kept.
-        """
-        if gait is self.gait:
-            return self
-        _ = self.target  # computed once for both
-        other = copy(self)
-        other.gait = gait
-        return other
+        system, moving = self._frame
+        return _turned(system.target, moving)
 
     @property
     def highest_speed(self) -> float:
@@ -155,35 +191,26 @@ class GaitNetwork:
         """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""
         return self.gait.omega(self.scale.foot_speed(*r.tolist()), self.scale)
 
-    def step(
-        self,
-        x: Array,
-        r: Array,
-        inhibition: Inhibition,
-        dt: float,
-        feedback: Array | float = 0.0,
-    ) -> Array:
-        """Advance the states (4, 2) by dt [s] at reference r under an inhibition that is
-        switched by region.
-
-        Feedback, ndarray (4,), is added to the legs' ω [rad/s]. After a gap in the robot's states
-        the time is made up in parts of at most ``LONGEST_STEP``.
-        """
-        parts = max(1, ceil(dt / LONGEST_STEP - 1e-9))
-        for _ in range(parts):
-            gains = inhibition.acting_gains(x, self.target)
-            x = self.system.step(x, self.omega(r) + feedback, gains, dt / parts)
-        return x
-
     def advance(
-        self,
-        x: Array,
-        r: Array,
-        inhibition: Inhibition,
-        dt: float,
-        feedback: Array | float = 0.0,
+        self, x: Array, r: Array, inhibition: Inhibition, dt: float, feedback: Array | float = 0.0,
     ) -> tuple[GaitNetwork, Array]:
-        """Advance the states as :meth:`step`, and the network: another one while gaits change.
+        """Advance the states and, while gaits change, the blend.
+
+        After a gap in the robot's states the time is made up in parts of at most
+        ``LONGEST_STEP``.
+
+        Parameters
+        ----------
+        x : ndarray (4, 2)
+            States.
+        r : ndarray (3,)
+            Reference.
+        inhibition : Inhibition
+            Switched by region.
+        dt : float
+            [s]
+        feedback : ndarray (4,) or float
+            Added to the legs' ω [rad/s].
 
         Returns
         -------
@@ -191,14 +218,37 @@ class GaitNetwork:
             In force after the step.
         x : ndarray (4, 2)
         """
-        return self, self.step(x, r, inhibition, dt, feedback)
+        network, parts = self, max(1, ceil(dt / LONGEST_STEP - 1e-9))
+        for _ in range(parts):
+            network, x = network._part(x, r, inhibition, dt / parts, feedback)
+        return network, x
+
+    def _part(self, x: Array, r: Array, inhibition: Inhibition, dt: float,
+              feedback: Array | float) -> tuple[GaitNetwork, Array]:
+        omega, (system, moving) = self.omega(r), self._frame
+        gait, gained = self.gait.following(omega, self.change_rate, inhibition.requested, dt)
+        y = _turned(x, None if moving is None else -moving)
+        gains = inhibition.acting_gains(y, system.target)
+        y = system.step(y, omega + gained / dt + feedback, gains, dt)
+        return self.of(gait), _turned(y, None if moving is None else gait.phases)
+
+    def step(
+        self, x: Array, r: Array, inhibition: Inhibition, dt: float, feedback: Array | float = 0.0,
+    ) -> Array:
+        """Advance the states (4, 2) as :meth:`advance`."""
+        return self.advance(x, r, inhibition, dt, feedback)[1]
 
     def rate(
-        self, x: Array, r: Array, inhibition: Inhibition, feedback: Array | float = 0.0
+        self, x: Array, r: Array, inhibition: Inhibition, feedback: Array | float = 0.0,
     ) -> Array:
-        """Rate of the states, ẋ (4, 2) [1/s], with feedback as in :meth:`step`."""
-        gains = inhibition.acting_gains(x, self.target)
-        return self.system.field(x, self.omega(r) + feedback, gains)
+        """Rate of the states, ẋ (4, 2) [1/s], with feedback as in :meth:`advance`: that of the
+        held blend and what moves its offsets.
+        """
+        system, moving = self._frame
+        y = _turned(x, None if moving is None else -moving)
+        omega = self.gait.oscillator_omegas(self.omega(r)) + feedback
+        field = system.field(y, omega, inhibition.acting_gains(y, system.target))
+        return _turned(field, moving)
 
     def locked_state(self, phi: float = 0.0) -> Array:
         """States (4, 2) on the limit cycle with fl at phase φ [rad] and all legs in their
@@ -207,7 +257,7 @@ class GaitNetwork:
         return state_at(phi + self.gait.phases, self.parameters.radius)
 
     def rest_state(
-        self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0
+        self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0,
     ) -> Array:
         """Equilibrium (4, 2) that is reached from the locked state under inhibition at zero
         reference.
@@ -248,4 +298,8 @@ class GaitNetwork:
             for (x_1, x_2), place in zip(x.tolist(), places, strict=True)
         ]
         mean = atan2(sum(map(sin, relative)), sum(map(cos, relative)))
-        return np.array([(angle - mean + pi) % (2.0 * pi) - pi for angle in relative])
+        return wrapped(np.array(relative) - mean)
+
+
+def _turned(x: Array, phases: Array | None) -> Array:
+    return x if phases is None else turned(x, phases)

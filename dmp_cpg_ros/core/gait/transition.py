@@ -21,12 +21,13 @@ during a transition as outside of it.
 weight w = s²(3 − 2s) blends offsets, rest phase, cadence and duty factor. n is the number of
 cycles for which no leg's frequency differs from ω by more than the fraction ``gait_change_rate``.
 While a stop is requested ṡ goes to 0 and the blend stays as it is; at rest the new gait takes
-force at once (:mod:`~dmp_cpg_ros.core.gait.gait_networks`).
+force at once (:mod:`~dmp_cpg_ros.core.gait.running`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import exp
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +35,9 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.arcs import arcs_between
 from dmp_cpg_ros.core.gait.com_height import Bounce
-from dmp_cpg_ros.core.gait.gait import BodyScale, Gait, limited
+from dmp_cpg_ros.core.gait.gait import BodyScale, CycleOfLegs, Gait
 from dmp_cpg_ros.core.gait.gait_word import gait_word
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
-from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 
 Array = NDArray[np.float64]
@@ -121,7 +121,7 @@ class GaitTransition:
 
 
 @dataclass(frozen=True)
-class BlendedGait:
+class BlendedGait(CycleOfLegs):
     """A gait between two gaits; everywhere that phases are read it stands for a :class:`Gait`.
 
     Attributes
@@ -148,6 +148,7 @@ class BlendedGait:
     weight: float = field(init=False, repr=False, compare=False)
     turning: float = field(init=False, repr=False, compare=False)
     rest: float = field(init=False, repr=False, compare=False)
+    highest_speed: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Validate and blend; ``turning`` is 2π dw/dt, the rate of an arc of one cycle [rad/s]."""
@@ -161,6 +162,8 @@ class BlendedGait:
         object.__setattr__(self, 'weight', weight)
         object.__setattr__(self, 'turning', 2.0 * np.pi * 6.0 * s * (1.0 - s) * self.rate)
         object.__setattr__(self, 'rest', transition.before.rest + weight * transition.rest_arc)
+        object.__setattr__(self, 'highest_speed', blended_limit(
+            transition.before.highest_speed, transition.after.highest_speed, weight))
 
     @property
     def name(self) -> str:
@@ -185,19 +188,56 @@ class BlendedGait:
         return transition.before.phases + (2.0 * np.pi * self.weight) * transition.offset_arcs
 
     @property
+    def moving_phases(self) -> Array:
+        """Offsets that move: the present :attr:`phases`."""
+        return self.phases
+
+    def following(self, omega: float, change_rate: float, pauses: bool, dt: float
+                  ) -> tuple[GaitInForce, float]:
+        """Blend a time step later, or the new gait at the end of the way.
+
+        Parameters
+        ----------
+        omega : float
+            The gait's frequency [rad/s].
+        change_rate : float
+            Largest change of a leg's frequency, as a fraction.
+        pauses : bool
+            Whether the share is to stay as it is.
+        dt : float
+            Time step [s].
+
+        Returns
+        -------
+        gait : BlendedGait or Gait
+        gained : float
+            By how much the oscillators run ahead of ω meanwhile [rad].
+        """
+        transition = self.transition
+        cycles = transition.cycles(change_rate)
+        wanted = 0.0 if pauses else omega / (2.0 * np.pi * cycles)
+        rate = wanted + (self.rate - wanted) * exp(-SETTLING_RATE * dt)
+        if pauses and rate * 2.0 * np.pi * cycles < STANDING * omega:
+            rate = 0.0
+        share = self.share + rate * dt
+        following: GaitInForce = (
+            transition.after.scaled(self.cadence_scale) if share >= 1.0
+            else replace(self, share=share, rate=rate)
+        )
+        weight = following.weight if isinstance(following, BlendedGait) else 1.0
+        return following, 2.0 * np.pi * transition.common_arc * (weight - self.weight)
+
+    def oscillator_omegas(self, omega: float) -> Array:
+        """Frequencies of the oscillators when the gait's is ω, with what moves the offsets
+        [rad/s].
+        """
+        omega = omega + self.turning * self.transition.common_arc
+        return omega + self.turning * self.transition.offset_arcs
+
+    @property
     def rest_rate(self) -> float:
         """Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]."""
         return self.turning * self.transition.rest_arc
-
-    @property
-    def highest_speed(self) -> float:
-        """Dimensionless foot speed that is not exceeded."""
-        before, after = self.transition.before, self.transition.after
-        return blended_limit(before.highest_speed, after.highest_speed, self.weight)
-
-    def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
-        """Velocity that the blend does of one that is asked for, as :meth:`Gait.limited`."""
-        return limited(velocity, scale, self.highest_speed)
 
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω at a foot speed, as :meth:`Gait.omega` [rad/s]."""
@@ -215,12 +255,8 @@ class BlendedGait:
             self.transition.after.duty(foot_speed, scale),
         )
 
-    def own_omega(self, leg: int, omega: float) -> float:
-        """Frequency with which one leg goes through its cycle when the gait's is ω [rad/s]."""
-        return omega + self.turning * float(self.transition.arcs[leg])
-
     def own_omegas(self, omega: float) -> list[float]:
-        """As :meth:`own_omega` of all legs [rad/s]."""
+        """Frequencies with which the legs go through their cycles when the gait's is ω [rad/s]."""
         return [omega + self.turning * arc for arc in self.transition.arcs.tolist()]
 
     def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
@@ -228,10 +264,6 @@ class BlendedGait:
         before, after = self.transition.before, self.transition.after
         return before.bounce(cycle_position, duty, omega).mixed(
             after.bounce(cycle_position, duty, omega), self.weight)
-
-    def scalar_cycle_position(self, phi: float) -> float:
-        """As :meth:`cycle_position` for one leg, without arrays."""
-        return (phi / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
 
     def cycle_position(self, phi: Array | float) -> Array:
         """Where legs are in their cycle, as :meth:`Gait.cycle_position`."""

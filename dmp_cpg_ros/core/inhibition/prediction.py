@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 
@@ -22,15 +23,9 @@ Array = NDArray[np.float64]
 
 
 def predict(
-    supervisor: GaitSupervisor,
-    reference: ReferenceSystem,
-    state: SupervisorState,
-    published: Inhibition,
-    x: Array,
-    r: Array,
-    command: tuple[float, float, float],
-    dt: float,
-    horizon: float = 10.0,
+    supervisor: GaitSupervisor, reference: ReferenceSystem, state: SupervisorState,
+    published: Inhibition, network: GaitNetwork, x: Array, r: Array,
+    command: tuple[float, float, float], dt: float, horizon: float = 10.0,
     body_mode: str = 'standing',
 ) -> float:
     """Time from now to rest (of a requested stop) or to phase lock (of a start).
@@ -43,6 +38,8 @@ def predict(
         Present state, the request included.
     published : Inhibition
         The inhibition that was published before the request; it still acts at the next tick.
+    network : GaitNetwork
+        The oscillators that act, with their gait.
     x : ndarray (4, 2)
         Present canonical state.
     r : ndarray (3,)
@@ -66,11 +63,10 @@ def predict(
     for k in range(1, math.ceil(horizon / dt) + 1):
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
         r = reference.step(r, r_ext, dt)
-        network, x = supervisor.network.advance(x, r, inhibition, dt)
-        supervisor = supervisor.on(network)
+        network, x = network.advance(x, r, inhibition, dt)
         state = supervisor.step(
-            state, start_ns + k * tick_ns, x, network.rate(x, r, inhibition), r, command,
-            body_mode=body_mode,
+            state, start_ns + k * tick_ns, network, x, network.rate(x, r, inhibition), r,
+            command, body_mode=body_mode,
         )
         inhibition = supervisor.inhibition(state)
         if state.word in ('at_rest', 'walking', 'free'):

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
-from dmp_cpg_ros.core.canonical.voting_parameters import SUM
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, Ballot
+from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
+from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
 from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.swing_activity import activities_step
@@ -82,7 +82,7 @@ class SupervisorState:
         Whether votes have overcome the threshold and hold the stop.
     vote_gains : ndarray (4,)
         Largest gains of the votes since then [1/s]: what holds the gait does not fade.
-    ballot : Ballot
+    tally : Tally
         Votes of this tick.
     """
 
@@ -98,7 +98,7 @@ class SupervisorState:
     asked: bool = False
     voted: bool = False
     vote_gains: Array = field(default_factory=lambda: np.zeros(len(LEGS)))
-    ballot: Ballot = NO_VOTES
+    tally: Tally = NO_VOTES
 
 
 class GaitSupervisor:
@@ -108,23 +108,17 @@ class GaitSupervisor:
     ----------
     parameters : InhibitionParameters
         Gains, region, legs, automatic stop.
-    network : GaitNetwork
-        The oscillators that are watched.
+    voting : VotingParameters
+        How a stop by votes holds and ends.
     activity_rate : float
         Rate of the legs' swing activity [1/s].
     """
 
     def __init__(
-        self, parameters: InhibitionParameters, network: GaitNetwork, activity_rate: float
+        self, parameters: InhibitionParameters, voting: VotingParameters, activity_rate: float,
     ) -> None:
         """Keep the parts."""
-        self.parameters, self.network, self.activity_rate = parameters, network, activity_rate
-
-    def on(self, network: GaitNetwork) -> GaitSupervisor:
-        """Return a supervisor of another network with the same parameters."""
-        if network is self.network:
-            return self
-        return GaitSupervisor(self.parameters, network, self.activity_rate)
+        self.parameters, self.voting, self.activity_rate = parameters, voting, activity_rate
 
     def initial_state(self, time_ns: int = 0) -> SupervisorState:
         """At rest, or free when ``start_inhibited`` is false."""
@@ -153,30 +147,24 @@ class GaitSupervisor:
 
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
         if not state.requested:
-            return state.ballot.gains
+            return state.tally.gains
         gains = self.parameters.armed_gains if armed and state.asked else np.zeros(len(LEGS))
         return np.maximum(gains, state.vote_gains) if armed and state.voted else gains
 
     def request(
-        self, state: SupervisorState, stop: bool, automatic: bool = False
+        self, state: SupervisorState, stop: bool, automatic: bool = False,
     ) -> SupervisorState:
         """Ask for a stop or a start; asking for what is already asked changes nothing but its
         origin.
 
         A service call that asks for a start ends a stop by votes too, once nobody votes any more.
         """
-        voted = state.voted and (stop or automatic or state.ballot.alive)
+        voted = state.voted and (stop or automatic or state.tally.alive)
         return self._turned(updated(state, asked=stop, automatic=automatic, voted=voted))
 
     def step(
-        self,
-        state: SupervisorState,
-        time_ns: int,
-        x: Array,
-        x_dot: Array,
-        r: Array,
-        command: tuple[float, float, float],
-        ballot: Ballot | None = None,
+        self, state: SupervisorState, time_ns: int, network: GaitNetwork, x: Array, x_dot: Array,
+        r: Array, command: tuple[float, float, float], tally: Tally | None = None,
         body_mode: str = 'standing',
     ) -> SupervisorState:
         """Advance by one tick.
@@ -187,13 +175,15 @@ class GaitSupervisor:
             State after the last tick, requests included.
         time_ns : int
             Stamp of this tick [ns].
+        network : GaitNetwork
+            The oscillators that act, with their gait.
         x, x_dot : ndarray (4, 2)
             Canonical states and rates of this tick.
         r : ndarray (3,)
             Reference of this tick.
         command : tuple of float
             External command (v_x, v_y, γ) that acts at this tick.
-        ballot : Ballot, optional
+        tally : Tally, optional
             Votes of this tick; those of the tick before without.
         body_mode : str
             What the body does; in every mode but ``standing`` the gait is stopped.
@@ -203,9 +193,9 @@ class GaitSupervisor:
         SupervisorState
         """
         dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
-        gait, rates = self.network.gait, scalar_phase_rates(x, x_dot)
-        speed = self.network.scale.foot_speed(*r.tolist())
-        omega, more = gait.omega(speed, self.network.scale), gait.rest_rate
+        gait, rates = network.gait, scalar_phase_rates(x, x_dot)
+        speed = network.scale.foot_speed(*r.tolist())
+        omega, more = gait.omega(speed, network.scale), gait.rest_rate
         activity = activities_step(
             state.activity,
             [rate + more for rate in rates],
@@ -218,13 +208,13 @@ class GaitSupervisor:
             state = self._automatic(state, command)
         else:
             state = self._barred(state, body_mode)
-        state = self._voted(state, ballot or state.ballot)
+        state = self._voted(state, tally or state.tally)
         if state.requested:
-            return self._stopping(state, x, rates, speed)
-        return self._running(state, x, speed)
+            return self._stopping(state, network.target, x, rates, speed)
+        return self._running(state, network.phase_errors(x), speed)
 
     def _automatic(
-        self, state: SupervisorState, command: tuple[float, float, float]
+        self, state: SupervisorState, command: tuple[float, float, float],
     ) -> SupervisorState:
         """Stop after a time of zero command, and start at a command, when ``auto_inhibit`` is
         on.
@@ -242,18 +232,18 @@ class GaitSupervisor:
             return self.request(state, True, True)
         return state
 
-    def _voted(self, state: SupervisorState, ballot: Ballot) -> SupervisorState:
+    def _voted(self, state: SupervisorState, tally: Tally) -> SupervisorState:
         """Stop when votes overcome the threshold; keep what holds until it is released."""
-        if ballot is not state.ballot:
-            state = updated(state, ballot=ballot)
-        if ballot.stops and not state.voted:
-            return self._turned(updated(state, voted=True, vote_gains=ballot.gains))
+        if tally is not state.tally:
+            state = updated(state, tally=tally)
+        if tally.stops and not state.voted:
+            return self._turned(updated(state, voted=True, vote_gains=tally.gains))
         if not state.voted:
             return state
-        if not ballot.alive and self.parameters.vote_resume:
+        if not tally.alive and self.voting.vote_resume:
             return self._turned(updated(state, voted=False))
-        if self.parameters.vote_rule == SUM and np.any(ballot.gains > state.vote_gains):
-            return updated(state, vote_gains=np.maximum(ballot.gains, state.vote_gains))
+        if self.voting.vote_rule == SUM and np.any(tally.gains > state.vote_gains):
+            return updated(state, vote_gains=np.maximum(tally.gains, state.vote_gains))
         return state
 
     @staticmethod
@@ -280,11 +270,11 @@ class GaitSupervisor:
         return updated(state, automatic=state.automatic and automatic, idle_ns=-1)
 
     def _stopping(
-        self, state: SupervisorState, x: Array, rates: list[float], speed: float
+        self, state: SupervisorState, target: Array, x: Array, rates: list[float], speed: float,
     ) -> SupervisorState:
         armed = state.armed or speed <= self.parameters.capture_speed
         inhibition = Inhibition(True, self._gains(state, armed), self.parameters.region_radius)
-        if not any(inhibition.acting_gains(x, self.network.target).tolist()):
+        if not any(inhibition.acting_gains(x, target).tolist()):
             return updated(state, armed=armed, word='waiting')
         if (
             max(map(abs, rates)) > REST_PHASE_RATE
@@ -294,9 +284,8 @@ class GaitSupervisor:
             return updated(state, armed=armed, word='captured')
         return updated(state, armed=armed, word='at_rest', measured_s=self._measured(state))
 
-    def _running(self, state: SupervisorState, x: Array, speed: float) -> SupervisorState:
-        errors = self.network.phase_errors(x).tolist()
-        locked = max(map(abs, errors)) <= LOCKED_PHASE_ERROR
+    def _running(self, state: SupervisorState, errors: Array, speed: float) -> SupervisorState:
+        locked = max(map(abs, errors.tolist())) <= LOCKED_PHASE_ERROR
         swinging = min(state.activity.tolist())
         if state.word == 'releasing' and not (locked and swinging >= LOCKED_ACTIVITY):
             return state

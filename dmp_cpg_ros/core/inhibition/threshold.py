@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.canonical.voting_parameters import WINNER_TAKE_ALL
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.voting import MajorityClamp, majority_clamp
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.voting_parameters import WINNER_TAKE_ALL, VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 
 Array = NDArray[np.float64]
@@ -49,18 +49,13 @@ class VoteClamp:
     limit: float
     window: MajorityClamp
 
-    @property
-    def fits(self) -> bool:
-        """Whether a majority stops the gait for certain and fewer votes cannot."""
-        return self.window.lowest < self.gain < self.window.highest
 
-
-def majority(parameters: InhibitionParameters) -> int:
+def majority(parameters: VotingParameters) -> int:
     """Number of legs that stop the gait: one alone where the winner takes all."""
     return 1 if parameters.vote_rule == WINNER_TAKE_ALL else parameters.vote_majority
 
 
-def vote_clamp(network: GaitNetwork, parameters: InhibitionParameters,
+def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: VotingParameters,
                span: OperatingRange) -> VoteClamp:
     """Clamp of the votes, from ``vote_limit`` or computed.
 
@@ -71,8 +66,10 @@ def vote_clamp(network: GaitNetwork, parameters: InhibitionParameters,
     ----------
     network : GaitNetwork
         Oscillators.
-    parameters : InhibitionParameters
-        Gain, region, rule, majority.
+    inhibition : InhibitionParameters
+        Gain and region.
+    voting : VotingParameters
+        Rule, majority, limit.
     span : OperatingRange
         Cadences.
 
@@ -82,11 +79,11 @@ def vote_clamp(network: GaitNetwork, parameters: InhibitionParameters,
         The computed clamp is the geometric mean of the window; without a window a little over what
         is certified for the majority, and the whole k_inh where nothing is.
     """
-    window = majority_clamp(network.system, span.omega_armed[1], parameters.region_radius,
-                            majority(parameters), slowest_omega=span.omega[0])
-    k_inh = parameters.inhibition_gain
-    if parameters.vote_limit > 0.0 or k_inh == 0.0:
-        return VoteClamp(parameters.vote_limit * k_inh, parameters.vote_limit, window)
+    window = majority_clamp(network.system, span.omega_armed[1], inhibition.region_radius,
+                            majority(voting), slowest_omega=span.omega[0])
+    k_inh = inhibition.inhibition_gain
+    if voting.vote_limit > 0.0 or k_inh == 0.0:
+        return VoteClamp(voting.vote_limit * k_inh, voting.vote_limit, window)
     if not np.isfinite(window.lowest):
         return VoteClamp(k_inh, 1.0, window)
     gain = float(np.sqrt(window.lowest * min(window.highest, ROOM**2 * window.lowest)))

@@ -16,15 +16,28 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
-from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, Ballot, acting_gains
 from dmp_cpg_ros.core.inhibition.threshold import VoteClamp, holds_at_rest, vote_clamp
-from dmp_cpg_ros.core.inhibition.up_direction import UpDirection
-from dmp_cpg_ros.core.inhibition.vote_box import COLLISION, FOOTING, SILENCE, TILT, Vote
-from dmp_cpg_ros.core.inhibition.vote_memory import VoteMemory
-from dmp_cpg_ros.core.inhibition.voting_contact import ContactState, judge_contact
-from dmp_cpg_ros.core.inhibition.voting_sensors import LastGood, VoteSensors
+from dmp_cpg_ros.core.inhibition.voters import (
+    NEVER,
+    FootWatch,
+    LastGood,
+    UpFilter,
+    VoteSensors,
+    watch_feet,
+)
+from dmp_cpg_ros.core.inhibition.votes import (
+    COLLISION,
+    FOOTING,
+    NO_VOTES,
+    SILENCE,
+    TILT,
+    Tally,
+    Vote,
+    VoteMemory,
+    acting_gains,
+)
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -36,75 +49,104 @@ FRESH_NS = 20_000_000
 
 
 @dataclass(frozen=True)
+class ClampInForce:
+    """Clamp of the weights for the oscillators that act.
+
+    Attributes
+    ----------
+    clamp : VoteClamp
+        As computed.
+    computed_at : float
+        Cadence at zero reference for which it was computed [rad/s].
+    omega : float
+        The same at this tick [rad/s].
+    rules : tuple
+        Parameters that it was computed with.
+    """
+
+    clamp: VoteClamp
+    computed_at: float
+    omega: float
+    rules: tuple[object, ...]
+
+    @property
+    def limit(self) -> float:
+        """Largest weight at this tick; it follows the cadence as the threshold does."""
+        return self.clamp.limit * (self.omega / self.computed_at)
+
+
+@dataclass(frozen=True)
 class VotingState:
     """What voting remembers from tick to tick.
 
     Attributes
     ----------
     time_ns : int
-        Stamp of the tick [ns].
+        Stamp of the tick [ns]; −1 before the first.
     memory : VoteMemory
         Votes of all sources.
-    contact : ContactState
+    feet : FootWatch
         What the feet have felt.
     last_good : LastGood
         When sensors last said something good.
-    up : UpDirection
+    up : UpFilter
         Which way is up, by the IMU.
-    ballot : Ballot
+    clamp : ClampInForce or None
+        Clamp of the weights; None without voting.
+    tally : Tally
         Result; the same object as long as no vote changes.
     """
 
-    time_ns: int
-    memory: VoteMemory
-    contact: ContactState
-    last_good: LastGood
-    up: UpDirection
-    ballot: Ballot = NO_VOTES
+    time_ns: int = NEVER
+    memory: VoteMemory = VoteMemory()
+    feet: FootWatch = FootWatch()
+    last_good: LastGood = LastGood.at(0)
+    up: UpFilter = UpFilter()
+    clamp: ClampInForce | None = None
+    tally: Tally = NO_VOTES
 
 
 class Voting:
-    """Counts votes; state in, state out.
+    """Counts votes; state in, state out. With ``voting`` off it counts nothing.
 
     Parameters
     ----------
     inhibition : InhibitionParameters
+        Gain and region.
+    voting : VotingParameters
         How votes are counted.
     sources : VoteSourceParameters
         What makes the legs vote.
-    network : GaitNetwork
-        The oscillators that are inhibited; those that act may be set before each step.
     reference : ReferenceParameters
         Limits of the commands: they decide the cadences.
     weight : float
         Weight m g of the robot [N].
     """
 
-    def __init__(self, inhibition: InhibitionParameters, sources: VoteSourceParameters,
-                 network: GaitNetwork, reference: ReferenceParameters, weight: float) -> None:
-        """Compute the clamp."""
-        self.inhibition, self.sources, self.network = inhibition, sources, network
+    def __init__(self, inhibition: InhibitionParameters, voting: VotingParameters,
+                 sources: VoteSourceParameters, reference: ReferenceParameters, weight: float
+                 ) -> None:
+        """Keep the parts."""
+        self.inhibition, self.voting, self.sources = inhibition, voting, sources
         self.reference, self._weight = reference, weight
-        self._omega = self._clamped_omega = float('nan')
-        self._rules: tuple[object, ...] = ()
-        self.clamp: VoteClamp
-        self._limit()
 
-    def initial_state(self, time_ns: int = 0) -> VotingState:
-        """Nobody has voted; sensors have their time from here on."""
-        return VotingState(time_ns, VoteMemory(), ContactState.initial(), LastGood.at(time_ns),
-                           UpDirection.upright())
+    def initial_state(self, network: GaitNetwork) -> VotingState:
+        """Nobody has voted; the clamp, which takes a while, is computed here for a first gait."""
+        return VotingState(clamp=self._clamp(None, network) if self.voting.voting else None)
 
-    def step(self, state: VotingState | None, time_ns: int, sensors: VoteSensors,
+    def step(self, state: VotingState, time_ns: int, network: GaitNetwork, sensors: VoteSensors,
              x: Array, r: Array, walking: bool, votes: tuple[Vote, ...] = ()) -> VotingState:
-        """Advance by one tick.
+        """Count the votes of one tick.
 
         Parameters
         ----------
-        state : VotingState or None
-            After the tick before; None at the first.
+        state : VotingState
+            After the tick before.
         time_ns : int
-            Stamp of this tick [ns].
+            Stamp of this tick [ns]; sensors have their time from the first on, and from one that
+            is earlier than the last.
+        network : GaitNetwork
+            The oscillators that act, with their gait.
         sensors : VoteSensors
             Newest readings.
         x : ndarray (4, 2)
@@ -120,14 +162,15 @@ class Voting:
         -------
         VotingState
         """
-        if state is None or time_ns < state.time_ns:
-            state = self.initial_state(time_ns)
+        if not self.voting.voting:
+            return state
+        if state.time_ns == NEVER or time_ns < state.time_ns:
+            state = VotingState(last_good=LastGood.at(time_ns), clamp=state.clamp)
         p, memory = self.sources, state.memory
         last_good = state.last_good.after(sensors)
-        contact, lost, hit = self._contact(state.contact, time_ns, sensors, x, r, walking)
+        feet, lost, hit = self._feet(state.feet, time_ns, network, sensors, x, r, walking)
         silent, blind = last_good.silent(time_ns, round(p.silence_time * 1e9))
-        up = state.up if not sensors.imu_is_good else state.up.after(
-            sensors.rate_in_base, sensors.specific_force_in_base, sensors.imu_ns)
+        up = state.up.after(sensors)
         tilted = up.tilt > p.tilt_limit and not blind
         for source, legs, weight in (
             (FOOTING, lost, p.footing_weight),
@@ -136,47 +179,41 @@ class Voting:
             (SILENCE, silent | blind, p.silence_weight),
         ):
             if weight > 0.0 and legs.any():
-                memory = memory.heard(source, np.where(legs, weight, np.nan).tolist(), time_ns)
+                memory = memory.heard(source, np.where(legs, weight, np.nan), time_ns)
         for voter, weights in votes:
             memory = memory.heard(voter, weights, time_ns)
-        fade_ns = round(self.inhibition.vote_fade * 1e9)
+        fade_ns = round(self.voting.vote_fade * 1e9)
         memory = memory.alive(time_ns, fade_ns) if memory.asks else memory
-        ballot = self._count(state.ballot, memory, time_ns, fade_ns, self._limit())
-        return VotingState(time_ns, memory, contact, last_good, up, ballot)
+        clamp = self._clamp(state.clamp, network)
+        tally = self._count(state.tally, memory, time_ns, fade_ns, network, clamp.limit)
+        return VotingState(time_ns, memory, feet, last_good, up, clamp, tally)
 
-    def follow(self, inhibition: InhibitionParameters, reference: ReferenceParameters,
-               sources: VoteSourceParameters) -> None:
-        """Take over parameters that have changed; they act from the next step on."""
-        self.inhibition, self.reference, self.sources = inhibition, reference, sources
-
-    def _limit(self) -> float:
-        """Clamp of the weights for the oscillators that act.
-
-        It is computed anew for new parameters and for a gait that has come to stay; in between it
-        follows the cadence, as the threshold of stiff couplings does.
+    def _clamp(self, before: ClampInForce | None, network: GaitNetwork) -> ClampInForce:
+        """Clamp at this tick, computed anew for new parameters and for a gait that has come to
+        stay.
         """
-        omega = self.network.omega(np.zeros(3))
-        stays, self._omega = omega == self._omega, omega
-        rules = (self.inhibition, self.network.parameters, self.reference)
-        if rules != self._rules or (stays and omega != self._clamped_omega):
-            self._rules, self._clamped_omega = rules, omega
-            self.clamp = vote_clamp(self.network, self.inhibition, operating_range(
-                self.network, self.inhibition, self.reference))
-        return self.clamp.limit * (omega / self._clamped_omega)
+        omega = network.omega(np.zeros(3))
+        rules = (self.inhibition, self.voting, network.parameters, self.reference)
+        if before is not None and before.rules == rules and (
+                omega != before.omega or omega == before.computed_at):
+            return replace(before, omega=omega)
+        span = operating_range(network, self.inhibition, self.reference)
+        clamp = vote_clamp(network, self.inhibition, self.voting, span)
+        return ClampInForce(clamp, omega, omega, rules)
 
-    def _contact(self, contact: ContactState, time_ns: int, sensors: VoteSensors, x: Array,
-                 r: Array, walking: bool
-                 ) -> tuple[ContactState, NDArray[np.bool_], NDArray[np.bool_]]:
-        network, load = self.network, sensors.foot_force / self._weight
+    def _feet(self, feet: FootWatch, time_ns: int, network: GaitNetwork, sensors: VoteSensors,
+              x: Array, r: Array, walking: bool
+              ) -> tuple[FootWatch, NDArray[np.bool_], NDArray[np.bool_]]:
+        load = sensors.foot_force / self._weight
         if time_ns - sensors.contact_ns > FRESH_NS:
             load = np.full(len(LEGS), np.nan)
         speed = network.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
-        return judge_contact(
-            contact, self.sources, time_ns, walking, network.gait.cycle_position(phase(x)),
+        return watch_feet(
+            feet, self.sources, time_ns, walking, network.gait.cycle_position(phase(x)),
             network.gait.duty(speed, network.scale), network.omega(r), load)
 
-    def _count(self, before: Ballot, memory: VoteMemory, time_ns: int, fade_ns: int,
-               limit: float) -> Ballot:
+    def _count(self, before: Tally, memory: VoteMemory, time_ns: int, fade_ns: int,
+               network: GaitNetwork, limit: float) -> Tally:
         """Count; the threshold is computed only when a weight has changed."""
         if not memory.asks:
             return NO_VOTES
@@ -185,7 +222,7 @@ class Voting:
         causes = memory.causes(time_ns, fade_ns)
         if np.array_equal(weights, before.weights):
             return before if causes == before.causes else replace(before, causes=causes)
-        gains = acting_gains(weights, p.inhibition_gain, p.vote_rule)
-        omega = self.network.omega(np.zeros(3))
-        stops = holds_at_rest(self.network.system, omega, gains, p.region_radius)
-        return Ballot(weights, gains, stops, causes)
+        gains = acting_gains(weights, p.inhibition_gain, self.voting.vote_rule)
+        omega = network.omega(np.zeros(3))
+        stops = holds_at_rest(network.system, omega, gains, p.region_radius)
+        return Tally(weights, gains, stops, causes)

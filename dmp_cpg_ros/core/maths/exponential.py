@@ -97,19 +97,21 @@ class ExponentialStep:
 
         Parameters
         ----------
-        x : ndarray (n,)
+        x : ndarray (...) of n numbers
             State.
         nonlinear : callable
-            N: ndarray (n,) → ndarray (n,).
+            N: of the shape of x to the same shape.
 
         Returns
         -------
-        ndarray (n,)
+        ndarray (...)
             State one step later.
         """
-        n, stages = len(x), self._stages  # below, dot has half the overhead of @ at this size
-        stages[:n] = x
-        stages[n : 2 * n] = nonlinear(x)
-        stages[2 * n : 3 * n] = nonlinear(self._to_half.dot(stages[: 2 * n]) + self._c_half)
-        stages[3 * n :] = nonlinear(self._to_end.dot(stages[: 3 * n]) + self._c)
-        return self._final.dot(stages) + self._c
+        n, stages, shape = x.size, self._stages, x.shape
+        stages[:n] = x.ravel()  # below, dot has half the overhead of @ at this size
+        stages[n : 2 * n] = nonlinear(x).ravel()
+        half = self._to_half.dot(stages[: 2 * n]) + self._c_half
+        stages[2 * n : 3 * n] = nonlinear(half.reshape(shape)).ravel()
+        end = self._to_end.dot(stages[: 3 * n]) + self._c
+        stages[3 * n :] = nonlinear(end.reshape(shape)).ravel()
+        return (self._final.dot(stages) + self._c).reshape(shape)

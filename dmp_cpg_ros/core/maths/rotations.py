@@ -12,27 +12,6 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def skew(v: Array) -> Array:
-    """Matrix of the cross product, ``skew(v) @ u = v × u``: (..., 3) → (..., 3, 3)."""
-    matrix = np.zeros((*v.shape, 3))
-    x, y, z = v[..., 0], v[..., 1], v[..., 2]
-    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
-    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
-    return matrix
-
-
-def rotation_matrix(quaternion: Array) -> Array:
-    """Matrix (3, 3) of a unit quaternion (4,)."""
-    x, y, z, w = quaternion.tolist()
-    return np.array(
-        (
-            (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
-            (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
-            (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-        )
-    )
-
-
 def turned(quaternion: Array, rotation_vector: Array) -> Array:
     """Turn a quaternion by a rotation vector in its own (the body's) frame: q ⊗ exp(φ/2).
 

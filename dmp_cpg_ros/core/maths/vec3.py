@@ -8,6 +8,7 @@ NumPy needs about a microsecond for any operation on three numbers, plain floats
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 
 Triple = tuple[float, float, float]
 """A vector."""
@@ -95,3 +96,12 @@ def upward(quaternion: Sequence[float]) -> Triple:
     """Third row of :func:`rotation`: the world's z axis seen in the body."""
     x, y, z, w = quaternion
     return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+def heading_frame(z_in_base: Triple) -> Matrix:
+    """Rotation from the base to the frame of the base's heading with a given z axis."""
+    x, y, z = z_in_base
+    forward_x, forward_y, forward_z = 1.0 - x * x, -x * y, -x * z
+    length = sqrt(forward_x * forward_x + forward_y * forward_y + forward_z * forward_z) + 1e-12
+    forward = (forward_x / length, forward_y / length, forward_z / length)
+    return forward, cross(z_in_base, forward), z_in_base

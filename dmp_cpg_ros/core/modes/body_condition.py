@@ -10,7 +10,7 @@ from math import acos, inf
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.legs import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState

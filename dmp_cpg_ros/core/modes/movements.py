@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.modes.postures import (
     leg_angles,
     lying_posture,

@@ -73,22 +73,25 @@ class CommandGate:
         Limits and timeout.
     scale : BodyScale, optional
         The robot's lengths, for the limits of the gait and of curves.
-
-    Attributes
-    ----------
     highest_speed : float
         Dimensionless foot speed of the gait that is wanted, see
-        :func:`~dmp_cpg_ros.core.gait.choice.highest_speed`; infinite at the start.
+        :func:`~dmp_cpg_ros.core.gait.choice.highest_speed`.
     """
 
     def __init__(
-        self, parameters: ReferenceParameters, scale: BodyScale | None = None
+        self, parameters: ReferenceParameters, scale: BodyScale | None = None,
+        highest_speed: float = inf,
     ) -> None:
         """Start with a zero command."""
-        self.parameters, self.highest_speed, self._scale = parameters, inf, scale
+        self._scale = scale
+        self.follow(parameters, highest_speed)
         self._command: tuple[float, float, float] = (0.0, 0.0, 0.0)
         self._received_ns: int | None = None
         self._fresh = False
+
+    def follow(self, parameters: ReferenceParameters, highest_speed: float) -> None:
+        """Take new limits; they hold for the next command, that of the gait at once."""
+        self.parameters, self.highest_speed = parameters, highest_speed
 
     def accept(self, v_x: float, v_y: float, gamma: float) -> None:
         """Take a new command; it acts from the next :meth:`at` on.

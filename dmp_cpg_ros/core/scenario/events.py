@@ -10,21 +10,27 @@ A new kind is one entry in :data:`EVENT_KINDS` here and one in the tables of tho
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, cast
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.modes.body_requests import REQUESTS
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.scenario.parameter_change import read_change
-from dmp_cpg_ros.core.scenario.push import read_push
+from dmp_cpg_ros.core.scenario.push import FRAMES, LARGEST_MEAN_FORCE, Push
+from dmp_cpg_ros.core.suite_parameters import OWNER, SuiteParameters
 
 Command = tuple[float, float, float]
 Read = Callable[[Any, str], tuple[Any, str]]
 
 LONGEST_S = 86400.0
 """Latest time in a scenario [s]."""
+
+LARGEST_IMPULSE = 1000.0
+"""Largest component of an impulse [N s]."""
+
+LONGEST_PUSH_S = 10.0
+"""Longest push [s]."""
 
 
 @dataclass(frozen=True)
@@ -58,16 +64,21 @@ class Event:
                 f"{where} needs 'at' and exactly one of {', '.join(EVENT_KINDS)}, "
                 f'not {dict(entry)}'
             )
-        try:
-            at = float(entry['at'])
-        except (TypeError, ValueError) as error:
-            raise DataError(
-                f'{where}: at = {entry["at"]!r} must be a number of seconds'
-            ) from error
-        if not 0.0 <= at <= LONGEST_S:
-            raise DataError(f'{where}: at = {at} s must lie between 0 and a day')
+        (at,) = numbers([entry['at']], where, f'at = {entry["at"]!r} s', 0.0, LONGEST_S)
         value, label = EVENT_KINDS[kinds[0]](entry[kinds[0]], where)
         return cls(at, kinds[0], value, str(entry.get('label', '')) or label)
+
+
+def numbers(values: Iterable[Any], where: str, what: str, low: float, high: float) -> list[float]:
+    """Numbers within a range; raises DataError that says what they are."""
+    try:
+        found = [float(value) for value in values]
+    except (TypeError, ValueError) as error:
+        raise DataError(f'{where}: {what} must be numbers: {error}') from error
+    if not all(low <= number <= high for number in found):
+        raise DataError(
+            f'{where}: {what} must be finite, at least {low:g} and at most {high:g}')
+    return found
 
 
 def known(values: Any, valid: tuple[str, ...], where: str) -> None:
@@ -84,12 +95,9 @@ def _command(value: Any, where: str) -> tuple[Command | None, str]:
     if value == 'silence':
         return None, 'silence'
     known(value, ('v_x', 'v_y', 'gamma'), where)
-    try:
-        v_x, v_y, gamma = (float(value.get(key, 0.0)) for key in ('v_x', 'v_y', 'gamma'))
-    except (TypeError, ValueError) as error:
-        raise DataError(f'{where}: command {value} must hold numbers') from error
-    if not all(abs(number) <= 100.0 for number in (v_x, v_y, gamma)):
-        raise DataError(f'{where}: command {value} must be finite and at most 100')
+    v_x, v_y, gamma = numbers(
+        (value.get(key, 0.0) for key in ('v_x', 'v_y', 'gamma')), where, f'command {value}',
+        -100.0, 100.0)
     return (v_x, v_y, gamma), f'v = ({v_x:g}, {v_y:g}) m/s, gamma = {gamma:g} rad/s'
 
 
@@ -110,14 +118,52 @@ def _gait(value: Any, where: str) -> tuple[str, str]:
 def _votes(value: Any, where: str) -> tuple[dict[str, float], str]:
     """Read votes for a stop: weights by leg; none end what was voted before."""
     known(value, LEGS, where)
-    try:
-        weights = {leg: float(weight) for leg, weight in value.items()}
-    except (TypeError, ValueError) as error:
-        raise DataError(f'{where}: votes {value} must hold numbers') from error
-    if not all(0.0 <= weight <= 100.0 for weight in weights.values()):
-        raise DataError(f'{where}: votes {value} must be finite, at least 0 and at most 100')
+    weights = dict(zip(
+        value, numbers(value.values(), where, f'votes {value}', 0.0, 100.0), strict=True))
     told = ', '.join(f'{leg} {weight:g}' for leg, weight in weights.items())
     return weights, f'votes {told}' if told else 'no more votes'
+
+
+def _push(value: Any, where: str) -> tuple[Push, str]:
+    """Read a push, such as ``{impulse: [0, 5, 0], duration: 0.1, frame: odom}``."""
+    known(value, ('impulse', 'duration', 'frame'), f'{where}: push')
+    impulse = value.get('impulse')
+    if not isinstance(impulse, (list, tuple)) or len(impulse) != 3:
+        raise DataError(f'{where}: push needs impulse: [x, y, z] in N s, not {impulse!r}')
+    x, y, z = numbers(impulse, where, f'impulse {impulse} N s', -LARGEST_IMPULSE, LARGEST_IMPULSE)
+    (duration,) = numbers([value.get('duration', Push.duration_s)], where,
+                          'duration of the push', 1e-6, LONGEST_PUSH_S)
+    most = LARGEST_MEAN_FORCE * duration
+    numbers((x, y, z), where, f'impulse {impulse} N s over {duration:g} s', -most, most)
+    frame = value.get('frame', FRAMES[0])
+    if frame not in FRAMES:
+        raise DataError(f"{where}: push in frame '{frame}'; valid are {', '.join(FRAMES)}")
+    label = f'push of ({x:g}, {y:g}, {z:g}) N s over {duration:g} s in {frame}'
+    return Push((x, y, z), duration, frame), label
+
+
+def _change(value: Any, where: str) -> tuple[dict[str, Any], str]:
+    """Read a change of parameters of one owner, all at once, such as ``{inhibition_gain: 300}``.
+
+    Whole numbers are floats where the parameter is one, lists are tuples. Ranges are left to the
+    owner, which refuses what is outside.
+    """
+    if not isinstance(value, Mapping) or not value:
+        raise DataError(f'{where}: set must be a mapping from parameters to values, not {value!r}')
+    known(value, tuple(sorted(OWNER)), f'{where}: set')
+    owners = sorted({OWNER[name] for name in value})
+    if len(owners) > 1:
+        raise DataError(f'{where}: {", ".join(value)} belong to {" and ".join(owners)}; make one '
+                        'event for each')
+    floats = {field.name for part in fields(SuiteParameters)
+              for field in fields(cast(Any, part.default_factory))
+              if isinstance(field.default, float)}
+    values = {
+        name: tuple(entry) if isinstance(entry, list)
+        else float(entry) if name in floats and type(entry) is int else entry
+        for name, entry in value.items()
+    }
+    return values, 'set ' + ', '.join(f'{name} = {entry}' for name, entry in value.items())
 
 
 def _request(what: str) -> Read:
@@ -135,8 +181,8 @@ EVENT_KINDS: dict[str, Read] = {
     'command': _command,
     'inhibit': _inhibit,
     'gait': _gait,
-    'push': read_push,
-    'set': read_change,
+    'push': _push,
+    'set': _change,
     'votes': _votes,
     **{what: _request(what) for what in REQUESTS},
 }

@@ -8,15 +8,14 @@ does: whoever falls silent stops pushing. A longer push is renewed.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from math import atan2, cos, isfinite, sin
-from typing import Any
+from math import cos, isfinite, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
 
 HOLD_NS = 100_000_000
 """How long a force acts that is not renewed [ns]."""
@@ -24,19 +23,12 @@ HOLD_NS = 100_000_000
 FRAMES = ('base_footprint', 'odom')
 """Frames of a force: x along the base's heading and z up, or the world's."""
 
-LARGEST_IMPULSE = 1000.0
-"""Largest component of an impulse [N s]."""
-
 LARGEST_FORCE = 15_000.0
 """Largest component of a force [N]: a hundred times a robot's weight, which a simulation bears."""
 
 LARGEST_MEAN_FORCE = LARGEST_FORCE / 1.5
 """Largest component of an impulse over its duration [N], which whole ticks round by half at most.
 """
-
-LONGEST_S = 10.0
-"""Longest push [s]."""
-
 
 @dataclass(frozen=True)
 class PushForce:
@@ -71,8 +63,7 @@ class PushForce:
         f_x, f_y, f_z = self.force
         if self.frame == 'odom':
             return np.array((f_x, f_y, f_z))
-        x, y, z, w = base_quaternion.tolist()
-        yaw = atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+        yaw = roll_pitch_yaw(base_quaternion)[2]
         c, s = cos(yaw), sin(yaw)
         return np.array((c * f_x - s * f_y, s * f_x + c * f_y, f_z))
 
@@ -125,42 +116,3 @@ class PushQueue:
         due = [force for force in self._waiting if force.time_ns <= now_ns]
         self._waiting = self._waiting[len(due):]
         return due[-1] if due else None
-
-
-def read_push(value: Any, where: str) -> tuple[Push, str]:
-    """Read a scenario's ``push``, such as ``{impulse: [0, 5, 0], duration: 0.1, frame: odom}``.
-
-    Returns
-    -------
-    push : Push
-    label : str
-        What to tell the user.
-
-    Raises
-    ------
-    DataError
-        That says what is valid.
-    """
-    valid = 'impulse: [x, y, z] in N s, and perhaps duration [s] and frame'
-    if not isinstance(value, Mapping) or not {'impulse'} <= set(value) <= {
-            'impulse', 'duration', 'frame'}:
-        raise DataError(f'{where}: push must be a mapping with {valid}, not {value!r}')
-    try:
-        x, y, z = (float(number) for number in value['impulse'])
-        duration = float(value.get('duration', Push.duration_s))
-    except (TypeError, ValueError) as error:
-        raise DataError(f'{where}: push must have numbers for {valid}, not {value}') from error
-    if not all(abs(number) <= LARGEST_IMPULSE for number in (x, y, z)):
-        raise DataError(f'{where}: the impulse {[x, y, z]} must be finite and at most '
-                        f'{LARGEST_IMPULSE:g} N s')
-    if not 0.0 < duration <= LONGEST_S:
-        raise DataError(f'{where}: the duration {duration} s of the push must be positive and at '
-                        f'most {LONGEST_S:g} s')
-    if max(abs(x), abs(y), abs(z)) > LARGEST_MEAN_FORCE * duration:
-        raise DataError(f'{where}: the impulse {[x, y, z]} over {duration:g} s must be at most '
-                        f'{LARGEST_MEAN_FORCE * duration:g} N s: {LARGEST_MEAN_FORCE:g} N')
-    frame = value.get('frame', FRAMES[0])
-    if frame not in FRAMES:
-        raise DataError(f"{where}: push in frame '{frame}'; valid are {', '.join(FRAMES)}")
-    label = f'push of ({x:g}, {y:g}, {z:g}) N s over {duration:g} s in {frame}'
-    return Push((x, y, z), duration, frame), label

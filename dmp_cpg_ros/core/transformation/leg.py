@@ -152,17 +152,15 @@ class LegPrimitive:
         ``fl``, ``fr``, ``rl`` or ``rr``.
     description : RobotDescription
         The robot.
-    gait : Gait
-        The gait in force; the attribute is set when it changes.
     parameters : LegParameters
         Gains and swing.
     """
 
     def __init__(
-        self, leg: str, description: RobotDescription, gait: GaitInForce, parameters: LegParameters
+        self, leg: str, description: RobotDescription, parameters: LegParameters
     ) -> None:
         """Derive foothold and scale from the description."""
-        self.parameters, self.gait, self.place = parameters, gait, LEGS.index(leg)
+        self.parameters, self.place = parameters, LEGS.index(leg)
         geometry = description.legs[self.place]
         self.kinematics = LegKinematics(geometry)
         self.scale = body_scale(description)
@@ -189,6 +187,7 @@ class LegPrimitive:
     def step(
         self,
         state: LegState,
+        gait: GaitInForce,
         x: Array,
         x_dot: Array,
         r: Array,
@@ -201,6 +200,8 @@ class LegPrimitive:
         ----------
         state : LegState
             State one tick before.
+        gait : Gait or BlendedGait
+            In force.
         x, x_dot : ndarray (2,)
             The leg's oscillator state and its derivative [1/s].
         r : ndarray (3,)
@@ -216,11 +217,11 @@ class LegPrimitive:
         goal, goal_velocity : ndarray (3,)
             g_θ [rad] and g_θ̇ [rad/s].
         """
-        p, gait = self.parameters, self.gait
+        p = self.parameters
         v_x, v_y, gamma = gait.limited(r.tolist(), self.scale)
         speed = self.scale.foot_speed(v_x, v_y, gamma)
         duty = gait.duty(speed, self.scale)
-        omega = gait.own_omega(self.place, gait.omega(speed, self.scale))
+        omega = gait.own_omegas(gait.omega(speed, self.scale))[self.place]
         x_1, x_2 = x.tolist()
         rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))

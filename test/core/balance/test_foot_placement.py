@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.balance.foot_placement import FootPlacement
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.maths.levelling import level_from_base
-from dmp_cpg_ros.core.maths.vec3 import Triple, pair
+from dmp_cpg_ros.core.maths.vec3 import Triple, heading_frame, pair, upward
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.transformation.leg import nominal_foothold
 
@@ -75,7 +74,7 @@ def test_a_pendulum_comes_to_rest_on_its_footholds(gain: float) -> None:
 @given(roll=st.floats(-0.3, 0.3), pitch=st.floats(-0.3, 0.3))
 def test_raised_feet_of_a_tilted_body_are_level(roll: float, pitch: float) -> None:
     q = np.array([np.sin(roll / 2), np.sin(pitch / 2), 0.0, 1.0])
-    R_level_base = level_from_base((q / np.linalg.norm(q)).tolist())
+    R_level_base = heading_frame(upward((q / np.linalg.norm(q)).tolist()))
     raised = np.array(PLACEMENT.raised(P, [(0.0, 0.0)] * 4, R_level_base))
     feet = (FEET + raised[:, None] * np.array([0.0, 0.0, 1.0])) @ np.array(R_level_base).T
     inside = np.abs(raised) < 0.09

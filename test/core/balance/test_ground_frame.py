@@ -10,7 +10,8 @@ from core_examples import quadruped, standing_state
 
 from dmp_cpg_ros.core.balance.ground_frame import SLIGHT, ground_from_base, lean
 from dmp_cpg_ros.core.estimation.terrain_plane import normal_in_world
-from dmp_cpg_ros.core.maths.rotations import rotation_matrix, turned
+from dmp_cpg_ros.core.maths.rotations import turned
+from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
@@ -30,7 +31,7 @@ def test_without_slope_it_is_level(turn: tuple[float, float, float]) -> None:
     np.testing.assert_allclose(known, unknown, atol=1e-12)
     np.testing.assert_allclose(known, level, atol=1e-12)
     np.testing.assert_allclose(upward, (0.0, 0.0, 1.0), atol=1e-12)
-    R = rotation_matrix(turned(LEVEL, np.array(turn)))
+    R = np.array(rotation(turned(LEVEL, np.array(turn)).tolist()))
     np.testing.assert_allclose(known[2], R[2], atol=1e-12)  # its z axis is the vertical
 
 
@@ -40,7 +41,7 @@ def test_on_a_slope_its_z_axis_is_the_normal(slope: tuple[float, float],
                                              turn: tuple[float, float, float]) -> None:
     state = state_on(slope, turn)
     R, upward = (np.array(found) for found in ground_from_base(state))
-    R_world_base = rotation_matrix(state.base_quaternion)
+    R_world_base = np.array(rotation(state.base_quaternion.tolist()))
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(R) == pytest.approx(1.0)
     # The frame falls short of the slope by (SLIGHT / slope)² of it.

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.balance.sway import STRAIGHT, planned_sway
-from dmp_cpg_ros.core.gait.com_height import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.studies.walking_trials import relative_error, steady
 from dmp_cpg_ros.suite import load_gaits
 

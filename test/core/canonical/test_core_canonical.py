@@ -26,7 +26,7 @@ def system(name: str = 'all_to_all', size: int = 4, k: float = 50.0, seed: int =
     rng = np.random.default_rng(seed)
     phases = rng.uniform(-np.pi, np.pi, size)
     graph = graph_from_edges(size, topology(name, size), k, phases)
-    oscillators = tuple(AndronovHopf(rho, r) for r in rng.uniform(0.8, 1.2, size))
+    oscillators = AndronovHopf(rho, rng.uniform(0.8, 1.2, size))
     return CanonicalSystem(graph, oscillators, state_at(phases))
 
 
@@ -49,8 +49,9 @@ def test_field_is_the_sum_that_the_paper_prints(name: str, seed: int, size: int)
     rng = np.random.default_rng(seed)
     of, x = system(name, size, seed=seed), rng.normal(size=(size, 2))
     omega, gains = rng.normal(size=size), rng.uniform(0.0, 100.0, size)
-    expected = np.array([oscillator.field(x[i], omega[i]) + gains[i] * (of.target[i] - x[i])
-                         for i, oscillator in enumerate(of.oscillators)])
+    expected = np.array([
+        AndronovHopf(8.0, float(of.radius[i])).field(x[i], omega[i])
+        + gains[i] * (of.target[i] - x[i]) for i in range(size)])
     for (i, j), K in zip(of.graph.edges, of.graph.gains, strict=True):
         seen = state_at(phase(x[j]) + of.graph.phases[i] - of.graph.phases[j], np.hypot(*x[j]))
         expected[i] += K @ (seen - x[i])
@@ -158,5 +159,5 @@ def test_phase_errors_do_not_see_a_common_phase() -> None:
 
 def test_as_many_oscillators_as_nodes() -> None:
     graph = graph_from_edges(3, topology('ring', 3), 1.0)
-    with pytest.raises(ParameterError, match='3 nodes need 3 oscillators, not 2'):
-        CanonicalSystem(graph, (AndronovHopf(1.0), AndronovHopf(1.0)))
+    with pytest.raises(ParameterError, match='3 nodes need one radius or 3, not 2'):
+        CanonicalSystem(graph, AndronovHopf(1.0, np.ones(2)))

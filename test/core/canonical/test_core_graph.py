@@ -12,10 +12,9 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.canonical.graph import (
     CouplingGraph,
     graph_from_edges,
-    phases_from_offsets,
     topology,
 )
-from dmp_cpg_ros.core.canonical.phase import state_at, wrapped
+from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
 
 NAMES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
@@ -72,50 +71,6 @@ def test_turning_each_node_into_its_place_gives_the_block_laplacian(seed: int) -
     back = (graph.coupling_matrix() @ x.ravel()).reshape(4, 2)
     seen = np.array([R.T @ v for R, v in zip(turn, back, strict=True)])
     assert np.allclose(seen.ravel(), -graph.block_laplacian() @ y.ravel())
-
-
-@given(seed=st.integers(0, 1000), size=st.integers(2, 7))
-def test_phases_are_found_from_consistent_offsets(seed: int, size: int) -> None:
-    rng = np.random.default_rng(seed)
-    phases = rng.uniform(-3.0, 3.0, size)
-    edges = {(i, int(rng.integers(i))) for i in range(1, size)}
-    edges |= {tuple(map(int, rng.choice(size, 2, replace=False))) for _ in range(size)}
-    offsets = {(i, j): phases[i] - phases[j] + 2.0 * np.pi * rng.integers(-1, 2) for i, j in edges}
-    found = phases_from_offsets(size, offsets)
-    assert np.allclose(wrapped(found - (phases - phases[0])), 0.0, atol=1e-9)
-
-
-def test_offsets_that_disagree_name_their_loop() -> None:
-    offsets = {(1, 0): 0.5, (2, 1): 0.5, (3, 2): 0.5, (4, 3): 0.5, (4, 1): 1.0}
-    with pytest.raises(ParameterError) as raised:
-        phases_from_offsets(5, offsets)
-    named = str(raised.value).split('loop ')[1].split(' add')[0]
-    loop = [int(word) for word in named.split(' - ')]
-    assert loop[0] == loop[-1] and set(loop) == {1, 2, 3, 4} and len(loop) == 5
-    steps = list(zip(loop[:-1], loop[1:], strict=True))
-    assert all((a, b) in offsets or (b, a) in offsets for a, b in steps)
-
-
-def test_offsets_of_both_directions_must_be_opposite() -> None:
-    assert np.allclose(phases_from_offsets(2, {(1, 0): 0.3, (0, 1): -0.3}), [0.0, 0.3])
-    with pytest.raises(ParameterError, match='loop'):
-        phases_from_offsets(2, {(1, 0): 0.3, (0, 1): 0.3})
-
-
-def test_nodes_that_nobody_reaches_are_named() -> None:
-    with pytest.raises(ParameterError, match=r'\[2, 3\] are not connected'):
-        phases_from_offsets(4, {(1, 0): 0.0, (3, 2): 0.0})
-
-
-@pytest.mark.parametrize('edge', [(0, 9), (-1, 0), (1, 1)])
-def test_offsets_of_impossible_edges_are_refused(edge: tuple[int, int]) -> None:
-    with pytest.raises(ParameterError, match='nodes 0 to 1'):
-        phases_from_offsets(2, {(1, 0): 0.0, edge: 0.1})
-
-
-def test_offsets_must_be_finite() -> None:
-    with pytest.raises(ParameterError, match='finite'):
-        phases_from_offsets(2, {(1, 0): np.nan})
 
 
 @pytest.mark.parametrize(('edges', 'gain', 'words'), [

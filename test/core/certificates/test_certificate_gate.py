@@ -13,11 +13,11 @@ from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_sta
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.gait_reader import GaitReader
 from dmp_cpg_ros.core.gait.gait_word import gait_word, read_gait_word
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
-from dmp_cpg_ros.core.gait.running_network import CADENCE_RATE, RunningNetwork
+from dmp_cpg_ros.core.gait.running import CADENCE_RATE, RunningGait
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER, SuiteParameters
@@ -135,25 +135,24 @@ def test_a_scaled_gait_differs_in_its_cadence_only(gait: str) -> None:
 
 
 def test_the_cadence_moves_to_its_factor_at_its_rate() -> None:
-    networks = GaitNetworks(
-        CanonicalParameters(), RUNNING.scale, GaitChangeParameters(), GaitReader(GAITS))
-    running, x, free = RunningNetwork(networks, GAITS['amble']), np.ones((4, 2)), Inhibition(
-        False, np.zeros(4), 0.3)
-    running.change(CanonicalParameters(cadence_scale=1.2))
-    seen, r = [], np.array([0.3, 0.0, 0.0])
-    plain = running.network.omega(r)
+    free, r, seen = Inhibition(False, np.zeros(4), 0.3), np.array([0.3, 0.0, 0.0]), []
+    before = RunningGait(CanonicalParameters(), RUNNING.scale, GaitReader(GAITS))
+    state = before.initial_state(GAITS['amble'], InhibitionParameters())
+    plain = before.network(state.gait).omega(r)
+    others = GaitChangeParameters(), GaitChoiceParameters()
+    running = before.with_parameters(CanonicalParameters(cadence_scale=1.2), *others)
     for _ in range(120):
-        running.begin_tick(x, r, free, TICK)
-        acting = running.network
-        seen.append(running.cadence_scale)
-        assert acting.omega(r) == pytest.approx(plain * running.cadence_scale)
-        assert read_gait_word(running.word) == ('amble', running.cadence_scale)
+        state = running.step(state, r, free, TICK)
+        seen.append(state.cadence_scale)
+        assert running.network(state.gait).omega(r) == pytest.approx(plain * state.cadence_scale)
+        assert read_gait_word(state.gait.word) == ('amble', state.cadence_scale)
     assert np.all(np.diff([1.0, *seen]) <= CADENCE_RATE * TICK + 1e-12)
     assert seen[-1] == 1.2 == seen[int(0.2 / CADENCE_RATE / TICK) + 1]
-    running.change(CanonicalParameters(cadence_scale=1.2, coupling_gain=50.0))
-    running.begin_tick(x, r, free, TICK)
-    assert running.network.parameters.coupling_gain == 50.0
-    assert running.cadence_scale == 1.2
+    weaker = CanonicalParameters(cadence_scale=1.2, coupling_gain=50.0)
+    running = running.with_parameters(weaker, *others)
+    state = running.step(state, r, free, TICK)
+    assert running.network(state.gait).parameters.coupling_gain == 50.0
+    assert state.cadence_scale == 1.2
 
 
 def walk(loop: WalkingLoop, ticks: int, start: int = 0) -> list[Tick]:

@@ -90,7 +90,7 @@ def own_frequencies(system: CanonicalSystem, omega: float, gains: np.ndarray,
     """
     if not free.synchronises or free.weights is None:
         return np.zeros(len(LEGS))
-    oscillator = system.oscillators[0]
+    oscillator = system.oscillators
     allowed = 0.5 * capture_set(system, omega, gains, inhibition.region_radius).tolerance
     share = LARGEST_MISMATCH
     while share > 1e-4 and not mismatch_bound(

@@ -15,6 +15,7 @@ from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
@@ -28,7 +29,7 @@ class Gait:
                  reference: ReferenceParameters, x: np.ndarray, r: np.ndarray,
                  stop: SupervisorState | None = None) -> None:
         self.network, self.reference = gait, ReferenceSystem(reference)
-        self.supervisor = GaitSupervisor(inhibition, gait, LEG.activity_rate)
+        self.supervisor = GaitSupervisor(inhibition, VotingParameters(), LEG.activity_rate)
         self.stop = stop or replace(self.supervisor.initial_state(), word='walking',
                                     requested=False, armed=False, activity=np.ones(4))
         self.published, self.x, self.r = self.supervisor.inhibition(self.stop), x, r
@@ -41,8 +42,9 @@ class Gait:
         self.r = self.reference.step(self.r, r_ext, TICK)
         self.x = self.network.step(self.x, self.r, self.published, TICK)
         rate = self.network.rate(self.x, self.r, self.published)
-        self.stop = self.supervisor.step(self.stop, self.tick_count * round(TICK * 1e9), self.x,
-                                         rate, self.r, self.command)
+        self.stop = self.supervisor.step(
+            self.stop, self.tick_count * round(TICK * 1e9), self.network, self.x, rate, self.r,
+            self.command)
         self.published = self.supervisor.inhibition(self.stop)
         return self.stop
 

@@ -18,10 +18,10 @@ from dmp_cpg_ros.core.certificates.lock_watch import (
     PhaseLockWatch,
 )
 from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH
-from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.gait_reader import GaitReader
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.gait.running_network import RunningNetwork
+from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 
 R = np.array([0.3, 0.0, 0.0])
@@ -130,18 +130,16 @@ def test_places_that_move_are_followed_without_an_alarm() -> None:
 
 def test_changed_couplings_are_watched_with_their_own_rate() -> None:
     start = network()
-    networks = GaitNetworks(
-        start.parameters, start.scale, GaitChangeParameters(), GaitReader(GAITS))
-    changing = RunningNetwork(networks, GAITS['amble'])
-    watcher = PhaseLockWatch()
-    x, bounds = changing.network.locked_state(), []
+    running = RunningGait(start.parameters, start.scale, GaitReader(GAITS))
+    state = running.initial_state(GAITS['amble'], InhibitionParameters(start_inhibited=False))
+    watcher, bounds = PhaseLockWatch(), []
     for gain in (100.0, 25.0):
-        changing.change(type(network().parameters)(coupling_gain=gain))
+        running = running.with_parameters(type(start.parameters)(coupling_gain=gain),
+                                          GaitChangeParameters(), GaitChoiceParameters())
         lock = None
         for _ in range(200):
-            x = changing.begin_tick(x, R, FREE, TICK)
-            x = changing.advance(x, R, FREE, TICK)
-            lock = watcher.step(lock, changing.network, R, x, True, TICK)
+            state = running.step(state, R, FREE, TICK)
+            lock = watcher.step(lock, running.network(state.gait), R, state.x, True, TICK)
         assert lock is not None
         bounds.append(lock.bound)
     assert bounds[1] > 3.0 * bounds[0]

@@ -58,7 +58,7 @@ def certified_settings() -> tuple[list[Setting], list[CaptureSet], np.ndarray]:
             setting = replace(setting, omega=setting.omega * rng.uniform(0.98, 1.02, 4))
         capture = capture_set(setting.system, setting.omega, setting.gains, setting.region_radius)
         contraction = inhibited_contraction(setting.system, capture)
-        oscillator = setting.system.oscillators[0]
+        oscillator = setting.system.oscillators
         free = synchronisation(setting.system.graph, oscillator.rho * oscillator.radius**2)
         rate = max(contraction.rate, capture.rate)
         apart = mismatch_bound(free, oscillator.rho, oscillator.radius,
@@ -203,7 +203,7 @@ def test_the_outward_growth_bounds_the_field_in_every_direction(seed: int) -> No
     angle = np.linspace(0.0, 2.0 * np.pi, 400)
     n = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     x = np.array([D, 0.0]) + u * n
-    assert np.all(np.sum(n * system.oscillators[0].field(x, omega), axis=1) <= bound + 1e-9)
+    assert np.all(np.sum(n * system.oscillators.field(x, omega), axis=1) <= bound + 1e-9)
 
 
 @settings(max_examples=30)

@@ -83,7 +83,7 @@ def certified(count: int, seed: int) -> list[tuple[Setting, float, np.ndarray]]:
     cases: list[tuple[Setting, float, np.ndarray]] = []
     while len(cases) < count:
         setting = random_setting(rng)
-        oscillator = setting.system.oscillators[0]
+        oscillator = setting.system.oscillators
         found = synchronisation(setting.system.graph, oscillator.rho * oscillator.radius**2)
         if found.synchronises and found.weights is not None:
             cases.append((setting, found.rate, found.weights))

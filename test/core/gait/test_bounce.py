@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.gait.com_height import GRAVITY, LEVEL, planned_bounce, stance_groups
+from dmp_cpg_ros.core.gait.com_height import LEVEL, planned_bounce, stance_groups
 from dmp_cpg_ros.core.gait.transition import GaitTransition
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.studies.walking_trials import relative_error, steady
 from dmp_cpg_ros.suite import load_gaits
 

@@ -17,9 +17,9 @@ from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.contraction.capture import PLACE_TOLERANCE, RADIUS_TOLERANCE
 from dmp_cpg_ros.core.gait.contact_feedback import (
     ContactLimits,
-    ContactPhase,
     ContactState,
     bounded,
+    contact_feedback,
     initial_contact_state,
     touchdown_error,
 )
@@ -50,12 +50,6 @@ def network_and_certificate(**values: object) -> tuple[GaitNetwork, Certificate]
     scale = body_scale(load_description(suite.robot_file))
     certificate = Running(suite.parameters, suite.gait, scale, TICK).certificate()
     return GaitNetwork(suite.parameters.canonical, suite.gait, scale), certificate
-
-
-def contact_with(limits: ContactLimits | None) -> ContactPhase:
-    contact = ContactPhase(QUARTER)
-    contact.limits = limits
-    return contact
 
 
 def places(network: GaitNetwork, x: np.ndarray) -> np.ndarray:
@@ -95,13 +89,14 @@ def test_touchdown_is_reached_sooner_where_feet_are_early_and_later_where_late(
     early: bool,
 ) -> None:
     network, certificate = network_and_certificate(gait='trot')
-    contact, state, x = contact_with(certificate.contact), WALKING, network.locked_state()
+    limits, state, x = certificate.contact, WALKING, network.locked_state()
     without = x
     for _ in range(100):
         position = network.gait.cycle_position(phase(x))
         in_front = (position > 0.0) & (position < 0.4)
         force = np.where(in_front, float(early), 1.0 - float(early)) * 2.0 * QUARTER
-        state, offset = contact.step(state, force, network, x, AT, FREE, TICK)
+        state, offset = contact_feedback(
+            state, force, QUARTER, limits, network, x, AT, FREE, TICK)
         x = network.step(x, AT, FREE, TICK, offset)
         without = network.step(without, AT, FREE, TICK)
     ahead = wrapped(phase(x) - phase(without))
@@ -124,14 +119,15 @@ def test_legs_stay_in_their_places_under_any_contacts(
     assert certificate['contact_feedback'].holds
     limits = certificate.contact
     assert limits is not None and limits.own > 0.0
-    random, contact = np.random.default_rng(7), contact_with(limits)
+    random = np.random.default_rng(7)
     state, x, felt = WALKING, network.locked_state(), 0.0
     radius = network.parameters.radius
     omega = network.omega(AT)
     for k in range(700):
         if k % random.integers(1, 40) == 0:
             force = random.choice((0.0, 50.0, np.nan), 4)
-        state, offset = contact.step(state, force, network, x, AT, FREE, TICK)
+        state, offset = contact_feedback(
+            state, force, QUARTER, limits, network, x, AT, FREE, TICK)
         if worst:
             apart = np.sign(network.phase_errors(x) + 1e-12 * random.normal(size=4))
             if k // 100 % 2:
@@ -153,19 +149,19 @@ def test_there_is_no_feedback_without_limits_at_rest_and_before_the_start_is_ove
     assert limits is not None and limits.after == certificate.time_to_walking > 0.0
     positions = [network.locked_state(phi) for phi in np.linspace(0.0, 6.0, 40)]
 
-    def acts(contact: ContactPhase, state: ContactState, inhibition: Inhibition = FREE,
+    def acts(allowed: ContactLimits | None, state: ContactState, inhibition: Inhibition = FREE,
              feet: np.ndarray = force) -> bool:
-        return any(np.any(contact.step(state, feet, network, x, AT, inhibition, TICK)[1])
-                   for x in positions)
+        return any(np.any(contact_feedback(
+            state, feet, QUARTER, allowed, network, x, AT, inhibition, TICK)[1])
+            for x in positions)
 
-    contact = contact_with(limits)
-    assert acts(contact, WALKING)
-    assert not acts(contact, initial_contact_state())
-    assert not acts(contact, WALKING, replace(FREE, requested=True))
-    assert not acts(contact, WALKING, feet=np.full(4, np.nan))
-    assert not acts(contact_with(None), WALKING)
-    after, _ = contact.step(WALKING, force, network, positions[0], AT,
-                            replace(FREE, requested=True), TICK)
+    assert acts(limits, WALKING)
+    assert not acts(limits, initial_contact_state())
+    assert not acts(limits, WALKING, replace(FREE, requested=True))
+    assert not acts(limits, WALKING, feet=np.full(4, np.nan))
+    assert not acts(None, WALKING)
+    after, _ = contact_feedback(WALKING, force, QUARTER, limits, network, positions[0], AT,
+                                replace(FREE, requested=True), TICK)
     assert after.released == 0.0
 
 

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.gait import GRAVITY, BodyScale, Gait
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 SCALE = BodyScale(0.28, 0.22)

@@ -15,10 +15,10 @@ from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, chosen_gait
-from dmp_cpg_ros.core.gait.gait import GRAVITY
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
@@ -78,9 +78,9 @@ def test_a_stop_within_a_transition_is_predicted_bounded_and_comes_to_rest(
     bound = certify_changes(loop.parameters, [GAITS[before], GAITS[after]], SCALE,
                             TICK).time_to_rest
     assert predicted <= bound
-    feet = [float(leg.kinematics.foot_in_base(state.joints.position)[2])
+    feet = [float(leg.primitive.kinematics.foot_in_base(state.leg.joints.position)[2])
             for leg, state in zip(loop.legs, loop.leg_states, strict=True)]
-    ground = loop.legs[0].foothold_in_base[2]
+    ground = loop.legs[0].primitive.foothold_in_base[2]
     assert max(feet) - ground < 0.01 * ROBOT.stance_height
     walker.walk(0.5)
     assert walker.ticks[-1].gait == after == loop.network.gait.name

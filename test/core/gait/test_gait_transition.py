@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -13,16 +14,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
-from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate, turned, wrapped
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.arcs import arcs_between, crowding
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
 from dmp_cpg_ros.core.gait.gait_reader import GaitReader
-from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork, network_system
+from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitTransition
 from dmp_cpg_ros.core.transformation.leg import body_scale
 
@@ -38,20 +39,19 @@ R = np.array([0.5, 0.0, 0.0])
 TOPOLOGIES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 
 
-def networks(**changes: object) -> GaitNetworks:
-    return GaitNetworks(CanonicalParameters(**changes), SCALE,  # type: ignore[arg-type]
-                        GaitChangeParameters(), GaitReader(ALL))
+def networks(**changes: object) -> RunningGait:
+    return RunningGait(CanonicalParameters(**changes), SCALE, GaitReader(ALL))  # type: ignore[arg-type]
 
 
-def changed(known: GaitNetworks, before: str, after: str, x: np.ndarray, ticks: int = 1500,
+def changed(known: RunningGait, before: str, after: str, x: np.ndarray, ticks: int = 1500,
             ) -> list[tuple[GaitNetwork, np.ndarray]]:
     """Networks and states of a change, tick by tick."""
-    network, course = known.of(ALL[before]), []
+    free, course = InhibitionParameters(start_inhibited=False), []
+    state = replace(known.initial_state(ALL[before], free), x=x, wanted=ALL[after])
     for _ in range(ticks):
-        network, x = known.follow(network, x, R, ALL[after], FREE)
-        network, x = network.advance(x, R, FREE, TICK)
-        course.append((network, x))
-        if network.gait is ALL[after]:
+        state = known.step(state, R, FREE, TICK)
+        course.append((known.network(state.gait), state.x))
+        if state.gait is ALL[after]:
             break
     return course
 
@@ -73,8 +73,8 @@ def test_the_spectrum_does_not_depend_on_the_offsets(name: str) -> None:
 @pytest.mark.parametrize(('before', 'after'), PAIRS)
 def test_the_phase_error_keeps_its_bound_in_every_transition(before: str, after: str) -> None:
     known = networks()
-    found = synchronisation(known.of(ALL[before]).system.graph, 8.0)
-    x = known.of(ALL[before]).locked_state(0.7)
+    found = synchronisation(known.network(ALL[before]).system.graph, 8.0)
+    x = known.network(ALL[before]).locked_state(0.7)
     course = changed(known, before, after, x)
     assert course[-1][0].gait is ALL[after] and len(course) < 1000
     assert max(np.abs(network.phase_errors(state)).max() for network, state in course) < 1e-9
@@ -93,14 +93,15 @@ def test_the_phase_error_keeps_its_bound_in_every_transition(before: str, after:
 def test_in_the_locked_coordinates_nothing_changes(graph: str) -> None:
     known = networks(coupling_graph=graph, coupling_gain=30.0)
     draw = np.random.default_rng(3)
-    transition = known.reader.transition(GAITS['amble'], GAITS['bound'])
+    transition = known.gaits.transition(GAITS['amble'], GAITS['bound'])
     gait = transition.at(0.4, 0.5)
     x = draw.normal(0.0, 0.7, (4, 2))
-    network = known.of(gait)
+    network = known.network(gait)
     following, moved = network.advance(x, R, FREE, TICK)
     omega = network.omega(R) + 2.0 * np.pi * transition.common_arc * (
         following.gait.weight - gait.weight) / TICK               # type: ignore[union-attr]
-    alone = known._locked.step(turned(x, -gait.phases), omega, np.zeros(4), TICK)
+    alone = network_system(known.parameters, np.zeros(4)).step(
+        turned(x, -gait.phases), omega, np.zeros(4), TICK)
     np.testing.assert_allclose(turned(moved, -following.gait.phases), alone, atol=1e-13)
 
 
@@ -108,13 +109,13 @@ def test_in_the_locked_coordinates_nothing_changes(graph: str) -> None:
 def test_offsets_that_are_not_fed_forward_act_as_unequal_frequencies(
         before: str, after: str) -> None:
     known = networks()
-    found = synchronisation(known.of(ALL[before]).system.graph, 8.0)
-    x, worst, fastest = known.of(ALL[before]).locked_state(), 0.0, 0.0
+    found = synchronisation(known.network(ALL[before]).system.graph, 8.0)
+    x, worst, fastest = known.network(ALL[before]).locked_state(), 0.0, 0.0
     for network, _ in changed(known, before, after, x)[:-1]:
         gait = network.gait
         assert isinstance(gait, BlendedGait)
-        held = GaitNetwork(known.parameters, gait, SCALE)          # knows of no moving offsets
-        x = held.step(x, R, FREE, TICK)
+        held = network_system(known.parameters, gait.phases)       # knows of no moving offsets
+        x = held.step(x, network.omega(R), np.zeros(4), TICK)
         worst = max(worst, float(np.ptp(wrapped(phase(x) - gait.phases - phase(x[0])
                                                 + gait.phases[0]))))
         fastest = max(fastest, gait.turning * float(np.ptp(gait.transition.arcs)) / 2.0)
@@ -128,7 +129,7 @@ def test_offsets_that_are_not_fed_forward_act_as_unequal_frequencies(
 def test_frequencies_stay_within_their_share_and_positions_do_not_jump(
         before: str, after: str) -> None:
     known, rate = networks(), GaitChangeParameters().gait_change_rate
-    course = changed(known, before, after, known.of(ALL[before]).locked_state(2.0))
+    course = changed(known, before, after, known.network(ALL[before]).locked_state(2.0))
     last = None
     for network, x in course:
         gait, omega = network.gait, network.omega(R)
@@ -145,10 +146,10 @@ def test_frequencies_stay_within_their_share_and_positions_do_not_jump(
 
 def test_a_change_there_and_back_ends_where_it_began() -> None:
     known = networks()
-    x = known.of(GAITS['pace']).locked_state()
+    x = known.network(GAITS['pace']).locked_state()
     _, x = changed(known, 'pace', 'bound', x)[-1]
     _, x = changed(known, 'bound', 'pace', x)[-1]
-    assert np.abs(known.of(GAITS['pace']).phase_errors(x)).max() < 1e-9
+    assert np.abs(known.network(GAITS['pace']).phase_errors(x)).max() < 1e-9
 
 
 @pytest.mark.parametrize(('before', 'after'), PAIRS)

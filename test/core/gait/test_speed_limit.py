@@ -18,10 +18,11 @@ from dmp_cpg_ros.core.balance.controller import PostureController, PostureParame
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
-from dmp_cpg_ros.core.gait.gait import GRAVITY, BodyScale, Gait, limited
-from dmp_cpg_ros.core.gait.gait_networks import HASTE
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait, limited
+from dmp_cpg_ros.core.gait.running import HASTE
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
 from dmp_cpg_ros.core.gait.transition import GaitTransition
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
 from dmp_cpg_ros.core.transformation.leg import (
     LegFeedback,
@@ -101,7 +102,7 @@ def test_commands_are_followed_up_to_the_gait_or_the_fastest_that_may_be_chosen(
     gate.accept(3.0, 0.0, 0.0)
     assert gate.at(0) == (3.0, 0.0, 0.0)
     choice = GaitChoiceParameters()
-    gate.highest_speed = highest_speed(choice, 'walk', GAITS.__getitem__)
+    gate.follow(gate.parameters, highest_speed(choice, 'walk', GAITS.__getitem__))
     assert gate.at(1)[0] == pytest.approx(GAITS['walk'].highest_speed * ROOT)
     choice = GaitChoiceParameters(auto_gait=True)
     assert highest_speed(choice, 'walk', GAITS.__getitem__) == GAITS['trot'].highest_speed
@@ -118,15 +119,15 @@ def test_legs_posture_and_cadence_take_the_same_velocity(gait: object) -> None:
     x = state_at(gait.phases + 0.7, 1.0)  # type: ignore[attr-defined]
     x_dot = 12.0 * x[:, ::-1] * [1.0, -1.0]
     nothing = LegFeedback(np.zeros(3), np.zeros(3), np.zeros(2), np.zeros(3))
-    leg = LegPrimitive('fr', ROBOT, gait, LegParameters())  # type: ignore[arg-type]
-    posture = PostureController(ROBOT, gait, PostureParameters())  # type: ignore[arg-type]
+    leg = LegPrimitive('fr', ROBOT, LegParameters())
+    posture = PostureController(ROBOT, PostureParameters())
     goals, torques = [], []
     for velocity in (FAST, short):
         r = np.array(velocity)
         goals.append(np.concatenate(leg.step(
-            leg.initial_state(), x[1], x_dot[1], r, nothing, TICK)[1:]))
+            leg.initial_state(), gait, x[1], x_dot[1], r, nothing, TICK)[1:]))  # type: ignore[arg-type]
         feedback = posture.step(
-            posture.initial_state(), standing_state(ROBOT, 0), x, x_dot, r, TICK)[1]
+            posture.initial_state(), standing_state(ROBOT, 0), gait, x, x_dot, r, TICK)[1]  # type: ignore[arg-type]
         torques.append([feedback.torque.sum(), feedback.shift_in_base.sum()])
     assert np.allclose(*goals) and np.allclose(*torques)
 

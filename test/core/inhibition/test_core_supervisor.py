@@ -58,7 +58,7 @@ class Run:
 
     def __init__(self, gait: str = 'amble', **changes: object) -> None:
         self.loop = LimblessLoop(ROBOT, GAITS[gait], suite_parameters(**changes))
-        self.loop.posture = NoBalance(ROBOT, GAITS[gait], PostureParameters())
+        self.loop.body.posture = NoBalance(ROBOT, PostureParameters())
         self.time_ns = 0
         self.ticks: list[Tick] = []
 

@@ -14,16 +14,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.canonical.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, acting_gains
-from dmp_cpg_ros.core.inhibition.threshold import holds_at_rest, vote_clamp
-from dmp_cpg_ros.core.inhibition.up_direction import UpDirection
-from dmp_cpg_ros.core.inhibition.vote_box import MOST_VOTERS, VoteBox
-from dmp_cpg_ros.core.inhibition.vote_memory import FADE_STEPS, VoteMemory
+from dmp_cpg_ros.core.inhibition.threshold import VoteClamp, holds_at_rest, vote_clamp
+from dmp_cpg_ros.core.inhibition.voters import (
+    FootWatch,
+    LastGood,
+    UpFilter,
+    VoteSensors,
+    vote_sensors,
+    watch_feet,
+)
+from dmp_cpg_ros.core.inhibition.votes import (
+    FADE_STEPS,
+    MOST_VOTERS,
+    NO_VOTES,
+    VoteInbox,
+    VoteMemory,
+    acting_gains,
+)
 from dmp_cpg_ros.core.inhibition.voting import Voting
-from dmp_cpg_ros.core.inhibition.voting_contact import ContactState, judge_contact
-from dmp_cpg_ros.core.inhibition.voting_sensors import LastGood, vote_sensors
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -36,10 +46,14 @@ FADE_NS = 1_000_000_000
 R = np.zeros(3)
 
 
-def voting(graph: str = 'all_to_all', **changes: object) -> Voting:
-    parameters = InhibitionParameters(voting=True, **changes)  # type: ignore[arg-type]
-    return Voting(parameters, SOURCES, network(coupling_graph=graph), ReferenceParameters(),
-                  ROBOT.mass * GRAVITY)
+def voting(sources: VoteSourceParameters = SOURCES, **changes: object) -> Voting:
+    return Voting(InhibitionParameters(), VotingParameters(**{'voting': True, **changes}),  # type: ignore
+                  sources, ReferenceParameters(), ROBOT.mass * GRAVITY)
+
+
+def fits(clamp: VoteClamp) -> bool:
+    """Whether a majority stops the gait for certain and fewer votes cannot."""
+    return clamp.window.lowest < clamp.gain < clamp.window.highest
 
 
 # Fading --------------------------------------------------------------------------------------
@@ -88,14 +102,14 @@ def test_votes_of_sources_add_up_and_a_new_vote_replaces_the_old_one() -> None:
 ])
 def test_what_cannot_be_a_vote_is_refused_and_leaves_nothing(
         weights: dict[str, float], voter: str, text: str) -> None:
-    box = VoteBox()
+    box = VoteInbox()
     with pytest.raises(DataError, match=text):
         box.accept(weights, voter)
     assert box.take() == ()
 
 
 def test_voters_are_limited_in_number_but_not_in_votes() -> None:
-    box = VoteBox()
+    box = VoteInbox()
     for i in range(MOST_VOTERS):
         box.accept({'fl': 1.0}, f'voter {i}')
     with pytest.raises(DataError, match='one voter too many'):
@@ -110,12 +124,12 @@ def test_voters_are_limited_in_number_but_not_in_votes() -> None:
 def judged(position: float, load: float, seconds: float, **changes: object
            ) -> tuple[bool, bool]:
     """Whether fl votes for lost footing and for a collision after a time at a place."""
-    p, state = replace(SOURCES, **changes), ContactState.initial()  # type: ignore[arg-type]
+    p, state = replace(SOURCES, **changes), FootWatch()  # type: ignore[arg-type]
     places, loads = np.full(4, 0.5), np.full(4, 0.25)
     places[0], loads[0] = position, load
     lost = hit = np.zeros(4, bool)
     for k in range(round(seconds * 1e9) // TICK_NS + 1):
-        state, lost, hit = judge_contact(state, p, k * TICK_NS, True, places, 0.6, 10.0, loads)
+        state, lost, hit = watch_feet(state, p, k * TICK_NS, True, places, 0.6, 10.0, loads)
         assert not lost[1:].any() and not hit[1:].any()
     return bool(lost[0]), bool(hit[0])
 
@@ -141,19 +155,23 @@ def test_nothing_is_judged_until_the_gait_has_run_for_a_while() -> None:
     assert judged(0.0, 0.5, 1.05, judged_after=1.0) == (False, True)
 
 
+def felt(rate: np.ndarray, force: np.ndarray, time_ns: int) -> VoteSensors:
+    return VoteSensors(time_ns, time_ns, np.zeros(4), rate, force)
+
+
 def up_after(rate: tuple[float, float, float], seconds: float, true: bool = True
-             ) -> tuple[UpDirection, np.ndarray]:
+             ) -> tuple[UpFilter, np.ndarray]:
     """Estimate of a body that turns from upright, and the truth; the accelerometer feels gravity,
     or nothing.
     """
-    up, omega, truth = UpDirection.upright(), np.array(rate), np.array([0.0, 0.0, 1.0])
+    up, omega, truth = UpFilter(), np.array(rate), np.array([0.0, 0.0, 1.0])
     speed = float(np.linalg.norm(omega))
     axis, start = omega / (speed or 1.0), truth
     for k in range(round(seconds / 0.004) + 1):
         angle = -speed * 0.004 * k
         truth = (start * math.cos(angle) + np.cross(axis, start) * math.sin(angle)
                  + axis * (axis @ start) * (1.0 - math.cos(angle)))
-        up = up.after(omega, GRAVITY * truth * true, k * TICK_NS)
+        up = up.after(felt(omega, GRAVITY * truth * true, k * TICK_NS))
     return up, truth
 
 
@@ -167,13 +185,14 @@ def test_up_follows_a_body_that_turns(x: float, y: float, z: float, feels: bool)
 
 
 def test_up_forgets_a_wrong_start_and_bears_blows_repeats_and_gaps() -> None:
-    up = UpDirection(np.array([1.0, 0.0, 0.0]), 0)
+    up = UpFilter(np.array([1.0, 0.0, 0.0]), 0)
     still, gravity = np.zeros(3), np.array([0.0, 0.0, GRAVITY])
     for k in range(1, 2000):
-        up = up.after(still, gravity if k % 10 else 20.0 * gravity[[2, 1, 0]], k * TICK_NS)
+        blow = gravity if k % 10 else 20.0 * gravity[[2, 1, 0]]
+        up = up.after(felt(still, blow, k * TICK_NS))
     assert up.tilt < 0.01
-    assert up.after(still, gravity[[2, 1, 0]], up.time_ns) is up
-    late = up.after(np.array([50.0, 0.0, 0.0]), gravity, up.time_ns + 10**9)
+    assert up.after(felt(still, gravity[[2, 1, 0]], up.time_ns)) is up
+    late = up.after(felt(np.array([50.0, 0.0, 0.0]), gravity, up.time_ns + 10**9))
     assert late.tilt == pytest.approx(0.0)
 
 
@@ -196,30 +215,29 @@ def test_a_sensor_is_silent_after_its_time_and_heard_again_at_once() -> None:
 ])
 def test_each_sensor_votes_with_its_legs(changes: dict[str, object], cause: str,
                                          legs: tuple[str, ...]) -> None:
-    counting = voting()
-    x, state = counting.network.locked_state(), None
+    counting, of = voting(), network()
+    x, state = of.locked_state(), counting.initial_state(of)
     for time_ns in range(0, 600_000_000, TICK_NS):
         reading = vote_sensors(replace(STANDING, time_ns=time_ns, **changes))  # type: ignore
-        state = counting.step(state, time_ns, reading, x, R, False)
-    ballot = state.ballot
-    assert ballot.causes == tuple(cause if leg in legs else '' for leg in LEGS)
-    np.testing.assert_array_equal(ballot.weights > 0.0, [leg in legs for leg in LEGS])
-    assert ballot.stops == (len(legs) >= 3)
+        state = counting.step(state, time_ns, of, reading, x, R, False)
+    tally = state.tally
+    assert tally.causes == tuple(cause if leg in legs else '' for leg in LEGS)
+    np.testing.assert_array_equal(tally.weights > 0.0, [leg in legs for leg in LEGS])
+    assert tally.stops == (len(legs) >= 3)
 
 
 def test_a_source_of_weight_zero_is_silent_and_time_that_goes_back_forgets() -> None:
-    counting = voting()
-    counting.sources = replace(SOURCES, tilt_weight=0.0)
+    counting, of = voting(replace(SOURCES, tilt_weight=0.0)), network()
     tilted = replace(STANDING, time_ns=10 * TICK_NS,
                      acceleration_in_base=np.array([0.0, 0.0, -GRAVITY]))
-    x = counting.network.locked_state()
-    state = counting.step(None, 10 * TICK_NS, vote_sensors(tilted), x, R, False)
-    assert state.ballot is NO_VOTES
-    voted = counting.step(state, 11 * TICK_NS, vote_sensors(tilted), x, R, False,
+    x, state = of.locked_state(), counting.initial_state(of)
+    state = counting.step(state, 10 * TICK_NS, of, vote_sensors(tilted), x, R, False)
+    assert state.tally is NO_VOTES
+    voted = counting.step(state, 11 * TICK_NS, of, vote_sensors(tilted), x, R, False,
                           (('user', (1.0, NAN, NAN, NAN)),))
-    assert voted.ballot.alive
-    again = counting.step(voted, 0, vote_sensors(STANDING), x, R, False)
-    assert not again.ballot.alive
+    assert voted.tally.alive
+    again = counting.step(voted, 0, of, vote_sensors(STANDING), x, R, False)
+    assert not again.tally.alive
 
 
 # Counting ------------------------------------------------------------------------------------
@@ -233,25 +251,26 @@ def test_gains_follow_the_rule(weights: list[float]) -> None:
     assert np.count_nonzero(won) <= 1 and won.max() == 50.0 * alpha.max()
 
 
-def test_weights_are_clamped_and_the_ballot_changes_only_with_a_vote() -> None:
-    counting = voting()
-    x = counting.network.locked_state()
-    state = counting.step(None, 0, vote_sensors(STANDING), x, R, False,
+def test_weights_are_clamped_and_the_tally_changes_only_with_a_vote() -> None:
+    counting, of = voting(), network()
+    x, state = of.locked_state(), counting.initial_state(of)
+    state = counting.step(state, 0, of, vote_sensors(STANDING), x, R, False,
                           (('user', (5.0, 0.01, NAN, NAN)),))
-    np.testing.assert_allclose(state.ballot.weights, (counting.clamp.limit, 0.01, 0.0, 0.0))
-    same = counting.step(state, TICK_NS, vote_sensors(replace(STANDING, time_ns=TICK_NS)), x, R,
-                         False)
-    assert same.ballot is state.ballot
+    assert state.clamp is not None
+    np.testing.assert_allclose(state.tally.weights, (state.clamp.limit, 0.01, 0.0, 0.0))
+    same = counting.step(state, TICK_NS, of, vote_sensors(replace(STANDING, time_ns=TICK_NS)), x,
+                         R, False)
+    assert same.tally is state.tally
 
 
 @pytest.mark.parametrize('graph', ['all_to_all', 'ring'])
 @pytest.mark.parametrize('count', [0, 1, 2, 3, 4])
 def test_the_computed_clamp_takes_a_majority_to_overcome(graph: str, count: int) -> None:
-    counting = voting(graph)
-    gains = np.where(np.arange(4) < count, counting.clamp.gain, 0.0)
-    omega = counting.network.omega(R)
-    assert counting.clamp.fits
-    assert holds_at_rest(counting.network.system, omega, gains, 0.3) == (count >= 3)
+    of = network(coupling_graph=graph)
+    in_force = voting().initial_state(of).clamp
+    assert in_force is not None and fits(in_force.clamp)
+    gains = np.where(np.arange(4) < count, in_force.clamp.gain, 0.0)
+    assert holds_at_rest(of.system, of.omega(R), gains, 0.3) == (count >= 3)
 
 
 def test_a_vote_too_weak_to_hold_its_own_node_does_not_hinder_the_others() -> None:
@@ -264,10 +283,11 @@ def test_a_vote_too_weak_to_hold_its_own_node_does_not_hinder_the_others() -> No
     {'vote_limit': 0.05}, {'vote_limit': 0.05, 'vote_rule': 'winner_take_all'}])
 def test_a_given_clamp_is_kept_and_told_apart_from_one_that_fits(changes: dict[str, object]
                                                                  ) -> None:
-    parameters = InhibitionParameters(voting=True, **changes)  # type: ignore[arg-type]
-    gait = network()
-    clamp = vote_clamp(gait, parameters, operating_range(gait, parameters, ReferenceParameters()))
-    assert clamp.gain == pytest.approx(20.0) and not clamp.fits
+    rules = VotingParameters(voting=True, **changes)  # type: ignore[arg-type]
+    gait, inhibition = network(), InhibitionParameters()
+    clamp = vote_clamp(gait, inhibition, rules,
+                       operating_range(gait, inhibition, ReferenceParameters()))
+    assert clamp.gain == pytest.approx(20.0) and not fits(clamp)
 
 
 @pytest.mark.parametrize(('name', 'value'), [
@@ -275,28 +295,36 @@ def test_a_given_clamp_is_kept_and_told_apart_from_one_that_fits(changes: dict[s
     ('vote_rule', 'loudest'), ('vote_fade', 0.0)])
 def test_impossible_rules_are_refused(name: str, value: object) -> None:
     with pytest.raises(ParameterError, match=name):
-        InhibitionParameters(**{name: value})  # type: ignore[arg-type]
+        VotingParameters(**{name: value})  # type: ignore[arg-type]
 
 
 def test_the_clamp_follows_the_cadence_and_settles_where_it_stays() -> None:
-    counting, slow = voting(), network('amble').gait
-    x, state = counting.network.locked_state(), None
-    before = counting.clamp.limit
+    counting, of = voting(), network('amble')
+    x, state, slow = of.locked_state(), counting.initial_state(of), of.gait
+    assert state.clamp is not None
+    before = state.clamp.limit
     for k, factor in enumerate((1.0, 1.05, 1.1, 1.1, 1.1)):
-        counting.network = network('amble').with_cadence_of(slow.scaled(factor))
+        of = of.of(slow.scaled(factor))
         reading = vote_sensors(replace(STANDING, time_ns=k * TICK_NS))
-        state = counting.step(state, k * TICK_NS, reading, x, R, False,
+        state = counting.step(state, k * TICK_NS, of, reading, x, R, False,
                               (('user', (9.0, 9.0, 9.0, NAN)),))
-        assert state.ballot.weights[0] == pytest.approx(factor * before, rel=0.02)
-        assert state.ballot.stops
-    fresh = Voting(counting.inhibition, SOURCES, counting.network, ReferenceParameters(), 90.0)
-    assert counting.clamp == fresh.clamp
-    assert state.ballot.weights[0] == fresh.clamp.limit
+        assert state.tally.weights[0] == pytest.approx(factor * before, rel=0.02)
+        assert state.tally.stops
+    fresh = counting.initial_state(of)
+    assert state.clamp == fresh.clamp and fresh.clamp is not None
+    assert state.tally.weights[0] == fresh.clamp.limit
 
 
 def test_changed_parameters_act_from_the_next_step_on() -> None:
-    counting = voting()
-    x, votes = counting.network.locked_state(), (('user', (9.0, NAN, NAN, NAN)),)
-    counting.follow(replace(counting.inhibition, vote_limit=0.05), ReferenceParameters(), SOURCES)
-    state = counting.step(None, 0, vote_sensors(STANDING), x, R, False, votes)
-    assert state.ballot.weights[0] == 0.05
+    of = network()
+    x, votes = of.locked_state(), (('user', (9.0, NAN, NAN, NAN)),)
+    state = voting().initial_state(of)
+    state = voting(vote_limit=0.05).step(state, 0, of, vote_sensors(STANDING), x, R, False, votes)
+    assert state.tally.weights[0] == 0.05
+
+
+def test_without_voting_nothing_is_counted() -> None:
+    counting, of = voting(voting=False), network()
+    state = counting.initial_state(of)
+    assert counting.step(state, 0, of, vote_sensors(STANDING), of.locked_state(), R, True,
+                         (('user', (9.0, 9.0, 9.0, 9.0)),)).tally is NO_VOTES

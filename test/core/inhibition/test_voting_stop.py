@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from dmp_cpg_ros.core.certificates.suggest import suggest_gains
 from dmp_cpg_ros.core.certificates.votes import vote_bound, votes_needed
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
@@ -26,8 +28,15 @@ WEAK = CanonicalParameters(coupling_gain=5.0)
 """Couplings with which the legs synchronise, and no leg alone can stop the others."""
 
 
-def voters(**changes: object) -> InhibitionParameters:
-    return InhibitionParameters(voting=True, **changes)  # type: ignore[arg-type]
+def voters(**changes: object) -> dict[str, Any]:
+    """Parts of the suite's parameters with voting."""
+    rules = {field.name for field in fields(VotingParameters)}
+    return {
+        'inhibition': InhibitionParameters(
+            **{name: value for name, value in changes.items() if name not in rules}),
+        'voting': VotingParameters(
+            voting=True, **{name: value for name, value in changes.items() if name in rules}),
+    }
 
 
 def vote(run: Run, legs: tuple[str, ...], seconds: float) -> Run:
@@ -44,13 +53,13 @@ def vote(run: Run, legs: tuple[str, ...], seconds: float) -> Run:
 @pytest.mark.parametrize('legs', [('rr',), ('fr', 'rl')])
 def test_a_minority_does_not_stop_the_gait(
         gait: str, canonical: CanonicalParameters, legs: tuple[str, ...]) -> None:
-    run = walking(gait, inhibition=voters(inhibited_legs=LEGS[:3]), canonical=canonical)
+    run = walking(gait, **voters(inhibited_legs=LEGS[:3]), canonical=canonical)
     run.ticks.clear()
     vote(run, legs, 3.0)
     assert not run.loop.stop.requested and set(run.words()) <= {'walking', 'free'}
     rates = [np.abs(tick.x_dot).max() for tick in run.ticks[-250:]]
     assert min(rates) > 1.0
-    assert {tick.supervisor.ballot.cause for tick in run.ticks[-20:]} == {
+    assert {tick.supervisor.tally.cause for tick in run.ticks[-20:]} == {
         ', '.join(f'{leg} user' for leg in legs)}
 
 
@@ -59,7 +68,7 @@ def test_a_minority_does_not_stop_the_gait(
 @pytest.mark.parametrize('missing', ['fr', ''])
 def test_a_majority_stops_it_through_the_states_of_a_requested_stop(
         gait: str, canonical: CanonicalParameters, missing: str) -> None:
-    run = walking(gait, inhibition=voters(inhibited_legs=LEGS[:3]), canonical=canonical)
+    run = walking(gait, **voters(inhibited_legs=LEGS[:3]), canonical=canonical)
     run.ticks.clear()
     vote(run, tuple(leg for leg in LEGS if leg != missing), 3.5)
     words = [word for word in run.words() if word not in ('free', 'walking')]
@@ -74,7 +83,7 @@ def test_a_majority_stops_it_through_the_states_of_a_requested_stop(
 
 
 def test_gains_are_held_back_until_the_reference_is_slow() -> None:
-    run = walking(speed=0.8, inhibition=voters())
+    run = walking(speed=0.8, **voters())
     run.ticks.clear()
     vote(run, LEGS[:3], 2.0)
     first = next(i for i, tick in enumerate(run.ticks) if tick.supervisor.armed)
@@ -83,14 +92,14 @@ def test_gains_are_held_back_until_the_reference_is_slow() -> None:
 
 
 def test_what_holds_the_gait_does_not_fade_and_the_service_releases_it() -> None:
-    run = walking(inhibition=voters())
+    run = walking(**voters())
     vote(run, LEGS[:3], 2.5)
     assert run.loop.stop.word == 'at_rest'
     held = run.loop.inhibition.gains
     run.loop.request(False)
     assert run.loop.stop.requested and run.loop.stop.voted
     run.go(1.5)
-    assert not run.loop.stop.ballot.alive
+    assert not run.loop.stop.tally.alive
     assert run.loop.stop.word == 'at_rest' and np.array_equal(run.loop.inhibition.gains, held)
     run.loop.command(0.8)
     run.go(1.0)
@@ -101,14 +110,14 @@ def test_what_holds_the_gait_does_not_fade_and_the_service_releases_it() -> None
 
 
 def test_a_stop_by_votes_can_end_by_itself() -> None:
-    run = walking(inhibition=voters(vote_resume=True))
+    run = walking(**voters(vote_resume=True))
     vote(run, LEGS, 2.5)
     assert run.loop.stop.word == 'at_rest'
     run.until('walking', longest=3.0)
 
 
 def test_a_stop_that_was_also_asked_for_outlasts_the_votes() -> None:
-    run = walking(inhibition=voters(vote_resume=True))
+    run = walking(**voters(vote_resume=True))
     vote(run, LEGS, 0.3)
     run.loop.request(True)
     run.go(3.0)
@@ -118,7 +127,7 @@ def test_a_stop_that_was_also_asked_for_outlasts_the_votes() -> None:
 
 def test_votes_of_a_minority_leave_a_requested_stop_as_it_is() -> None:
     def stopped(legs: tuple[str, ...]) -> np.ndarray:
-        run = walking(inhibition=voters())
+        run = walking(**voters())
         run.loop.request(True)
         run.ticks.clear()
         vote(run, legs, 2.0) if legs else run.go(2.0)
@@ -128,20 +137,20 @@ def test_votes_of_a_minority_leave_a_requested_stop_as_it_is() -> None:
 
 
 def test_the_prediction_of_a_stop_by_votes_is_kept_to_the_tick() -> None:
-    run = walking(inhibition=voters(vote_fade=10.0))
+    run = walking(**voters(vote_fade=10.0))
     run.loop.vote(dict.fromkeys(LEGS[1:], 1.0))
     run.go(TICK)
     loop = run.loop
     assert loop.stop.voted
-    predicted = predict(loop.supervisor, loop.reference, loop.stop, loop.inhibition, loop.x,
-                        loop.r, loop.gate.at(run.time_ns - TICK_NS), TICK)
+    predicted = predict(loop.supervisor, loop.reference, loop.stop, loop.inhibition, loop.network,
+                        loop.x, loop.r, loop.gate.at(run.time_ns - TICK_NS), TICK)
     run.until('at_rest')
     assert loop.stop.measured_s == pytest.approx(predicted, abs=1e-9)
 
 
 @pytest.mark.parametrize('leg', LEGS)
 def test_where_the_winner_takes_all_the_largest_vote_is_inhibited_alone(leg: str) -> None:
-    run = walking(inhibition=voters(vote_rule='winner_take_all'))
+    run = walking(**voters(vote_rule='winner_take_all'))
     run.loop.vote({**dict.fromkeys(LEGS, 0.05), leg: 1.0})
     run.go(2.5)
     assert run.loop.stop.word == 'at_rest'
@@ -150,7 +159,7 @@ def test_where_the_winner_takes_all_the_largest_vote_is_inhibited_alone(leg: str
 
 def test_legs_that_step_into_the_void_stop_the_gait_and_one_leg_does_not() -> None:
     def after(legs: tuple[str, ...], seconds: float) -> Run:
-        run = walking('trot', inhibition=voters())
+        run = walking('trot', **voters())
         force = np.where([leg in legs for leg in LEGS], 0.0, 20.0)
         tick = run.loop.tick
         run.loop.tick = lambda state: tick(replace(state, foot_force=force))
@@ -158,7 +167,7 @@ def test_legs_that_step_into_the_void_stop_the_gait_and_one_leg_does_not() -> No
 
     run = after(('fr',), 4.0)
     assert not run.loop.stop.requested
-    assert 'fr footing' in {tick.supervisor.ballot.cause for tick in run.ticks}
+    assert 'fr footing' in {tick.supervisor.tally.cause for tick in run.ticks}
     run = after(LEGS, 4.0)
     assert run.loop.stop.word == 'at_rest' and run.loop.stop.voted
 
@@ -166,16 +175,16 @@ def test_legs_that_step_into_the_void_stop_the_gait_and_one_leg_does_not() -> No
 def test_without_voting_nobody_is_heard() -> None:
     run = walking()
     vote(run, LEGS, 1.0)
-    assert not run.loop.stop.requested and not run.loop.stop.ballot.alive
+    assert not run.loop.stop.requested and not run.loop.stop.tally.alive
 
 
 # The certificate of a setting with votes -------------------------------------------------------
 
 
-def certificate(inhibition: InhibitionParameters, gait: str = 'amble', **canonical: object
-                ) -> Certificate:
-    p = SuiteParameters()
-    return certify(network(gait, **canonical), inhibition, p.reference, p.leg, p.posture, TICK)
+def certificate(parts: dict[str, Any], gait: str = 'amble', **canonical: object) -> Certificate:
+    p = SuiteParameters(**parts)
+    return certify(network(gait, **canonical), p.inhibition, p.reference, p.leg, p.posture, TICK,
+                   voting=p.voting)
 
 
 @pytest.mark.parametrize('graph', ['all_to_all', 'ring'])
@@ -188,7 +197,7 @@ def test_the_computed_clamp_is_certified(gait: str, graph: str) -> None:
 
 def test_votes_are_certified_in_every_gait_of_a_change() -> None:
     def failing(**changes: object) -> list[str]:
-        p = SuiteParameters(inhibition=voters(**changes))
+        p = SuiteParameters(**voters(**changes))
         found = certify_changes(p, [GAITS['amble'], GAITS['trot']], network().scale, TICK)
         return [entry.name for entry in found.failing]
 
@@ -212,28 +221,33 @@ def test_weak_couplings_are_certified_with_several_inhibited_legs() -> None:
 ])
 def test_a_clamp_that_does_not_fit_fails_by_name(name: str, changes: dict[str, object]) -> None:
     assert name in [entry.name for entry in certificate(voters(**changes)).failing]
-    assert certificate(InhibitionParameters(**changes)).holds  # type: ignore[arg-type]
+    voting = VotingParameters(**changes)  # type: ignore[arg-type]
+    assert certificate({'voting': voting}).holds
 
 
 @pytest.mark.parametrize('majority', [1, 2, 3, 4])
 def test_as_many_votes_are_needed_as_are_wanted(majority: int) -> None:
-    gait, p = network(), voters(vote_majority=majority)
-    needed = votes_needed(gait, p, operating_range(gait, p, SuiteParameters().reference))
+    gait, p = network(), SuiteParameters(**voters(vote_majority=majority))
+    needed = votes_needed(gait, p.inhibition, p.voting,
+                          operating_range(gait, p.inhibition, p.reference))
     assert needed.certain == majority and needed.powerless == majority - 1
 
 
 def test_gains_are_suggested_with_which_votes_are_certified_too() -> None:
-    p = SuiteParameters()
-    running = (network('pronk', coupling_gain=5.0), voters(inhibited_legs=LEGS[:3]), p.reference,
-               p.leg, p.posture, TICK)
-    assert [entry.name for entry in certify(*running).failing] == ['votes_needed']
-    found = suggest_gains(*running)
+    p = SuiteParameters(**voters(inhibited_legs=LEGS[:3]))
+    running = (network('pronk', coupling_gain=5.0), p.inhibition, p.reference, p.leg, p.posture,
+               TICK)
+    certified = certify(*running, voting=p.voting)
+    assert [entry.name for entry in certified.failing] == ['votes_needed']
+    found = suggest_gains(*running, p.voting)
     assert found is not None and found.changed and found.certificate['votes_needed'].holds
-    assert suggest_gains(network(coupling_graph='path'), *running[1:]) is None
+    assert suggest_gains(network(coupling_graph='path'), *running[1:], p.voting) is None
 
 
 def test_nobody_is_certain_to_stop_legs_that_are_not_coupled_enough() -> None:
-    gait, p = network(coupling_gain=5.0), voters(vote_majority=1)
-    needed = votes_needed(gait, p, operating_range(gait, p, SuiteParameters().reference))
-    assert needed.enough[0] == np.inf and needed.clamp.gain == p.inhibition_gain
-    assert not certificate(p, coupling_gain=5.0).holds
+    gait, parts = network(coupling_gain=5.0), voters(vote_majority=1)
+    p = SuiteParameters(**parts)
+    needed = votes_needed(gait, p.inhibition, p.voting,
+                          operating_range(gait, p.inhibition, p.reference))
+    assert needed.enough[0] == np.inf and needed.clamp.gain == p.inhibition.inhibition_gain
+    assert not certificate(parts, coupling_gain=5.0).holds

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.maths import vec3
-from dmp_cpg_ros.core.maths.rotations import rotation_matrix, turned
+from dmp_cpg_ros.core.maths.rotations import turned
 
 RANDOM = np.random.default_rng(11)
 
@@ -31,9 +31,14 @@ def test_products_and_inverse(_: int) -> None:
 
 
 def test_rotations() -> None:
-    quaternion = turned(np.array([0.0, 0.0, 0.0, 1.0]), RANDOM.normal(size=3))
-    R = rotation_matrix(quaternion)
-    np.testing.assert_array_equal(vec3.rotation(quaternion.tolist()), R)
+    vector = RANDOM.normal(size=3)
+    quaternion = turned(np.array([0.0, 0.0, 0.0, 1.0]), vector)
+    R, angle = np.array(vec3.rotation(quaternion.tolist())), float(np.linalg.norm(vector))
+    (x, y, z), across = vector / angle, np.cross(vector, [1.0, 2.0, 3.0])
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    np.testing.assert_allclose(
+        R, np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K, atol=1e-12)
+    assert vector @ np.cross(across, R @ across) * np.sin(angle) > 0.0
     np.testing.assert_array_equal(vec3.upward(quaternion.tolist()), R[2])
 
 

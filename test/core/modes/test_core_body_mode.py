@@ -12,7 +12,7 @@ import pytest
 from core_examples import TICK, TICK_NS, quadruped, standing_state
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.gait.gait import GRAVITY
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.modes.body_command import MODES, MOVING, BodyCommand
 from dmp_cpg_ros.core.modes.body_condition import BodyCondition, BodySense
 from dmp_cpg_ros.core.modes.body_mode import BodyModes, ModeParameters, ModeState

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from core_examples import GAITS, geometry, quadruped
+from core_examples import geometry, quadruped
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.modes.body_command import BodyCommand
@@ -87,7 +87,7 @@ def test_all_four_soles_stay_on_one_ground_all_the_way_up(description: RobotDesc
 def test_the_way_ends_in_the_stance_of_the_gait() -> None:
     for leg in LEGS:
         joints = slice(3 * LEGS.index(leg), 3 * LEGS.index(leg) + 3)
-        stance = LegPrimitive(leg, ROBOT, GAITS['amble'], LegParameters()).initial_state()
+        stance = LegPrimitive(leg, ROBOT, LegParameters()).initial_state()
         np.testing.assert_allclose(standing_posture(ROBOT)[joints], stance.joints.position)
         np.testing.assert_allclose(raised_posture(ROBOT, 1.0)[joints], stance.joints.position)
 
@@ -147,7 +147,7 @@ class Mover:
 
     def __init__(self, start: np.ndarray, dt: float = 0.004) -> None:
         self.dt, self.count, self.movements = dt, 0, Movements(ROBOT)
-        primitives = [LegPrimitive(leg, ROBOT, GAITS['amble'], LegParameters()) for leg in LEGS]
+        primitives = [LegPrimitive(leg, ROBOT, LegParameters()) for leg in LEGS]
         self.legs = [LegMotion(slice(3 * i, 3 * i + 3), self.movements, one.transformation)
                      for i, one in enumerate(primitives)]
         zero = np.zeros(3)

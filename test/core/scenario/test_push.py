@@ -9,7 +9,8 @@ import pytest
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import JointTargets
-from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue, read_push
+from dmp_cpg_ros.core.scenario.events import EVENT_KINDS
+from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue
 from dmp_cpg_ros.core.scenario.scenario import Scenario, play
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -96,13 +97,14 @@ def test_a_force_that_is_not_renewed_ends():
 
 @pytest.mark.parametrize(('value', 'text'), [
     (5.0, 'must be a mapping with impulse'),
-    ({'duration': 0.1}, 'must be a mapping with impulse'),
-    ({'impulse': [1, 2]}, 'must have numbers'),
+    ({'duration': 0.1}, 'push needs impulse'),
+    ({'impulse': [1, 2]}, 'push needs impulse'),
+    ({'impulse': [1, 'a', 2]}, 'must be numbers'),
     ({'impulse': [0, float('nan'), 0]}, 'must be finite'),
-    ({'impulse': [0, 5, 0], 'duration': 0}, 'must be positive'),
+    ({'impulse': [0, 5, 0], 'duration': 0}, 'duration of the push must be'),
     ({'impulse': [0, 5, 0], 'frame': 'base'}, 'valid are base_footprint, odom'),
-    ({'impulse': [0, 5, 0], 'force': 3}, 'must be a mapping with impulse'),
+    ({'impulse': [0, 5, 0], 'force': 3}, "'force' is not known; valid are impulse"),
 ])
 def test_a_bad_push_is_refused_with_what_is_valid(value, text):
     with pytest.raises(DataError, match=text):
-        read_push(value, 'event 1')
+        EVENT_KINDS['push'](value, 'event 1')

@@ -10,6 +10,7 @@ from core_examples import GAITS, TICK, network, quadruped
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import phase_generator, state_at
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.joint_system import TransformationState
 from dmp_cpg_ros.core.transformation.leg import (
@@ -25,8 +26,8 @@ ROBOT = quadruped()
 REFERENCES = {'forward': [0.5, 0.0, 0.0], 'sideways': [0.0, 0.3, 0.0], 'turn': [0.2, 0.0, 0.8]}
 
 
-def leg_of(leg: str, gait: str, **changes: object) -> LegPrimitive:
-    return LegPrimitive(leg, ROBOT, GAITS[gait], LegParameters(**changes))  # type: ignore[arg-type]
+def leg_of(leg: str, **changes: object) -> LegPrimitive:
+    return LegPrimitive(leg, ROBOT, LegParameters(**changes))  # type: ignore[arg-type]
 
 
 def asked(leg: LegPrimitive, state: LegState, shift: np.ndarray | None = None) -> LegFeedback:
@@ -35,15 +36,16 @@ def asked(leg: LegPrimitive, state: LegState, shift: np.ndarray | None = None) -
     return LegFeedback(state.joints.position, shift, np.zeros(2), np.zeros(3))
 
 
-def walked(leg: LegPrimitive, r: np.ndarray, shift: np.ndarray, seconds: float) -> np.ndarray:
+def walked(leg: LegPrimitive, gait: Gait, r: np.ndarray, shift: np.ndarray, seconds: float
+           ) -> np.ndarray:
     """Goals and their velocities of a leg that walks steadily, (ticks, 2, 3)."""
     speed = leg.scale.foot_speed(*r)
-    omega, state, rows = leg.gait.omega(speed, leg.scale), leg.initial_state(), []
+    omega, state, rows = gait.omega(speed, leg.scale), leg.initial_state(), []
     for k in range(round(seconds / TICK)):
         x = state_at(omega * k * TICK)
         x_dot = omega * phase_generator() @ x
-        state, goal, goal_velocity = leg.step(state, x, x_dot, r, asked(leg, state, shift),
-                                              TICK)
+        state, goal, goal_velocity = leg.step(
+            state, gait, x, x_dot, r, asked(leg, state, shift), TICK)
         rows.append((goal, goal_velocity))
     return np.array(rows)
 
@@ -52,15 +54,15 @@ def walked(leg: LegPrimitive, r: np.ndarray, shift: np.ndarray, seconds: float) 
 @pytest.mark.parametrize(('leg', 'gait'), [('fl', 'amble'), ('rr', 'trot')])
 def test_goal_velocities_are_the_rates_of_the_goals(leg: str, gait: str, direction: str) -> None:
     r, shift = np.array(REFERENCES[direction]), np.array([0.02, -0.01, 0.01])
-    goals, velocities = walked(leg_of(leg, gait), r, shift, 3.0)[400:].swapaxes(0, 1)
+    goals, velocities = walked(leg_of(leg), GAITS[gait], r, shift, 3.0)[400:].swapaxes(0, 1)
     rates = np.diff(goals, axis=0) / TICK
     middle = 0.5 * (velocities[1:] + velocities[:-1])
     assert np.abs(rates - middle).max() < 0.05 * np.abs(velocities).max()
 
 
 def test_an_unused_foot_path_in_stance_moves_against_the_body() -> None:
-    leg, r = leg_of('fl', 'amble'), np.array([0.5, 0.0, 0.0])
-    goals = walked(leg, r, np.zeros(3), 3.0)[400:, 0]
+    leg, r = leg_of('fl'), np.array([0.5, 0.0, 0.0])
+    goals = walked(leg, GAITS['amble'], r, np.zeros(3), 3.0)[400:, 0]
     feet = np.array([leg.kinematics.foot_in_base(goal) for goal in goals])
     standing = feet[:-1, 2] == pytest.approx(leg.foothold_in_base[2], abs=1e-9)
     velocity = np.diff(feet[:, 0])[standing & (np.diff(feet[:, 2]) < 1e-9)] / TICK
@@ -74,27 +76,28 @@ def test_at_rest_every_foot_is_on_the_ground(gait: str) -> None:
     x = at.rest_state(inhibition)
     x_dot = at.rate(x, zero, inhibition)
     for i, name in enumerate(LEGS):
-        leg = leg_of(name, gait)
+        leg = leg_of(name)
         state = leg.initial_state()
         for _ in range(500):
-            state, goal, _ = leg.step(state, x[i], x_dot[i], zero, asked(leg, state), TICK)
+            state, goal, _ = leg.step(
+                state, GAITS[gait], x[i], x_dot[i], zero, asked(leg, state), TICK)
         foot = leg.kinematics.foot_in_base(goal)
         assert np.allclose(foot, nominal_foothold(ROBOT, name), atol=1e-6)
 
 
 def test_the_kinematic_reading_follows_the_goals_closely() -> None:
-    leg, r = leg_of('fr', 'trot'), np.array([0.5, 0.0, 0.0])
-    omega, state, errors = leg.gait.omega(0.5, leg.scale), leg.initial_state(), []
+    leg, gait, r = leg_of('fr'), GAITS['trot'], np.array([0.5, 0.0, 0.0])
+    omega, state, errors = gait.omega(0.5, leg.scale), leg.initial_state(), []
     for k in range(750):
         x = state_at(omega * k * TICK)
-        state, goal, _ = leg.step(state, x, omega * phase_generator() @ x, r,
+        state, goal, _ = leg.step(state, gait, x, omega * phase_generator() @ x, r,
                                   asked(leg, state), TICK)
         errors.append(np.abs(state.joints.position - goal).max())
     assert max(errors[250:]) < 0.03
 
 
 def test_the_torque_reading_sends_torques_of_the_measured_joints() -> None:
-    leg, rng = leg_of('fl', 'amble', reading='torque'), np.random.default_rng(0)
+    leg, rng = leg_of('fl', reading='torque'), np.random.default_rng(0)
     q, q_dot, goal, goal_velocity, feedback = rng.normal(size=(5, 3))
     measured = TransformationState(q, q_dot)
     out = leg.targets(leg.initial_state(), goal, goal_velocity, feedback, measured)

@@ -45,18 +45,18 @@ def test_at_rest_a_foot_holds_its_place_and_returns_to_level(
 def test_a_yielding_foot_stays_where_it_is_in_the_world(excess: list[float]) -> None:
     """The body moves faster than planned; its standing feet do not leave their footholds."""
     robot, dt = quadruped(), 0.001
-    leg = LegPrimitive('fl', robot, GAITS['trot'], LegParameters(yielding_rate=0.0))
+    leg, gait = LegPrimitive('fl', robot, LegParameters(yielding_rate=0.0)), GAITS['trot']
     r, e = np.array([0.5, 0.0, 0.0]), np.array(excess)
-    omega, state = leg.gait.omega(0.5, leg.scale), leg.initial_state()
+    omega, state = gait.omega(0.5, leg.scale), leg.initial_state()
     drift, moved, places = -e, np.zeros(2), []
     for k in range(600):
         x = state_at(omega * k * dt)
         asked = LegFeedback(state.joints.position, np.zeros(3), drift, np.zeros(3))
-        state, goal, _ = leg.step(state, x, omega * phase_generator() @ x, r, asked, dt)
+        state, goal, _ = leg.step(state, gait, x, omega * phase_generator() @ x, r, asked, dt)
         moved = moved + dt * (r[:2] * leg.rolling[0] + e)
         foot = leg.kinematics.foot_in_base(goal)
-        position = leg.gait.scalar_cycle_position(float(omega * k * dt))
-        standing = abs(position) > 0.5 * (1.0 - leg.gait.duty(0.5, leg.scale)) + 0.02
+        position = gait.scalar_cycle_position(float(omega * k * dt))
+        standing = abs(position) > 0.5 * (1.0 - gait.duty(0.5, leg.scale)) + 0.02
         places.append(np.array([*(foot[:2] + moved), float(standing)]))
     table = np.array(places)
     stance = np.flatnonzero(table[:, 2])

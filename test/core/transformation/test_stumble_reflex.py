@@ -147,12 +147,13 @@ def test_a_standing_foot_feels_nothing() -> None:
     standing = stumble_step(Stumble(), None, LIFT, THRESHOLD, TICK)
     assert standing == Stumble()
 
+TROT = load_gait('trot')
+
 
 def leg_and_state(lift: float) -> tuple[LegPrimitive, LegState]:
     """A leg of the package's robot."""
     suite = load_suite()
-    leg = LegPrimitive('fl', load_description(suite.robot_file), load_gait('trot'),
-                       LegParameters(stumble_lift=lift))
+    leg = LegPrimitive('fl', load_description(suite.robot_file), LegParameters(stumble_lift=lift))
     return leg, leg.initial_state()
 
 
@@ -161,7 +162,7 @@ def test_the_leg_feels_an_obstacle_by_its_joints(blocked: bool) -> None:
     """A foot that is where it should be moves as without the reflex, to the last bit."""
     (without, state_0), (leg, state) = leg_and_state(0.0), leg_and_state(0.13)
     r = np.array((0.5, 0.0, 0.0))
-    omega = leg.gait.omega(leg.scale.foot_speed(0.5, 0.0, 0.0), leg.scale)
+    omega = TROT.omega(leg.scale.foot_speed(0.5, 0.0, 0.0), leg.scale)
     highest = highest_0 = -np.inf
     wall = float(leg.foothold_in_base[0])
     for k in range(500):
@@ -175,8 +176,8 @@ def test_the_leg_feels_an_obstacle_by_its_joints(blocked: bool) -> None:
             foot[0] = min(foot[0], wall)
             measured = leg.kinematics.inverse(foot)
         feedback = LegFeedback(measured, np.zeros(3), np.zeros(2), np.zeros(3))
-        state, goal, _ = leg.step(state, x, x_dot, r, feedback, TICK)
-        state_0, goal_0, _ = without.step(state_0, x, x_dot, r, feedback, TICK)
+        state, goal, _ = leg.step(state, TROT, x, x_dot, r, feedback, TICK)
+        state_0, goal_0, _ = without.step(state_0, TROT, x, x_dot, r, feedback, TICK)
         if not blocked:
             np.testing.assert_array_equal(goal, goal_0)
         if k > 150:
@@ -190,7 +191,7 @@ def landing_tick(force: float) -> int:
     """First tick at which a leg that comes down on ground 25 mm high knows that it has landed."""
     leg, state = leg_and_state(0.13)
     r, high = np.array((0.5, 0.0, 0.0)), float(leg.foothold_in_base[2]) + 0.025
-    omega = leg.gait.omega(leg.scale.foot_speed(0.5, 0.0, 0.0), leg.scale)
+    omega = TROT.omega(leg.scale.foot_speed(0.5, 0.0, 0.0), leg.scale)
     for k in range(500):
         x = state_at(np.array(omega * k * TICK))
         foot = np.array(leg.kinematics.foot(state.joints.position))
@@ -198,7 +199,7 @@ def landing_tick(force: float) -> int:
         foot[2] = high if stands else foot[2]
         feedback = LegFeedback(leg.kinematics.inverse(foot), np.zeros(3), np.zeros(2),
                                np.zeros(3), force * stands)
-        state, _, _ = leg.step(state, x, omega * np.array((x[1], -x[0])), r, feedback, TICK)
+        state, _, _ = leg.step(state, TROT, x, omega * np.array((x[1], -x[0])), r, feedback, TICK)
         if state.stumble.landed:
             return k
     return 500

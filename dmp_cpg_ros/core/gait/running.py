@@ -1,0 +1,221 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The canonical block while it runs: oscillators, gait in force, cadence, contact feedback.
+
+The state stays and nothing jumps when gait or parameters change. Couplings and oscillators take
+new parameters at once: they enter ẋ and leave x as it is. The factor on the cadence moves at
+``CADENCE_RATE`` from one value to the other, never beyond. When the gait changes:
+
+- While it walks freely, a change begins at once and takes its cycles; into a slower gait, once the
+  reference has nearly come down to the highest speed of that gait.
+- While gaits change, another change waits until the present one has ended; of several that wait
+  the last one is taken.
+- While a stop is under way, a change in progress pauses and a new one waits: what was predicted
+  and bounded for the stop holds for the blend as it stands.
+- At rest all feet are on the ground and no leg swings, so the gait that is wanted takes force at
+  once: the oscillators are turned to their places in it and to its equilibrium, and the legs,
+  whose swing height and speed are zero, stay where they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.inhibition import (
+    Inhibition,
+    InhibitionParameters,
+    initial_inhibition,
+)
+from dmp_cpg_ros.core.canonical.phase import turned
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, chosen_gait
+from dmp_cpg_ros.core.gait.contact_feedback import (
+    ContactLimits,
+    ContactState,
+    contact_feedback,
+    initial_contact_state,
+)
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.maths.updated import updated
+
+Array = NDArray[np.float64]
+
+CADENCE_RATE = 0.5
+"""Rate at which the factor on the cadence moves to a new value [1/s].
+
+A foot in stance stands where its phase and the cadence put it: v Δc/f from its foothold. A jump of
+the cadence would be a jump of the feet.
+"""
+
+HASTE = 1.1
+"""Share of a gait's highest speed at which a change into it begins. Commands are within the limit
+of the gait that is wanted already, so the reference comes down to it; the blend's own limit is for
+what is left.
+"""
+
+
+@dataclass(frozen=True)
+class CanonicalState:
+    """State of the canonical block after a tick.
+
+    Attributes
+    ----------
+    gait : Gait or BlendedGait
+        In force: the phases of x are to be read in it.
+    wanted : Gait
+        The gait that was asked for last.
+    cadence_scale : float
+        Factor on the cadence that acts; that of the parameters once it has arrived.
+    x, x_dot : ndarray (4, 2)
+        States and rates of the oscillators.
+    contact : ContactState
+        Memory of the contact feedback.
+    """
+
+    gait: GaitInForce
+    wanted: Gait
+    cadence_scale: float
+    x: Array
+    x_dot: Array
+    contact: ContactState
+
+    @property
+    def leading_to(self) -> Gait:
+        """The gait in force, or the one that the present change leads to."""
+        return self.gait.transition.after if isinstance(self.gait, BlendedGait) else self.gait
+
+
+class RunningGait:
+    """The canonical block; state in, state out.
+
+    Parameters
+    ----------
+    parameters : CanonicalParameters
+        Oscillators, coupling, cadence, contact feedback.
+    scale : BodyScale
+        The robot's lengths.
+    gaits : GaitReader
+        The gaits that are known, and the ways between them.
+    change : GaitChangeParameters, optional
+        How gaits change.
+    choice : GaitChoiceParameters, optional
+        Automatic choice of the gait; off without.
+    quarter : float, optional
+        Force on each foot of the standing robot, for contact feedback [N].
+    """
+
+    def __init__(
+        self, parameters: CanonicalParameters, scale: BodyScale, gaits: GaitReader,
+        change: GaitChangeParameters | None = None, choice: GaitChoiceParameters | None = None,
+        quarter: float = float('nan'),
+    ) -> None:
+        """Keep the parts; networks are built when they are needed."""
+        self.parameters, self.scale, self.gaits, self.quarter = parameters, scale, gaits, quarter
+        self.choice = choice or GaitChoiceParameters()
+        self._network = GaitNetwork(
+            parameters, next(iter(gaits.gaits.values())), scale,
+            (change or GaitChangeParameters()).gait_change_rate)
+
+    def with_parameters(
+        self, parameters: CanonicalParameters, change: GaitChangeParameters,
+        choice: GaitChoiceParameters,
+    ) -> RunningGait:
+        """Return the block with other parameters; from the next step on they act."""
+        return RunningGait(parameters, self.scale, self.gaits, change, choice, self.quarter)
+
+    def network(self, gait: GaitInForce) -> GaitNetwork:
+        """Oscillators of a gait or of a blend, at the cadence that it has."""
+        self._network = self._network.of(gait)
+        return self._network
+
+    def initial_state(self, gait: Gait, inhibition: InhibitionParameters) -> CanonicalState:
+        """At rest under inhibition where it starts inhibited, or with all legs in their places.
+
+        Parameters
+        ----------
+        gait : Gait
+            At the start, before ``cadence_scale``.
+        inhibition : InhibitionParameters
+            Whether the gait starts inhibited, and by what.
+        """
+        factor, acting = self.parameters.cadence_scale, initial_inhibition(inhibition)
+        network = self.network(gait.scaled(factor))
+        x = network.rest_state(acting) if inhibition.start_inhibited else network.locked_state()
+        return CanonicalState(network.gait, gait, factor, x, np.zeros_like(x),
+                              initial_contact_state())
+
+    def want(self, state: CanonicalState, name: str) -> CanonicalState:
+        """Ask for a gait; raises ParameterError with the valid names."""
+        return updated(state, wanted=self.gaits.named(name))
+
+    def step(
+        self, state: CanonicalState, r: Array, inhibition: Inhibition, dt: float,
+        foot_force: Array | None = None, limits: ContactLimits | None = None,
+    ) -> CanonicalState:
+        """Advance by one tick.
+
+        Parameters
+        ----------
+        state : CanonicalState
+            After the tick before.
+        r : ndarray (3,)
+            Reference of this tick.
+        inhibition : Inhibition
+            That acts.
+        dt : float
+            Time since the tick before [s]; 0 at the first.
+        foot_force : ndarray (4,), optional
+            Normal forces of the feet, where they are fed back [N].
+        limits : ContactLimits, optional
+            What contact feedback may do; nothing without.
+
+        Returns
+        -------
+        CanonicalState
+        """
+        name = chosen_gait(self.choice, state.wanted.name, r, self.scale)
+        wanted = state.wanted if name == state.wanted.name else self.gaits.named(name)
+        gait, cadence_scale = self._at_cadence(state, dt)
+        network, x = self._begin_change(self.network(gait), state.x, r, wanted, inhibition)
+        contact, feedback = state.contact, 0.0  # type: tuple[ContactState, Array | float]
+        if self.parameters.contact_feedback and foot_force is not None:
+            contact, feedback = contact_feedback(
+                contact, foot_force, self.quarter, limits, network, x, r, inhibition, dt)
+        if dt > 0.0:
+            network, x = network.advance(x, r, inhibition, dt, feedback)
+        self._network = network
+        x_dot = network.rate(x, r, inhibition, feedback)
+        return CanonicalState(network.gait, wanted, cadence_scale, x, x_dot, contact)
+
+    def _at_cadence(self, state: CanonicalState, dt: float) -> tuple[GaitInForce, float]:
+        """Gait in force at a cadence nearer to that of the parameters."""
+        wanted, factor = self.parameters.cadence_scale, state.cadence_scale
+        if factor == wanted:
+            return state.gait, factor
+        most = CADENCE_RATE * dt
+        factor = wanted if abs(wanted - factor) <= most else factor + min(
+            max(wanted - factor, -most), most)
+        return self.gaits.at_cadence(state.gait, factor), factor
+
+    def _begin_change(self, network: GaitNetwork, x: Array, r: Array, wanted: Gait,
+                      inhibition: Inhibition) -> tuple[GaitNetwork, Array]:
+        """Begin the change to the gait that is wanted, when it is time for it; the states are
+        turned when the gait changes at rest.
+        """
+        gait = network.gait
+        if gait.name == wanted.name:
+            return network, x
+        if inhibition.at_rest:
+            new = self.network(wanted.scaled(gait.cadence_scale))
+            return new, new.settled(turned(x, wanted.phases - gait.phases), r, inhibition)
+        if inhibition.requested or isinstance(gait, BlendedGait):
+            return network, x
+        if self.scale.foot_speed(*r.tolist()) > HASTE * self.scale.speed(wanted.highest_speed):
+            return network, x
+        transition = self.gaits.transition(self.gaits.named(gait.name), wanted)
+        return self.network(transition.at(0.0, 0.0).scaled(gait.cadence_scale)), x
