@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.modes.body_command import BALANCED
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,11 @@ class Episode:
     end: float
     events: tuple[StatusEvent, ...]
 
+    @property
+    def captured(self) -> float:
+        """When inhibition took hold: the first state that is not ``waiting``, or the end [s]."""
+        return next((e.time for e in self.events if e.message != 'waiting'), self.end)
+
 
 def episodes(recording: Recording, words: tuple[str, ...]) -> list[Episode]:
     """Longest stretches in which the inhibition's state is one of ``words``."""
@@ -67,11 +73,25 @@ def episodes(recording: Recording, words: tuple[str, ...]) -> list[Episode]:
     return found
 
 
+def requested_stops(recording: Recording) -> list[Episode]:
+    """Stops that were asked for while the robot walked; one that began at rest is none."""
+    return [episode for episode in episodes(recording, STOPPING)
+            if episode.events[0].message != 'at_rest']
+
+
 def running_intervals(recording: Recording) -> list[tuple[float, float]]:
     """Intervals without inhibition; the whole recording when the inhibition was not recorded."""
     if not recording.inhibition:
         return [recording.span] if recording.span[1] > recording.span[0] else []
     return [(episode.start, episode.end) for episode in episodes(recording, RUNNING)]
+
+
+def within(time: Array, intervals: list[tuple[float, float]]) -> NDArray[np.bool_]:
+    """Which times (n,) lie in one of some half-open intervals, boolean ndarray (n,)."""
+    inside = np.zeros(len(time), dtype=bool)
+    for start, end in intervals:
+        inside |= (time >= start) & (time < end)
+    return inside
 
 
 def changing_intervals(recording: Recording) -> list[tuple[float, float]]:
@@ -80,10 +100,8 @@ def changing_intervals(recording: Recording) -> list[tuple[float, float]]:
     if not frames:
         return []
     changing = np.array(['>' in frame for frame in frames])
-    return [
-        (float(time[first]), float(time[min(past, len(time) - 1)]))
-        for first, past in stretches(changing)
-    ]
+    return [(float(time[first]), float(time[min(past, len(time) - 1)]))
+            for first, past in stretches(changing)]
 
 
 def unwrapped_phases(recording: Recording) -> Array:
@@ -112,10 +130,8 @@ def cycle_count(recording: Recording, start: float, end: float) -> float:
 
 def gait_period(recording: Recording) -> float | None:
     """Median duration of a gait cycle while running [s], None where there is none."""
-    periods = [
-        np.diff(cycle_starts(recording, *interval)) for interval in running_intervals(recording)
-    ]
-    lengths = np.concatenate([np.array([]), *periods])
+    lengths = np.concatenate([np.array([]), *(
+        np.diff(cycle_starts(recording, *interval)) for interval in running_intervals(recording))])
     return float(np.median(lengths)) if lengths.size else None
 
 
@@ -129,9 +145,7 @@ def steady_segments(recording: Recording) -> list[tuple[float, float]]:
         return []
     rate = np.abs(np.gradient(value, time, axis=0))
     steady = (rate < STEADY_RATES).all(axis=1) & (np.abs(value) > MOVING).any(axis=1)
-    running = np.zeros(len(time), dtype=bool)
-    for start, end in running_intervals(recording):
-        running |= (time >= start) & (time < end)
+    running = within(time, running_intervals(recording))
     for start, end in changing_intervals(recording):
         running &= (time < start) | (time > end)
     segments = []
@@ -143,3 +157,25 @@ def steady_segments(recording: Recording) -> list[tuple[float, float]]:
         if end - start >= SHORTEST_SEGMENT:
             segments.append((start, end))
     return segments
+
+
+def should_stand(recording: Recording, time: Array) -> NDArray[np.bool_]:
+    """Whether the robot was to stand at some times (n,) [s], boolean ndarray (n,): not while it
+    lay, rose or lowered itself; always where its body mode was not recorded.
+    """
+    if not recording.modes:
+        return np.ones(len(time), dtype=bool)
+    changes = np.array([event.time for event in recording.modes])
+    standing = np.array([event.message in BALANCED for event in recording.modes])
+    return np.asarray(standing[np.maximum(np.searchsorted(changes, time, 'right') - 1, 0)])
+
+
+def stands_until(recording: Recording, start: float, end: float) -> float:
+    """First time in an interval at which the robot is not to stand, or the interval's end [s]."""
+    down = (event.time for event in recording.modes if event.message not in BALANCED)
+    return min((time for time in down if start <= time < end), default=end)
+
+
+def fall_noticed(recording: Recording) -> bool:
+    """Whether the suite noticed a fall; a robot that was found fallen has not fallen since."""
+    return any(event.message == 'damped' for event in recording.modes[1:])

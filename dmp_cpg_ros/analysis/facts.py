@@ -59,12 +59,8 @@ def facts(metrics: Mapping[str, Any], lock_step: bool | None = None) -> list[Fac
         In the order of importance.
     """
     return [
-        *_decoding(metrics),
-        *_walking(metrics),
-        *_stops(metrics),
-        *_timing(metrics, lock_step),
-        *_certificate(metrics),
-    ]
+        *_decoding(metrics), *_walking(metrics), *_stops(metrics), *_timing(metrics, lock_step),
+        *_certificate(metrics)]
 
 
 def _decoding(metrics: Mapping[str, Any]) -> list[Fact]:
@@ -89,8 +85,7 @@ def _walking(metrics: Mapping[str, Any]) -> list[Fact]:
         Fact(
             f'Mean speed within {SPEED_TOLERANCE:.0%} of the reference wherever that was constant',
             'no such stretch' if error is None else f'largest error {error:.1%}',
-            None if error is None else error <= SPEED_TOLERANCE,
-        ),
+            None if error is None else error <= SPEED_TOLERANCE),
     ]
     if robot['cost_of_transport'] is not None:
         finding = f'{robot["cost_of_transport"]:.2f}, {COSTS[robot["cost_of_transport_from"]]}'
@@ -155,11 +150,7 @@ def _timing(metrics: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
     latency = _number(timing['latency_ms_p50'], 'median {:.2f} ms')
     late = _number(timing['latency_ms_p99'], '99% {:.2f} ms')
     return [
-        Fact(
-            'The suite kept wall time',
-            f'real-time factor {factor:.3f}, {rate}',
-            kept,
-        ),
+        Fact('The suite kept wall time', f'real-time factor {factor:.3f}, {rate}', kept),
         Fact('Latency from state to last target', f'{latency}, {late}', None),
     ]
 

@@ -48,11 +48,9 @@ def foot_slip(recording: Recording, robot: RobotDescription, contact_force: floa
         )
         loaded = feet.force[rows[2], i] > contact_force
         foot = odometry.position_in_world[rows[1]] + np.einsum(
-            'nij,nj->ni', R, feet_in_base(leg, q)
-        )
+            'nij,nj->ni', R, feet_in_base(leg, q))
         rate = np.einsum(
-            'nij,nj->ni', R, odometry.rate_in_base[rows[1]] + shank_rate_in_base(leg, q, q_dot)
-        )
+            'nij,nj->ni', R, odometry.rate_in_base[rows[1]] + shank_rate_in_base(leg, q, q_dot))
         slips.append(_slid(time, foot[:, :2], rate, loaded, leg.foot_radius))
     return np.array(slips)
 

@@ -5,25 +5,25 @@
 from __future__ import annotations
 
 import datetime
+import json
 import os
 import platform
+import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote, urlparse
 
 import dmp_cpg_ros
-from dmp_cpg_ros.analysis.provenance import source_commit
 
 PACKAGES = ('numpy', 'mujoco', 'rosbags', 'matplotlib', 'rclpy', 'mcap')
 
 
 def build_manifest(
-    parameters: Mapping[str, Any] | None = None,
-    seeds: Mapping[str, int] | None = None,
-    digests: Mapping[str, str] | None = None,
-    **facts: Any,
-) -> dict[str, Any]:
+        parameters: Mapping[str, Any] | None = None, seeds: Mapping[str, int] | None = None,
+        digests: Mapping[str, str] | None = None, **facts: Any) -> dict[str, Any]:
     """Contents of ``manifest.json``.
 
     Parameters
@@ -42,28 +42,19 @@ def build_manifest(
     dict
         Absolute paths in texts are cut to file names; host and user names are not asked for.
     """
-    return without_paths(
-        {
-            'created': datetime.datetime.now(datetime.timezone.utc).isoformat(timespec='seconds'),
-            'versions': versions(),
-            'commit': source_commit(),
-            **facts,
-            'parameters': dict(parameters or {}),
-            'seeds': dict(seeds or {}),
-            'digests': dict(digests or {}),
-            'host': host_facts(),
-        }
-    )
+    created = datetime.datetime.now(datetime.timezone.utc).isoformat(timespec='seconds')
+    return without_paths({
+        'created': created, 'versions': versions(), 'commit': source_commit(), **facts,
+        'parameters': dict(parameters or {}), 'seeds': dict(seeds or {}),
+        'digests': dict(digests or {}), 'host': host_facts()})
 
 
 def versions() -> dict[str, str]:
     """Versions of the package, of Python and of what is installed of the packages it stands on."""
     found = {'dmp_cpg_ros': dmp_cpg_ros.__version__, 'python': platform.python_version()}
     for name in PACKAGES:
-        try:
+        with suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
     distribution = os.environ.get('ROS_DISTRO')
     return {**found, 'ros_distro': distribution} if distribution else found
 
@@ -103,10 +94,55 @@ def _in_a_folder(text: str) -> bool:
 
 
 def _processor() -> str:
-    try:
+    with suppress(OSError):
         for line in Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
             if line.startswith('model name'):
                 return line.split(':', 1)[1].strip()
-    except OSError:
-        pass
     return platform.processor() or 'unknown'
+
+
+def source_commit() -> dict[str, Any] | None:
+    """Commit of the checkout that the package runs or was installed from.
+
+    Returns
+    -------
+    dict or None
+        ``hash`` and ``changed`` (whether tracked files differ from it); None outside a checkout,
+        where the package's version has to do.
+    """
+    package = Path(dmp_cpg_ros.__file__).resolve().parent
+    for folder in (package, _installed_from()):
+        if folder is not None and _tracks(folder):
+            commit = _git(folder, 'rev-parse', 'HEAD')
+            changes = _git(folder, 'status', '--porcelain', '--untracked-files=no')
+            if commit:
+                return {'hash': commit, 'changed': bool(changes)}
+    return None
+
+
+def _installed_from() -> Path | None:
+    """Checkout that pip installed the package from (PEP 610), None when it came from elsewhere."""
+    try:
+        text = metadata.distribution('dmp_cpg_ros').read_text('direct_url.json')
+    except metadata.PackageNotFoundError:
+        return None
+    url = urlparse(json.loads(text).get('url', '')) if text else None
+    if url is None or url.scheme != 'file':
+        return None
+    folder = Path(unquote(url.path)) / 'dmp_cpg_ros'
+    return folder if folder.is_dir() else None
+
+
+def _tracks(folder: Path) -> bool:
+    """Whether git tracks the package there, not just a folder around it."""
+    return bool(_git(folder, 'ls-files', '--', '__init__.py'))
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    """Output of a git command, empty when it fails or there is no git."""
+    try:
+        done = subprocess.run(['git', '-C', str(folder), *arguments], capture_output=True,
+                              text=True, timeout=10, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return ''
+    return done.stdout.strip() if done.returncode == 0 else ''

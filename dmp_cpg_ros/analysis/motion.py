@@ -88,6 +88,11 @@ def smoothed(time: Array, values: Array, window: float) -> Array:
     return (running[index + half + 1] - running[index - half]) / width
 
 
+def root_mean_square(values: Array) -> list[float]:
+    """Root mean squares of the columns of (n, k)."""
+    return list(np.sqrt((values**2).mean(axis=0)).tolist())
+
+
 def common_rows(*times: Array) -> list[NDArray[np.int64]]:
     """Rows of several series that bear the same stamps."""
     common = times[0]

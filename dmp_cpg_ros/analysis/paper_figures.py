@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The paper's figures, each from data to a Figure.
 
-Target kinematics and canonical states are those of the report; they take a recording of any run.
+Figures 5 and 7 are those of the report, in :mod:`~dmp_cpg_ros.analysis.figures.over_time`.
 """
 
 from __future__ import annotations
@@ -12,15 +12,12 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
 
-from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.figures import canonical_states, style, target_kinematics
+from dmp_cpg_ros.analysis.figures import style
+from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.paper_data import LocalDynamics, VanDerPolData
-from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.robot_model.state import LEGS
 
 COLOURS = tuple(style.LEG_COLOURS.values())
 
@@ -56,7 +53,7 @@ def van_der_pol_figure(data: VanDerPolData, labels: Sequence[str]) -> Figure:
     axes[0, 0].set_ylabel('$x_{i1}$ [–]')
     axes[1, 0].set_ylabel('$x_{i2}$ [1/s]')
     figure.align_ylabels()
-    style.legend(figure, [Line2D([], [], color=colour, label=label)
+    style.legend(figure, [style.key(label, color=colour)
                           for colour, label in zip(COLOURS, labels, strict=True)])
     return figure
 
@@ -81,23 +78,13 @@ def local_dynamics_figure(free: LocalDynamics, inhibited: LocalDynamics) -> Figu
         panel.set(title=title, xlabel='$x_1$ [–]', xlim=(-1.6, 1.6), ylim=(-1.6, 1.6))
         panel.set_aspect('equal')
     axes[0, 0].set_ylabel('$x_2$ [–]')
-    rest = Line2D([], [], color='#D55E00', marker='o', linestyle='', label='at rest')
+    rest = style.key('at rest', color='#D55E00', marker='o', linestyle='')
     style.legend(figure, [
-        Line2D([], [], color=style.MEASURED, marker='o', markersize=2.5, label='trajectories'),
-        Line2D([], [], color='#777777', linestyle=(0, (4, 3)), label='free limit cycle'),
+        style.key('trajectories', color=style.MEASURED, marker='o', markersize=2.5),
+        style.key('free limit cycle', color='#777777', linestyle=(0, (4, 3))),
         Patch(facecolor='#DCE8F5', edgecolor='#3B6EA8', label='region C'),
         rest])
     return figure
-
-
-def canonical_states_figure(recording: Recording, context: RunContext) -> Figure | None:
-    """Canonical states across inhibition and release (paper, figure OscillatorStates)."""
-    return canonical_states.draw(recording, context)
-
-
-def target_kinematics_figure(recording: Recording, context: RunContext) -> Figure | None:
-    """Hip and knee targets across inhibition and release (paper, figure TargetKinematics)."""
-    return target_kinematics.draw(recording, context)
 
 
 def gait_figure(gait: Gait, duty: float) -> Figure:
@@ -113,18 +100,15 @@ def gait_figure(gait: Gait, duty: float) -> Figure:
     figure, axes = style.new_figure(1.9)
     panel: Axes = axes[0, 0]
     cycle = np.linspace(0.0, 2.0, 2001)
-    for row, leg in enumerate(LEGS):
+    for row, lag in enumerate(gait.lag):
         # fl touches down at cycle 0
-        position = (cycle - gait.lag[row] + 0.5 * (1.0 - duty) + 0.5) % 1.0 - 0.5
+        position = (cycle - lag + 0.5 * (1.0 - duty) + 0.5) % 1.0 - 0.5
         stance = np.abs(position) >= 0.5 * (1.0 - duty)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], stance, [False]]).astype(int)))
-        bars = [(cycle[a], cycle[b - 1] - cycle[a]) for a, b in edges.reshape(-1, 2)]
-        panel.broken_barh(bars, (len(LEGS) - 1 - row - 0.35, 0.7),
-                          facecolor=style.LEG_COLOURS[leg], linewidth=0)
-    panel.set_yticks(range(len(LEGS)), [style.LEG_NAMES[leg] for leg in reversed(LEGS)])
-    panel.set(xlabel='cycle', xlim=(0.0, 2.0), ylim=(-0.6, len(LEGS) - 0.4),
+        bars = [(cycle[a], cycle[b - 1] - cycle[a]) for a, b in stretches(stance)]
+        style.leg_bars(panel, row, bars, 0.7)
+    style.leg_rows(panel)
+    panel.set(xlabel='cycle', xlim=(0.0, 2.0),
               title=f'{gait.name}: feet on the ground, duty factor {duty:.2f}')
-    panel.grid(visible=False, axis='y')
     return figure
 
 

@@ -16,7 +16,7 @@ from matplotlib import image
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import MOVING, STOPPING, episodes, steady_segments
+from dmp_cpg_ros.analysis.episodes import MOVING, requested_stops, steady_segments
 from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -62,9 +62,9 @@ def moments(recording: Recording, context: RunContext) -> list[Moment]:
             v = _reference(recording, start)[0]
             found.append(Moment('walking', f'Walking at {v:.2f} m/s (t = {time:.2f} s)', time))
             break
-    for episode in episodes(recording, STOPPING):
-        if episode.events[0].message != 'at_rest' and episode.events[-1].message == 'at_rest':
-            time = 0.5 * (episode.events[-1].time + episode.end)
+    for stop in requested_stops(recording):
+        if stop.events[-1].message == 'at_rest':
+            time = 0.5 * (stop.events[-1].time + stop.end)
             found.append(Moment('at_rest', f'At rest under inhibition (t = {time:.2f} s)', time))
             break
     rates = [_reference(recording, start)[2] for start, _ in segments]
@@ -123,10 +123,8 @@ def _pose(recording: Recording, time: float, turn: bool) -> tuple[Array, Array, 
     """
     odometry, joints = recording.odometry, recording.joints
     row = min(int(np.searchsorted(odometry.time, time)), len(odometry.time) - 1)
-    position, angles = (
-        odometry.position_in_world[row],
-        held(joints.time, joints.position, np.array([time]))[0],
-    )
+    position = odometry.position_in_world[row]
+    angles = held(joints.time, joints.position, np.array([time]))[0]
     if not turn:
         return position, odometry.quaternion[row], angles
     quaternion = odometry.quaternion[row : row + 1]
@@ -145,9 +143,6 @@ def _foot_in_the_air(recording: Recording, context: RunContext, start: float, en
         return middle
     inside = (feet.time >= start) & (feet.time <= end)
     swings = stretches(inside & (feet.force[:, NEAR_FOOT] <= context.contact_force))
-    middles = [
-        float(feet.time[(first + past) // 2])
-        for first, past in swings
-        if past - first > FEWEST_SAMPLES
-    ]
+    middles = [float(feet.time[(first + past) // 2]) for first, past in swings
+               if past - first > FEWEST_SAMPLES]
     return min(middles, key=lambda time: abs(time - middle), default=middle)

@@ -9,7 +9,8 @@ an array with no rows, so that every query works on every recording.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,56 +22,69 @@ Array = NDArray[np.float64]
 N_JOINTS, N_LEGS = len(JOINT_NAMES), len(LEGS)
 
 
-def no_rows(*shape: int) -> Array:
-    """Array without rows, ndarray (0, *shape)."""
-    return np.empty((0, *shape))
+Rows = TypeVar('Rows', bound='Series')
+
+
+def no_rows(*shape: int) -> Any:
+    """Field of a dataclass that is an array without rows, ndarray (0, *shape), by default."""
+    return field(default_factory=lambda: np.empty((0, *shape)))
 
 
 @dataclass(frozen=True)
-class JointSeries:
+class Series:
+    """Arrays with a row for each time.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    """
+
+    time: Array = no_rows()
+
+
+def taken(series: Rows, rows: Any) -> Rows:
+    """Some rows of a series: those of an index, a mask or a slice."""
+    return replace(series, **{of.name: getattr(series, of.name)[rows] for of in fields(series)})
+
+
+@dataclass(frozen=True)
+class JointSeries(Series):
     """Joint states or joint targets.
 
     Attributes
     ----------
-    time : ndarray (n,)
-        [s]
     position, velocity, effort : ndarray (n, 12)
         [rad], [rad/s], [N m] in the order of ``JOINT_NAMES``; NaN where a message held no value.
     """
 
-    time: Array = field(default_factory=no_rows)
-    position: Array = field(default_factory=lambda: no_rows(N_JOINTS))
-    velocity: Array = field(default_factory=lambda: no_rows(N_JOINTS))
-    effort: Array = field(default_factory=lambda: no_rows(N_JOINTS))
+    position: Array = no_rows(N_JOINTS)
+    velocity: Array = no_rows(N_JOINTS)
+    effort: Array = no_rows(N_JOINTS)
 
 
 @dataclass(frozen=True)
-class WorkSeries:
+class WorkSeries(Series):
     """What the joints' torques did, taken at every physics step.
 
     Attributes
     ----------
-    time : ndarray (n,)
-        [s]
     work : ndarray (n, 12)
         Positive mechanical work since time 0 [J].
     peak_effort : ndarray (n, 12)
         Largest size of the torque since the row before [N m].
     """
 
-    time: Array = field(default_factory=no_rows)
-    work: Array = field(default_factory=lambda: no_rows(N_JOINTS))
-    peak_effort: Array = field(default_factory=lambda: no_rows(N_JOINTS))
+    work: Array = no_rows(N_JOINTS)
+    peak_effort: Array = no_rows(N_JOINTS)
 
 
 @dataclass(frozen=True)
-class CanonicalSeries:
+class CanonicalSeries(Series):
     """Canonical states.
 
     Attributes
     ----------
-    time : ndarray (n,)
-        [s]
     x, x_dot : ndarray (n, 4, 2)
         States and their time derivatives [1/s].
     frame : tuple of str
@@ -78,36 +92,30 @@ class CanonicalSeries:
         (:mod:`~dmp_cpg_ros.core.gait.gait_reader`); empty where it was not recorded.
     """
 
-    time: Array = field(default_factory=no_rows)
-    x: Array = field(default_factory=lambda: no_rows(N_LEGS, 2))
-    x_dot: Array = field(default_factory=lambda: no_rows(N_LEGS, 2))
+    x: Array = no_rows(N_LEGS, 2)
+    x_dot: Array = no_rows(N_LEGS, 2)
     frame: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
-class VelocitySeries:
+class VelocitySeries(Series):
     """Commands or the reference.
 
     Attributes
     ----------
-    time : ndarray (n,)
-        [s]
     value : ndarray (n, 3)
         v_x, v_y [m/s], γ [rad/s].
     """
 
-    time: Array = field(default_factory=no_rows)
-    value: Array = field(default_factory=lambda: no_rows(3))
+    value: Array = no_rows(3)
 
 
 @dataclass(frozen=True)
-class OdometrySeries:
+class OdometrySeries(Series):
     """Motion of ``base_link`` in ``odom``.
 
     Attributes
     ----------
-    time : ndarray (n,)
-        [s]
     position_in_world : ndarray (n, 3)
         [m]
     quaternion : ndarray (n, 4)
@@ -116,66 +124,56 @@ class OdometrySeries:
         [m/s], [rad/s]
     """
 
-    time: Array = field(default_factory=no_rows)
-    position_in_world: Array = field(default_factory=lambda: no_rows(3))
-    quaternion: Array = field(default_factory=lambda: no_rows(4))
-    velocity_in_base: Array = field(default_factory=lambda: no_rows(3))
-    rate_in_base: Array = field(default_factory=lambda: no_rows(3))
+    position_in_world: Array = no_rows(3)
+    quaternion: Array = no_rows(4)
+    velocity_in_base: Array = no_rows(3)
+    rate_in_base: Array = no_rows(3)
 
 
 @dataclass(frozen=True)
-class ImuSeries:
+class ImuSeries(Series):
     """Inertial measurements.
 
     Attributes
     ----------
-    time : ndarray (n,)
-        [s]
     quaternion : ndarray (n, 4)
         x, y, z, w.
     rate_in_base, acceleration_in_base : ndarray (n, 3)
         [rad/s], [m/s^2]
     """
 
-    time: Array = field(default_factory=no_rows)
-    quaternion: Array = field(default_factory=lambda: no_rows(4))
-    rate_in_base: Array = field(default_factory=lambda: no_rows(3))
-    acceleration_in_base: Array = field(default_factory=lambda: no_rows(3))
+    quaternion: Array = no_rows(4)
+    rate_in_base: Array = no_rows(3)
+    acceleration_in_base: Array = no_rows(3)
 
 
 @dataclass(frozen=True)
-class FootForceSeries:
+class FootForceSeries(Series):
     """Normal contact forces.
 
     Attributes
     ----------
-    time : ndarray (n,)
-        [s]
     force : ndarray (n, 4)
         [N], in the order of ``LEGS``.
     """
 
-    time: Array = field(default_factory=no_rows)
-    force: Array = field(default_factory=lambda: no_rows(N_LEGS))
+    force: Array = no_rows(N_LEGS)
 
 
 @dataclass(frozen=True)
-class PostureSeries:
+class PostureSeries(Series):
     """What the posture controller asked of the legs.
 
     Attributes
     ----------
-    time : ndarray (n,)
-        [s]
     torque : ndarray (n, 12)
         Feedback torques τ_fb [N m].
     foot_shift_in_base : ndarray (n, 4, 2)
         Shift of the foot placement in x and y [m].
     """
 
-    time: Array = field(default_factory=no_rows)
-    torque: Array = field(default_factory=lambda: no_rows(N_JOINTS))
-    foot_shift_in_base: Array = field(default_factory=lambda: no_rows(N_LEGS, 2))
+    torque: Array = no_rows(N_JOINTS)
+    foot_shift_in_base: Array = no_rows(N_LEGS, 2)
 
 
 @dataclass(frozen=True)
@@ -209,21 +207,18 @@ class StatusEvent:
 
 
 @dataclass(frozen=True)
-class ArrivalSeries:
+class ArrivalSeries(Series):
     """When the recorder got a tick's state and the last of its targets.
 
     Attributes
     ----------
-    time : ndarray (n,)
-        Stamp of the tick [s].
     state, targets : ndarray (n,)
         Record times [s]: of ``joint_states``, and of the last ``joint_targets`` with the same
         stamp (NaN without). They are on whatever clock the recorder used.
     """
 
-    time: Array = field(default_factory=no_rows)
-    state: Array = field(default_factory=no_rows)
-    targets: Array = field(default_factory=no_rows)
+    state: Array = no_rows()
+    targets: Array = no_rows()
 
     @property
     def on_wall_clock(self) -> bool:
@@ -268,21 +263,21 @@ class Recording:
         not be decoded.
     """
 
-    joints: JointSeries = field(default_factory=JointSeries)
-    targets: JointSeries = field(default_factory=JointSeries)
-    work: WorkSeries = field(default_factory=WorkSeries)
-    canonical: CanonicalSeries = field(default_factory=CanonicalSeries)
-    reference: VelocitySeries = field(default_factory=VelocitySeries)
-    commands: VelocitySeries = field(default_factory=VelocitySeries)
-    odometry: OdometrySeries = field(default_factory=OdometrySeries)
-    estimate: OdometrySeries = field(default_factory=OdometrySeries)
-    imu: ImuSeries = field(default_factory=ImuSeries)
-    feet: FootForceSeries = field(default_factory=FootForceSeries)
-    posture: PostureSeries = field(default_factory=PostureSeries)
+    joints: JointSeries = JointSeries()
+    targets: JointSeries = JointSeries()
+    work: WorkSeries = WorkSeries()
+    canonical: CanonicalSeries = CanonicalSeries()
+    reference: VelocitySeries = VelocitySeries()
+    commands: VelocitySeries = VelocitySeries()
+    odometry: OdometrySeries = OdometrySeries()
+    estimate: OdometrySeries = OdometrySeries()
+    imu: ImuSeries = ImuSeries()
+    feet: FootForceSeries = FootForceSeries()
+    posture: PostureSeries = PostureSeries()
     inhibition: tuple[StatusEvent, ...] = ()
     modes: tuple[StatusEvent, ...] = ()
     statuses: Mapping[str, tuple[StatusEvent, ...]] = field(default_factory=dict)
-    arrivals: ArrivalSeries = field(default_factory=ArrivalSeries)
+    arrivals: ArrivalSeries = ArrivalSeries()
     counts: Mapping[str, int] = field(default_factory=dict)
     undecodable: Mapping[str, int] = field(default_factory=dict)
 
@@ -294,18 +289,7 @@ class Recording:
     @property
     def span(self) -> tuple[float, float]:
         """First and last stamp of the recorded series [s]; (0, 0) when nothing was recorded."""
-        axes = [
-            series.time
-            for series in (
-                self.joints,
-                self.canonical,
-                self.odometry,
-                self.reference,
-                self.feet,
-                self.targets,
-            )
-            if series.time.size
-        ]
-        if not axes:
-            return 0.0, 0.0
-        return min(float(axis[0]) for axis in axes), max(float(axis[-1]) for axis in axes)
+        axes = [series.time for series in (self.joints, self.canonical, self.odometry,
+                                           self.reference, self.feet, self.targets)]
+        ends = [float(axis[row]) for axis in axes if axis.size for row in (0, -1)]
+        return min(ends, default=0.0), max(ends, default=0.0)

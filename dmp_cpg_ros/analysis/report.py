@@ -55,19 +55,15 @@ def render(contents: ReportContents) -> str:
     metrics = plain(contents.metrics)
     sections = [
         ('summary', 'Summary', _summary(contents, metrics)),
-        ('figures', 'Figures', _figures(contents)),
-        ('stops', 'Stops and starts', _stops(metrics)),
-        ('speeds', 'Steady speeds', _speeds(metrics)),
-        ('metrics', 'Metrics', _metrics(metrics)),
+        ('figures', 'Figures', _figures(contents)), ('stops', 'Stops and starts', _stops(metrics)),
+        ('speeds', 'Steady speeds', _speeds(metrics)), ('metrics', 'Metrics', _metrics(metrics)),
         ('certificate', 'Certificate', _certificate(metrics)),
-        ('manifest', 'Manifest', _manifest(contents)),
-    ]
+        ('manifest', 'Manifest', _manifest(contents))]
     sections = [section for section in sections if section[2]]
     links = ''.join(f'<a href="#{name}">{title}</a>' for name, title, _ in sections)
     body = ''.join(
-        f'<section id="{name}"><h2>{title}</h2>{content}</section>\n'
-        for name, title, content in sections
-    )
+        f'<section id="{name}"><h2>{title}</h2>{content}</section>\n' for name, title,
+        content in sections)
     title, created = escape(contents.title), escape(str(contents.manifest.get('created', '')))
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'

@@ -45,14 +45,9 @@ class RunResults:
 
 
 def write_results(
-    folder: Path,
-    recording: Recording,
-    context: RunContext,
-    manifest: Mapping[str, Any],
-    certificate: Sequence[Any] | None = None,
-    draw: Draw | None = None,
-    report: bool = True,
-) -> RunResults:
+        folder: Path, recording: Recording, context: RunContext, manifest: Mapping[str, Any],
+        certificate: Sequence[Any] | None = None, draw: Draw | None = None,
+        report: bool = True) -> RunResults:
     """Write everything that a run's folder holds besides its bag.
 
     Parameters
@@ -91,14 +86,8 @@ def write_results(
     write_report(
         path,
         ReportContents(
-            _title(context, facts),
-            _subtitle(recording, context, facts),
-            metrics,
-            facts,
-            figures,
-            pictures,
-            lock_step=facts.get('lock_step'),
-        ),
+            _title(context, facts), _subtitle(recording, context, facts), metrics, facts, figures,
+            pictures, lock_step=facts.get('lock_step')),
     )
     return RunResults(folder, metrics, facts, path, figures, pictures)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.foot_motion import foot_slip
 from dmp_cpg_ros.analysis.metrics.stops import STILL_SPEED
 from dmp_cpg_ros.analysis.motion import rotations, tilt
-from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording
+from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording, taken
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 
 Array = NDArray[np.float64]
@@ -59,20 +59,25 @@ class StopOutcome:
     fell: bool
     standing: bool = False
     walked_on: bool = False
-    predicted_s: float = float('nan')
-    bound_s: float = float('nan')
-    measured_s: float = float('nan')
-    body_rest_s: float = float('nan')
-    slip_m: float = float('nan')
-    displacement_m: float = float('nan')
-    tilt: float = float('nan')
-    deceleration: float = float('nan')
-    resumed_speed: float = float('nan')
+    predicted_s: float = np.nan
+    bound_s: float = np.nan
+    measured_s: float = np.nan
+    body_rest_s: float = np.nan
+    slip_m: float = np.nan
+    displacement_m: float = np.nan
+    tilt: float = np.nan
+    deceleration: float = np.nan
+    resumed_speed: float = np.nan
 
     @property
     def prediction_error(self) -> float:
         """Share of the measured time by which the prediction missed it; NaN without either."""
         return abs(self.predicted_s - self.measured_s) / self.measured_s
+
+    @property
+    def bounded(self) -> bool:
+        """Whether there is a bound."""
+        return bool(np.isfinite(self.bound_s))
 
     @property
     def bound_exceeded(self) -> bool:
@@ -105,16 +110,15 @@ def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float)
     moving = np.flatnonzero(speed >= STILL_SPEED)
     rest = min(moving[-1] + 1, len(time) - 1) if moving.size else 0
     path = odometry.position_in_world[: rest + 1, :2]
-    slip = foot_slip(_first_rows(hold, rest + 1), robot, contact_force)
+    until_rest = Recording(
+        joints=taken(hold.joints, slice(rest + 1)), odometry=taken(odometry, slice(rest + 1)),
+        feet=taken(hold.feet, slice(rest + 1)))
+    slip = foot_slip(until_rest, robot, contact_force)
     return StopOutcome(
-        fell=False,
-        standing=bool(still.all() and loaded.all()),
-        body_rest_s=float(time[rest]),
+        fell=False, standing=bool(still.all() and loaded.all()), body_rest_s=float(time[rest]),
         slip_m=0.0 if slip is None else float(slip.mean()),
         displacement_m=float(np.hypot(*(path[-1] - path[0]))),
-        tilt=float(tilt(odometry.quaternion).max()),
-        deceleration=_deceleration(odometry),
-    )
+        tilt=float(tilt(odometry.quaternion).max()), deceleration=_deceleration(odometry))
 
 
 def _deceleration(odometry: OdometrySeries) -> float:
@@ -125,86 +129,25 @@ def _deceleration(odometry: OdometrySeries) -> float:
     return float(np.hypot(*change.T).max() / DECELERATION_WINDOW)
 
 
-def _first_rows(hold: Recording, count: int) -> Recording:
-    joints, odometry, feet = hold.joints, hold.odometry, hold.feet
-    return Recording(
-        joints=type(joints)(
-            joints.time[:count],
-            joints.position[:count],
-            joints.velocity[:count],
-            joints.effort[:count],
-        ),
-        odometry=type(odometry)(
-            odometry.time[:count],
-            odometry.position_in_world[:count],
-            odometry.quaternion[:count],
-            odometry.velocity_in_base[:count],
-            odometry.rate_in_base[:count],
-        ),
-        feet=type(feet)(feet.time[:count], feet.force[:count]),
-    )
-
-
 @dataclass(frozen=True)
 class StopSummary:
-    """What a set of outcomes has in common; times, errors and lengths as (median, worst).
+    """What a set of outcomes has in common; those that fell count, but have no times or lengths.
 
     Attributes
     ----------
-    count, fell, standing, walked_on, bounded, bound_exceeded : int
-        Numbers of cases; ``bounded`` are those that have a bound.
-    prediction_error : tuple of float
-        Share of the measured time.
-    bound_s, measured_s, body_rest_s : tuple of float
-        [s]
-    slip_m, displacement_m : tuple of float
-        [m]
-    tilt : tuple of float
-        [rad]
-    deceleration : tuple of float
-        [m/s^2]
+    outcomes : sequence of StopOutcome
+        The set.
     """
 
-    count: int
-    fell: int
-    standing: int
-    walked_on: int
-    bounded: int
-    bound_exceeded: int
-    prediction_error: tuple[float, float]
-    bound_s: tuple[float, float]
-    measured_s: tuple[float, float]
-    body_rest_s: tuple[float, float]
-    slip_m: tuple[float, float]
-    displacement_m: tuple[float, float]
-    tilt: tuple[float, float]
-    deceleration: tuple[float, float]
+    outcomes: Sequence[StopOutcome]
 
+    def number(self, name: str) -> int:
+        """In how many outcomes something is so, such as ``standing`` or ``bound_exceeded``."""
+        return sum(bool(getattr(outcome, name)) for outcome in self.outcomes)
 
-def summary(outcomes: Sequence[StopOutcome]) -> StopSummary:
-    """Summarise outcomes; those that fell count, but have no times or lengths."""
-
-    def number(name: str) -> int:
-        return sum(bool(getattr(outcome, name)) for outcome in outcomes)
-
-    def spread(name: str) -> tuple[float, float]:
-        values = np.array([getattr(outcome, name) for outcome in outcomes if not outcome.fell])
+    def spread(self, name: str) -> tuple[float, float]:
+        """Median and worst of a number, such as ``slip_m``; NaN where no outcome has it."""
+        upright = [outcome for outcome in self.outcomes if not outcome.fell]
+        values = np.array([getattr(outcome, name) for outcome in upright])
         values = values[np.isfinite(values)]
         return (float(np.median(values)), float(values.max())) if values.size else (np.nan, np.nan)
-
-    return StopSummary(
-        len(outcomes),
-        number('fell'),
-        number('standing'),
-        number('walked_on'),
-        sum(np.isfinite(outcome.bound_s) for outcome in outcomes),
-        number('bound_exceeded'),
-        spread('prediction_error'),
-        spread('bound_s'),
-        spread('measured_s'),
-        spread('body_rest_s'),
-        spread('slip_m'),
-        spread('displacement_m'),
-        spread('tilt'),
-        spread('deceleration'),
-    )

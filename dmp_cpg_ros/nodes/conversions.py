@@ -18,6 +18,7 @@ from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import FRAMES, PushForce
+from dmp_cpg_ros.layouts import CANONICAL_NAMES, CORRECTION_NAMES, SHIFT_NAMES
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.message_values import (
     Array,
@@ -29,10 +30,6 @@ from dmp_cpg_ros.nodes.message_values import (
 from dmp_cpg_ros.nodes.robot_state_messages import BASE_FRAME
 from dmp_cpg_ros.nodes.serialized_messages import SerializedJointState, SerializedTwist
 from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraft
-
-CANONICAL_NAMES = tuple(f'{leg}_x{i}' for leg in LEGS for i in (1, 2))
-SHIFT_NAMES = tuple(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xyz')
-CORRECTION_NAMES = ('base_x', 'base_y', 'base_yaw')
 
 _JOINTS = slice(0, len(JOINT_NAMES))
 _FEET = slice(len(JOINT_NAMES), len(JOINT_NAMES) + len(SHIFT_NAMES))

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import nan, pi
 
-from dmp_cpg_ros.analysis.stop_outcome import summary
+from dmp_cpg_ros.analysis.stop_outcome import StopSummary
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.stop_trial import StopCase, run_trials
 from dmp_cpg_ros.studies.walking_trials import (
@@ -76,15 +76,16 @@ def run_robot(case: RobotCase) -> RobotOutcome:
     suite = load_suite(None, {'robot': case.file, 'cmd_vel_timeout': 0.0})
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
     phases = [i / case.phases for i in range(case.phases)]
-    stops = summary(list(run_trials(
+    stops = StopSummary(list(run_trials(
         robot, [StopCase('amble', 0.5, phase) for phase in phases], load_gait('amble'),
         suite.parameters)))
     pushed = [change for phase in phases
               for change in survived_pushes(PushCase('amble', 0.5, phase, SIDES), case.file)]
     return RobotOutcome(
         robot.description.mass, steady('amble', (0.5, 0.0, 0.0), case.file),
-        steady('trot', (1.0, 0.0, 0.0), case.file), top_speed(case.file), stops.count,
-        stops.standing, stops.walked_on, stops.fell, min(pushed))
+        steady('trot', (1.0, 0.0, 0.0), case.file), top_speed(case.file),
+        len(stops.outcomes), stops.number('standing'), stops.number('walked_on'),
+        stops.number('fell'), min(pushed))
 
 
 def top_speed(file: str) -> float:

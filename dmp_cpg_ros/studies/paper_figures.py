@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from dmp_cpg_ros.analysis import paper_data, paper_figures
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.figures import style
+from dmp_cpg_ros.analysis.figures import over_time, style
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.loop import WalkingLoop
@@ -59,11 +59,10 @@ def figures(suite: Suite) -> Iterator[tuple[str, Figure]]:
     context = RunContext(robot.description, suite.gait, suite.parameters.inhibition,
                          suite.parameters.canonical.radius)
     recording = experiment(suite, robot)
-    for name, figure in (
-            ('target_kinematics', paper_figures.target_kinematics_figure(recording, context)),
-            ('canonical_states', paper_figures.canonical_states_figure(recording, context))):
+    for draw in (over_time.target_kinematics, over_time.canonical_states):
+        figure = draw(recording, context)
         if figure is not None:
-            yield name, figure
+            yield draw.__name__, figure
     yield 'local_dynamics', paper_figures.local_dynamics_figure(
         paper_data.local_dynamics(False), paper_data.local_dynamics(True))
 

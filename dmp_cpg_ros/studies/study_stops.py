@@ -20,7 +20,7 @@ from math import pi
 from multiprocessing import Pool
 from pathlib import Path
 
-from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, summary
+from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.core.certificates.certify import certify
@@ -130,12 +130,12 @@ def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
 
 def table(results: Results) -> str:
     """Markdown table: a row per gait, speed, cadence, leg and method, and one for each method."""
-    rows = [(*_labels(key), *_cells(summary([outcome for _, outcome in group]), key[-1]))
+    rows = [(*_labels(key), *_cells(StopSummary([outcome for _, outcome in group]), key[-1]))
             for key, group in groupby(results, lambda result: _key(result[0]))]
     for method in METHODS:
         outcomes = [outcome for case, outcome in results if case.method == method]
         if outcomes:
-            rows.append(('all', '', '', '', method, *_cells(summary(outcomes), method)))
+            rows.append(('all', '', '', '', method, *_cells(StopSummary(outcomes), method)))
     return markdown_table(COLUMNS, rows)
 
 
@@ -149,19 +149,20 @@ def _labels(key: tuple[str, float, str, float, str]) -> tuple[str, ...]:
 
 
 def _cells(of: StopSummary, method: str) -> tuple[str, ...]:
-    def pair(values: tuple[float, float], scale: float, digits: int) -> str:
+    def pair(name: str, scale: float, digits: int) -> str:
+        values = of.spread(name)
         if values[0] != values[0]:
             return '-'
         return ' / '.join(f'{scale * value:.{digits}f}' for value in values)
 
-    exceeded = f'{of.bound_exceeded}/{of.bounded}' if of.bounded else '-'
-    walked_on = _share(of.walked_on, of.count) if method == METHODS[0] else '-'
-    return (str(of.count), str(of.fell), _share(of.standing, of.count),
-            walked_on, pair(of.prediction_error, 100.0, 1), exceeded,
-            pair(of.bound_s, 1.0, 2), pair(of.measured_s, 1.0, 2),
-            pair(of.body_rest_s, 1.0, 2), pair(of.slip_m, 1e3, 1),
-            pair(of.displacement_m, 1.0, 2), pair(of.tilt, 180.0 / pi, 1),
-            pair(of.deceleration, 1.0, 1))
+    bounded, count = of.number('bounded'), len(of.outcomes)
+    return (str(count), str(of.number('fell')), _share(of.number('standing'), count),
+            _share(of.number('walked_on'), count) if method == METHODS[0] else '-',
+            pair('prediction_error', 100.0, 1),
+            f"{of.number('bound_exceeded')}/{bounded}" if bounded else '-',
+            pair('bound_s', 1.0, 2), pair('measured_s', 1.0, 2), pair('body_rest_s', 1.0, 2),
+            pair('slip_m', 1e3, 1), pair('displacement_m', 1.0, 2), pair('tilt', 180.0 / pi, 1),
+            pair('deceleration', 1.0, 1))
 
 
 def _share(part: int, whole: int) -> str:

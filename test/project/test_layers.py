@@ -26,12 +26,13 @@ LAYERS = {
     'paper': ({'core'}, {'numpy'}),
     'configuration': ({'core'}, {'yaml'}),
     'suite_table': ({'core'}, set()),
+    'layouts': ({'core'}, set()),
     'suite': ({'core', 'configuration', 'suite_table'}, set()),
     'primitive_files': ({'core', 'configuration'}, {'numpy', 'yaml'}),
     'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco', 'yaml'}),
-    'nodes': ({'core', 'configuration', 'suite_table', 'suite', 'robot'},
+    'nodes': ({'core', 'configuration', 'layouts', 'suite_table', 'suite', 'robot'},
               {'numpy', 'yaml', *ROS, *RECORDS}),
-    'analysis': ({'core', 'paper', 'configuration', 'suite_table', 'suite'},
+    'analysis': ({'core', 'paper', 'configuration', 'layouts', 'suite_table', 'suite'},
                  {'numpy', *RECORDS, *FIGURES}),
     'commands': ({'core', 'configuration', 'suite_table', 'suite', 'primitive_files', 'robot',
                   'nodes', 'analysis'}, EVERYTHING),
@@ -103,8 +104,8 @@ def test_no_import_runs_in_a_circle() -> None:
 
 @pytest.mark.parametrize(('layers', 'unwanted'), [
     (['core', 'paper'], EVERYTHING - {'numpy'}),
-    (['configuration', 'suite_table', 'suite', 'primitive_files', 'models', 'analysis'],
-     ROS | {'mujoco'}),
+    (['configuration', 'layouts', 'suite_table', 'suite', 'primitive_files', 'models',
+      'analysis'], ROS | {'mujoco'}),
     (['robot'], ROS | RECORDS),
 ])
 def test_importing_a_layer_loads_nothing_that_it_must_do_without(

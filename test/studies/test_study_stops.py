@@ -17,7 +17,7 @@ from dmp_cpg_ros.analysis.recording import (
     OdometrySeries,
     Recording,
 )
-from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, body_at_rest, summary
+from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, body_at_rest
 
 ROBOT = quadruped()
 
@@ -57,10 +57,10 @@ def test_it_does_not_stand_when_it_moves_or_a_foot_is_in_the_air(
 def test_a_summary_counts_every_case_but_measures_those_that_did_not_fall() -> None:
     good = StopOutcome(False, True, True, predicted_s=1.1, bound_s=2.0, measured_s=1.0)
     late = StopOutcome(False, True, False, predicted_s=1.0, bound_s=0.9, measured_s=1.0)
-    of = summary([good, late, StopOutcome(fell=True), StopOutcome(fell=True)])
-    assert (of.count, of.fell, of.standing, of.walked_on) == (4, 2, 2, 1)
-    assert (of.bounded, of.bound_exceeded) == (2, 1)
-    assert of.prediction_error == pytest.approx((0.05, 0.1))
+    of = StopSummary([good, late, StopOutcome(fell=True), StopOutcome(fell=True)])
+    assert [of.number(name) for name in ('fell', 'standing', 'walked_on')] == [2, 2, 1]
+    assert (of.number('bounded'), of.number('bound_exceeded')) == (2, 1)
+    assert of.spread('prediction_error') == pytest.approx((0.05, 0.1))
 
 
 def test_a_stop_that_never_came_to_rest_exceeds_its_bound() -> None:

@@ -13,15 +13,11 @@ from matplotlib.figure import Figure
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import (
-    attitude,
-    canonical_states,
-    estimation,
     footfall,
+    over_time,
     path,
     phase_portrait,
-    speed_tracking,
     style,
-    target_kinematics,
     timing,
     torques,
 )
@@ -36,41 +32,77 @@ class FigureEntry:
     ----------
     name : str
         Of its file, without ending.
-    title, caption : str
-        What it is, and what there is to see.
+    title : str
+        What it is.
     draw : callable
         From recording and context to a Figure, or None when the recording lacks what it needs.
+    caption : str
+        What there is to see.
     """
 
     name: str
     title: str
-    caption: str
     draw: Callable[[Recording, RunContext], Figure | None]
+    caption: str
 
 
-CATALOGUE: tuple[FigureEntry, ...] = tuple(
-    FigureEntry(module.__name__.rsplit('.', 1)[-1], title, module.CAPTION, module.draw)
-    for module, title in (
-        (target_kinematics, 'Target kinematics'),
-        (canonical_states, 'Canonical states'),
-        (phase_portrait, 'Phase portrait'),
-        (footfall, 'Footfall'),
-        (path, 'Path'),
-        (speed_tracking, 'Speed tracking'),
-        (attitude, 'Body attitude'),
-        (estimation, 'Estimate of the body'),
-        (torques, 'Joint torques'),
-        (timing, 'Timing'),
-    )
+CATALOGUE = (
+    FigureEntry(
+        'target_kinematics', 'Target kinematics', over_time.target_kinematics,
+        'Targets of the hips and the knees across a stop by sparse inhibition and the start '
+        'after it. One oscillator is inhibited; the targets of all legs should come to rest and '
+        'resume without a kick.'),
+    FigureEntry(
+        'canonical_states', 'Canonical states', over_time.canonical_states,
+        'The four oscillators across the addition and the removal of sparse inhibition. Only the '
+        'inhibited leg feels it; the coupling brings the other three to rest near their places.'),
+    FigureEntry(
+        'phase_portrait', 'Phase portrait', phase_portrait.draw,
+        'The first stop in the plane of the oscillators. Left: the inhibited oscillator runs on '
+        'its limit cycle until inhibition is armed and it enters the region C, where it is held '
+        'near its target. Middle: close-up of C; the small distance at which it rests is the '
+        'pull of the other oscillators over the gain. Right: all four legs; dots mark where they '
+        'rest, rings their places in the gait.'),
+    FigureEntry(
+        'footfall', 'Footfall', footfall.draw,
+        'Bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles '
+        'of steady walking. Bottom: the first stop and the start after it; at rest all four bars '
+        'should be unbroken.'),
+    FigureEntry(
+        'path', 'Path', path.draw,
+        'The base from above. Small dots are footholds, one for each stance; squares mark where '
+        'the robot stood still, arrows its heading every two seconds.'),
+    FigureEntry(
+        'speed_tracking', 'Speed tracking', over_time.speed_tracking,
+        'As commanded, as filtered by the reference system, and as measured; the pale line is '
+        'every sample, the bold one the mean over a gait cycle. While a stop is requested the '
+        'reference goes to zero whatever the command.'),
+    FigureEntry(
+        'attitude', 'Body attitude', over_time.attitude,
+        'Roll and pitch, height over the ground and yaw of the base. The dashed lines are what '
+        'is asked for: the standing height, and the integral of the reference turn rate.'),
+    FigureEntry(
+        'estimation', 'Estimate of the body', over_time.estimation,
+        'What the robot believes of its motion, from gyroscope, accelerometer, joints and '
+        "contacts, minus the simulator's truth: velocity in the base, tilt, and yaw, which "
+        'nothing it has can correct.'),
+    FigureEntry(
+        'torques', 'Joint torques', torques.draw,
+        'Left: three cycles of steady walking; grey lines are the limits where they are in view. '
+        'Right: the whole run as share of the limit; bars reach to the 99th percentile, ticks '
+        'mark the largest value.'),
+    FigureEntry(
+        'timing', 'Timing', timing.draw,
+        'Top: what the robot measured of itself, control rate and latency from a state to the '
+        'last of the four targets that answer it. Bottom, where the recording bears wall time: '
+        'how far apart the states reached the recorder, and how long after a state the last '
+        'target of its tick did.'),
 )
 
 
 def write_figures(
-    recording: Recording,
-    context: RunContext,
-    folder: Path,
-    entries: Sequence[FigureEntry] = CATALOGUE,
-) -> dict[str, Path]:
+        recording: Recording, context: RunContext, folder: Path,
+        entries: Sequence[FigureEntry] = CATALOGUE) -> dict[str, Path]:
     """Draw and write ``NAME.png`` for each figure that the recording allows.
 
     Returns

@@ -12,17 +12,16 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis import gait_in_force
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import RUNNING, episodes, gait_period, steady_segments
+from dmp_cpg_ros.analysis.episodes import (
+    gait_period,
+    running_intervals,
+    steady_segments,
+    within,
+)
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-CAPTION = (
-    'Bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles of '
-    'steady walking. Bottom: the first stop and the start after it; at rest all four bars should '
-    'be unbroken.'
-)
 
 CYCLES = 6
 """Gait cycles of steady walking that are drawn."""
@@ -62,10 +61,9 @@ def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool
     stance, duty = gait_in_force.planned_stance(recording, context)
     if not duty.size:
         return None
-    running = np.zeros(len(canonical.time), dtype=bool)
-    for episode in episodes(recording, RUNNING):
-        running |= (canonical.time >= episode.start) & (canonical.time < episode.end)
-    return stance & running[:, None] if recording.inhibition else stance
+    if not recording.inhibition:
+        return stance
+    return stance & within(canonical.time, running_intervals(recording))[:, None]
 
 
 def _diagram(
@@ -73,25 +71,12 @@ def _diagram(
 ) -> None:
     contact = recording.feet.force > context.contact_force
     planned = planned_stance(recording, context)
-    for row, leg in enumerate(LEGS):
-        y = len(LEGS) - 1 - row
+    for leg in range(len(LEGS)):
         if planned is not None:
-            axes.broken_barh(
-                bars(recording.canonical.time, planned[:, row]),
-                (y - 0.4, 0.8),
-                facecolor=style.LEG_COLOURS[leg],
-                alpha=0.28,
-                linewidth=0,
-            )
-        axes.broken_barh(
-            bars(recording.feet.time, contact[:, row]),
-            (y - 0.22, 0.44),
-            facecolor=style.LEG_COLOURS[leg],
-            linewidth=0,
-        )
-    axes.set_yticks(range(len(LEGS)), [style.LEG_NAMES[leg] for leg in reversed(LEGS)])
-    axes.set_ylim(-0.6, len(LEGS) - 0.4)
-    axes.grid(visible=False, axis='y')
+            style.leg_bars(axes, leg, bars(recording.canonical.time, planned[:, leg]), 0.8,
+                           alpha=0.28)
+        style.leg_bars(axes, leg, bars(recording.feet.time, contact[:, leg]), 0.44)
+    style.leg_rows(axes)
     style.limit_view(axes, window)
 
 

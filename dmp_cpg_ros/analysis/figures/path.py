@@ -4,26 +4,27 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import STOPPING, episodes
+from dmp_cpg_ros.analysis.episodes import requested_stops
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.foot_motion import feet_in_base
 from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations, stretches
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
-CAPTION = (
-    'The base from above. Small dots are footholds, one for each stance; squares mark where the '
-    'robot stood still, arrows its heading every two seconds.'
-)
-
 FEWEST_SAMPLES = 5
 """Shorter contacts are no footholds."""
+
+FOOTHOLD: Any = {'marker': '.', 'linestyle': ''}
+BEGIN: Any = {
+    'marker': 'o', 'color': 'white', 'markeredgecolor': style.INK, 'linestyle': ''}
+STOP: Any = {'marker': 's', 'color': style.RED, 'linestyle': ''}
 
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
@@ -31,61 +32,27 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
     odometry = recording.odometry
     if odometry.time.size < 2:
         return None
-    x, y = odometry.position_in_world[:, 0], odometry.position_in_world[:, 1]
+    x, y = odometry.position_in_world[:, :2].T
     margin = 0.4
     span_x, span_y = np.ptp(x) + 2 * margin, np.ptp(y) + 2 * margin
     figure, axes = style.new_figure(
-        float(np.clip((style.WIDTH - 0.7) * span_y / span_x + 0.9, 2.0, 7.0))
-    )
+        float(np.clip((style.WIDTH - 0.7) * span_y / span_x + 0.9, 2.0, 7.0)))
     panel = axes[0, 0]
-    handles = [Line2D([], [], color=style.INK, label='base')]
+    handles = [style.key('base', color=style.INK)]
     if context.robot is not None and _footholds(panel, recording, context):
-        handles += [
-            Line2D(
-                [],
-                [],
-                color=style.LEG_COLOURS[leg],
-                marker='.',
-                linestyle='',
-                label=style.LEG_NAMES[leg],
-            )
-            for leg in LEGS
-        ]
+        handles += [style.key(style.LEG_NAMES[leg], color=style.LEG_COLOURS[leg], **FOOTHOLD)
+                    for leg in LEGS]
     panel.plot(x, y, color=style.INK, linewidth=1.3, zorder=3)
     _headings(panel, recording)
-    panel.plot(
-        x[0], y[0], marker='o', color='white', markeredgecolor=style.INK, markersize=6, zorder=5
-    )
-    for episode in episodes(recording, STOPPING):
-        if episode.events[0].message != 'at_rest':
-            panel.plot(
-                np.interp(episode.end, odometry.time, x),
-                np.interp(episode.end, odometry.time, y),
-                marker='s',
-                color='#C00000',
-                markersize=5,
-                zorder=5,
-            )
-    handles += [
-        Line2D(
-            [],
-            [],
-            color='white',
-            markeredgecolor=style.INK,
-            marker='o',
-            linestyle='',
-            label='begin',
-        ),
-        Line2D([], [], color='#C00000', marker='s', linestyle='', label='stop'),
-    ]
+    panel.plot(x[0], y[0], markersize=6, zorder=5, **BEGIN)
+    for stop in requested_stops(recording):
+        place = (np.interp(stop.end, odometry.time, column) for column in (x, y))
+        panel.plot(*place, markersize=5, zorder=5, **STOP)
     panel.set(
-        xlim=(x.min() - margin, x.max() + margin),
-        ylim=(y.min() - margin, y.max() + margin),
-        xlabel='x [m]',
-        ylabel='y [m]',
-    )
+        xlim=(x.min() - margin, x.max() + margin), ylim=(y.min() - margin, y.max() + margin),
+        xlabel='x [m]', ylabel='y [m]')
     panel.set_aspect('equal')
-    style.legend(figure, handles)
+    style.legend(figure, [*handles, style.key('begin', **BEGIN), style.key('stop', **STOP)])
     return figure
 
 
@@ -98,20 +65,8 @@ def _headings(axes: Axes, recording: Recording, every: float = 2.0) -> None:
         for column in (*odometry.position_in_world[:, :2].T, yaw)
     )
     axes.quiver(
-        x,
-        y,
-        np.cos(heading),
-        np.sin(heading),
-        color=style.INK,
-        angles='xy',
-        scale_units='xy',
-        scale=4.5,
-        width=0.0028,
-        headwidth=5,
-        headlength=5,
-        headaxislength=4.5,
-        zorder=4,
-    )
+        x, y, np.cos(heading), np.sin(heading), color=style.INK, angles='xy', scale_units='xy',
+        scale=4.5, width=0.0028, headwidth=5, headlength=5, headaxislength=4.5, zorder=4)
 
 
 def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
@@ -132,11 +87,6 @@ def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
         ]
         if places:
             axes.plot(
-                *np.array(places).T,
-                color=style.LEG_COLOURS[leg.name],
-                marker='.',
-                markersize=3.5,
-                linestyle='',
-                zorder=2,
-            )
+                *np.array(places).T, color=style.LEG_COLOURS[leg.name], markersize=3.5, zorder=2,
+                **FOOTHOLD)
     return True

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from dmp_cpg_ros.analysis.episodes import STOPPING, episodes
+from dmp_cpg_ros.analysis.episodes import STOPPING, episodes, requested_stops
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -37,6 +37,8 @@ LEG_NAMES = dict(zip(LEGS, ('front left', 'front right', 'rear left', 'rear righ
 
 INK, GREY, MEASURED, REFERENCE = '#222222', '#8A8A8A', '#0072B2', '#222222'
 WAITING, INHIBITED = '#F6E8B1', '#D9DEE4'
+BLUE, ORANGE, VIOLET, RED = '#56B4E9', '#E69F00', '#6A51A3', '#C00000'
+DASHED = (0, (5, 2))
 
 _PARAMETERS: Any = {
     'font.family': 'sans-serif',
@@ -83,8 +85,7 @@ def applied() -> Iterator[None]:
 
 
 def new_figure(
-    height: float, rows: int = 1, columns: int = 1, **options: Any
-) -> tuple[Figure, Any]:
+        height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
     """Figure of page width and its axes, ndarray (rows, columns).
 
     Parameters
@@ -100,33 +101,84 @@ def new_figure(
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
+def time_panels(
+    recording: Recording, height: float, labels: Sequence[str],
+    window: tuple[float, float] | None = None
+) -> tuple[Figure, list[Axes], list[Patch]]:
+    """Panels over one time axis, in which stops are shaded.
+
+    Parameters
+    ----------
+    recording : Recording
+        The run.
+    height : float
+        Of the figure [inch].
+    labels : sequence of str
+        One per panel, of its y axis.
+    window : tuple of float, optional
+        Times that are shown [s]; all without.
+
+    Returns
+    -------
+    Figure, list of Axes, list of Patch
+        The last are handles of the shades for the legend.
+    """
+    figure, axes = new_figure(height, len(labels), sharex=True)
+    panels, shades = list(axes[:, 0]), []
+    for panel, label in zip(panels, labels, strict=True):
+        shades = shade_stops(panel, recording)
+        panel.set_ylabel(label)
+        limit_view(panel, window or recording.span)
+    panels[-1].set_xlabel('time [s]')
+    figure.align_ylabels()
+    return figure, panels, shades
+
+
+def plot_legs(axes: Axes, time: Any, values: Any) -> None:
+    """Draw a line per leg, each in its colour: values (n, 4) over time (n,)."""
+    for leg, column in zip(LEGS, values.T, strict=True):
+        axes.plot(time, column, color=LEG_COLOURS[leg])
+
+
+def leg_rows(axes: Axes) -> None:
+    """Lay out one row per leg, fl at the top: leg i is at y = 3 - i."""
+    axes.set_yticks(range(len(LEGS)), [LEG_NAMES[leg] for leg in reversed(LEGS)])
+    axes.set_ylim(-0.6, len(LEGS) - 0.4)
+    axes.grid(visible=False, axis='y')
+
+
+def leg_bars(
+    axes: Axes, leg: int, spans: Sequence[tuple[float, float]], height: float, **look: Any
+) -> None:
+    """Draw bars (start, length) of a height in the row of a leg."""
+    axes.broken_barh(spans, (len(LEGS) - 1 - leg - 0.5 * height, height),
+                     facecolor=LEG_COLOURS[LEGS[leg]], linewidth=0, **look)
+
+
+def key(label: str, **look: Any) -> Line2D:
+    """Handle of a legend for what looks like that."""
+    return Line2D([], [], label=label, **look)
+
+
 def legend(figure: Figure, handles: Sequence[Any]) -> None:
     """Put a legend in one row above the panels."""
     height = LEGEND_HEIGHT / figure.get_figheight()
     figure.set_layout_engine('constrained', rect=(0.0, 0.0, 1.0, 1.0 - height))
     figure.legend(
-        handles=list(handles),
-        loc='upper center',
-        ncols=len(handles),
-        columnspacing=1.3,
-        handlelength=1.6,
-        handletextpad=0.5,
-        borderaxespad=0.3,
-    )
+        handles=list(handles), loc='upper center', ncols=len(handles), columnspacing=1.3,
+        handlelength=1.6, handletextpad=0.5, borderaxespad=0.3)
 
 
 def leg_legend(figure: Figure, extra: Sequence[Any] = ()) -> None:
     """Legend of the four legs, and more handles."""
-    lines = [Line2D([], [], color=LEG_COLOURS[leg], label=LEG_NAMES[leg]) for leg in LEGS]
-    legend(figure, [*lines, *extra])
+    legend(figure, [*(key(LEG_NAMES[leg], color=LEG_COLOURS[leg]) for leg in LEGS), *extra])
 
 
 def shade_stops(axes: Axes, recording: Recording) -> list[Patch]:
     """Shade requested stops and inhibition; returns handles for the legend."""
     waiting = inhibited = False
     for episode in episodes(recording, STOPPING):
-        captures = [event.time for event in episode.events if event.message != 'waiting']
-        capture = captures[0] if captures else episode.end
+        capture = episode.captured
         if capture > episode.start:
             axes.axvspan(episode.start, capture, color=WAITING, linewidth=0, zorder=0)
             waiting = True
@@ -152,10 +204,9 @@ def stop_window(
     Without a stop it is the end of the recording.
     """
     first, last = recording.span
-    for episode in episodes(recording, STOPPING):
-        if episode.events[0].message != 'at_rest':
-            start = max(first, episode.start - before)
-            return start, min(last, episode.end + after, start + longest)
+    for stop in requested_stops(recording):
+        start = max(first, stop.start - before)
+        return start, min(last, stop.end + after, start + longest)
     return max(first, last - before - after), last
 
 

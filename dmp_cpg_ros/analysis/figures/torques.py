@@ -14,12 +14,6 @@ from dmp_cpg_ros.analysis.figures.footfall import steady_window
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 
-CAPTION = (
-    'Left: three cycles of steady walking; grey lines are the limits where they are in view. '
-    'Right: the whole run as share of the limit; bars reach to the 99th percentile, ticks mark '
-    'the largest value.'
-)
-
 
 def draw(recording: Recording, context: RunContext) -> Figure | None:
     """Draw the torques; None when none were measured."""
@@ -28,24 +22,14 @@ def draw(recording: Recording, context: RunContext) -> Figure | None:
         return None
     window = steady_window(recording, 3) or style.stop_window(recording)
     rows = style.rows_in(joints.time, window)
-    limits = (
-        None
-        if context.robot is None
-        else np.array([leg.torque_limit for leg in context.robot.legs])
-    )
-    figure, axes = style.new_figure(
-        4.6,
-        3,
-        1 if limits is None else 2,
-        sharex='col',
-        width_ratios=None if limits is None else (3.0, 1.0),
-    )
+    limits = None
+    if context.robot is not None:
+        limits = np.array([leg.torque_limit for leg in context.robot.legs])
+    figure, axes = style.new_figure(4.6, 3, 1 if limits is None else 2, sharex='col',
+                                    width_ratios=None if limits is None else (3.0, 1.0))
     for k, joint in enumerate(JOINTS_OF_LEG):
         panel = axes[k, 0]
-        for index, leg in enumerate(LEGS):
-            panel.plot(
-                joints.time[rows], joints.effort[rows, 3 * index + k], color=style.LEG_COLOURS[leg]
-            )
+        style.plot_legs(panel, joints.time[rows], joints.effort[rows, k::3])
         panel.set_ylabel(f'{joint} [N m]')
         style.limit_view(panel, window)
         if limits is not None:
@@ -63,29 +47,15 @@ def _limits(axes: Axes, limit: float) -> None:
     low, high = axes.get_ylim()
     for value in (-limit, limit):
         if low <= value <= high:
-            axes.axhline(value, color=style.GREY, linewidth=0.9, linestyle=(0, (5, 2)))
+            axes.axhline(value, color=style.GREY, linewidth=0.9, linestyle=style.DASHED)
 
 
 def _shares(axes: Axes, share: np.ndarray) -> None:
-    for index, leg in enumerate(LEGS):
-        y = len(LEGS) - 1 - index
-        axes.barh(
-            y,
-            100.0 * np.nanpercentile(share[:, index], 99.0),
-            height=0.62,
-            color=style.LEG_COLOURS[leg],
-            alpha=0.75,
-        )
-        axes.plot(
-            [100.0 * np.nanmax(share[:, index])] * 2,
-            [y - 0.31, y + 0.31],
-            color=style.INK,
-            linewidth=1.2,
-        )
-    axes.axvline(100.0, color=style.GREY, linewidth=0.9, linestyle=(0, (5, 2)))
-    axes.set(
-        xlim=(0.0, 108.0),
-        yticks=range(len(LEGS)),
-        yticklabels=[leg.upper() for leg in reversed(LEGS)],
-    )
+    for leg, y, of in zip(LEGS, range(len(LEGS) - 1, -1, -1), 100.0 * share.T, strict=True):
+        axes.barh(y, np.nanpercentile(of, 99.0), height=0.62, color=style.LEG_COLOURS[leg],
+                  alpha=0.75)
+        axes.plot([np.nanmax(of)] * 2, [y - 0.31, y + 0.31], color=style.INK, linewidth=1.2)
+    axes.axvline(100.0, color=style.GREY, linewidth=0.9, linestyle=style.DASHED)
+    axes.set(xlim=(0.0, 108.0), yticks=range(len(LEGS)),
+             yticklabels=[leg.upper() for leg in reversed(LEGS)])
     axes.grid(visible=False, axis='y')

@@ -10,10 +10,7 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
         'base below half the standing height over the ground, or tilted by more than 60°, at any '
         'time at which it should stand; or the suite noticed a fall',
     ),
-    'robot.distance_m': (
-        'm',
-        'length of the horizontal path of the base, its sway averaged out',
-    ),
+    'robot.distance_m': ('m', 'length of the horizontal path of the base, its sway averaged out'),
     'robot.yaw_drift_deg_per_10m': (
         '°/10 m',
         'size of the yaw gained per distance on straight stretches, over whole gait cycles',

@@ -12,8 +12,13 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.ground import height_over_ground
-from dmp_cpg_ros.analysis.motion import common_rows, roll_pitch_yaw, rotations
-from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording
+from dmp_cpg_ros.analysis.motion import (
+    common_rows,
+    roll_pitch_yaw,
+    root_mean_square,
+    rotations,
+)
+from dmp_cpg_ros.analysis.recording import Recording, taken
 from dmp_cpg_ros.suite_table import POSTURE
 
 Array = NDArray[np.float64]
@@ -56,7 +61,7 @@ def estimate_errors(recording: Recording) -> EstimateErrors | None:
     rows = common_rows(truth.time, estimate.time)
     if len(rows[0]) < 2:
         return None
-    true, found = _taken(truth, rows[0]), _taken(estimate, rows[1])
+    true, found = taken(truth, rows[0]), taken(estimate, rows[1])
     angles = roll_pitch_yaw(found.quaternion) - roll_pitch_yaw(true.quaternion)
     way, way_found = (each.position_in_world - each.position_in_world[0] for each in (true, found))
     velocity = found.velocity_in_base - true.velocity_in_base
@@ -76,26 +81,15 @@ def estimation_metrics(recording: Recording, context: RunContext) -> dict[str, A
         ``position_error_share``, the horizontal error at the end over the distance, and
         ``z_error_share``; ``height_rmse_m`` over the ground.
     """
-    names = (
-        'v_x_rmse',
-        'v_y_rmse',
-        'v_z_rmse',
-        'roll_rmse_deg',
-        'pitch_rmse_deg',
-        'yaw_error_deg',
-        'yaw_error_deg_per_10m',
-        'position_error_share',
-        'z_error_share',
-        'height_rmse_m',
-    )
-    metrics: dict[str, Any] = dict.fromkeys(names)
+    metrics: dict[str, Any] = dict.fromkeys((
+        'v_x_rmse', 'v_y_rmse', 'v_z_rmse', 'roll_rmse_deg', 'pitch_rmse_deg', 'yaw_error_deg',
+        'yaw_error_deg_per_10m', 'position_error_share', 'z_error_share', 'height_rmse_m'))
     errors = estimate_errors(recording)
     if errors is None:
         return metrics
-    metrics.update(zip(names[:3], _rms(errors.velocity_in_base), strict=True))
-    metrics.update(zip(names[3:5], _rms(np.rad2deg(errors.tilt)), strict=True))
+    rms = [*root_mean_square(errors.velocity_in_base), *root_mean_square(np.rad2deg(errors.tilt))]
     yaw = float(np.rad2deg(errors.yaw[-1]))
-    metrics['yaw_error_deg'] = yaw
+    metrics.update(zip(metrics, [*rms, yaw], strict=False))
     metrics['height_rmse_m'] = _height_error(recording, context)
     if errors.walked >= SHORTEST_DISTANCE:
         x, y, z = errors.position_in_world[-1].tolist()
@@ -108,11 +102,8 @@ def estimation_metrics(recording: Recording, context: RunContext) -> dict[str, A
 def _height_error(recording: Recording, context: RunContext) -> float | None:
     """Root mean square over the height that the node tells now and then [m]."""
     odometry = recording.odometry
-    told = [
-        (event.time, event.number('estimated_height_m'))
-        for event in recording.statuses.get(POSTURE, ())
-    ]
-    told = [entry for entry in told if entry[1] is not None]
+    told = [(event.time, height) for event in recording.statuses.get(POSTURE, ())
+            if (height := event.number('estimated_height_m')) is not None]
     if not told:
         return None
     time, height = np.array(told, dtype=float).T
@@ -120,17 +111,3 @@ def _height_error(recording: Recording, context: RunContext) -> float | None:
     upward = rotations(odometry.quaternion)[:, 2, 2] if not context.world.is_flat else 1.0
     true = np.interp(time, odometry.time, height_over_ground(odometry, context) * upward)
     return float(np.sqrt(((height - true) ** 2).mean()))
-
-
-def _rms(values: Array) -> list[float]:
-    return list(np.sqrt((values**2).mean(axis=0)).tolist())
-
-
-def _taken(series: OdometrySeries, rows: NDArray[np.int64]) -> OdometrySeries:
-    return OdometrySeries(
-        series.time[rows],
-        series.position_in_world[rows],
-        series.quaternion[rows],
-        series.velocity_in_base[rows],
-        series.rate_in_base[rows],
-    )

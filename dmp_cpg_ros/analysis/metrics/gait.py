@@ -17,6 +17,7 @@ from dmp_cpg_ros.analysis.episodes import (
     gait_period,
     running_intervals,
     steady_segments,
+    within,
 )
 from dmp_cpg_ros.analysis.gait_in_force import gaits_walked, phase_offsets, planned_stance
 from dmp_cpg_ros.analysis.motion import held, mean_between
@@ -40,20 +41,17 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         ``period_s``, the median gait cycle.
     """
     time, errors = phase_errors(recording, context)
-    settled = settled_rows(recording, time)
+    settled = np.abs(errors[settled_rows(recording, time)])
     duty = duty_factors(recording, context)
+    changes = [{'start_s': start, 'end_s': end} for start, end in changing_intervals(recording)]
     return {
         'name': None if context.gait is None else context.gait.name,
         'names': gaits_walked(recording) or None,
-        'changes': [
-            {'start_s': start, 'end_s': end} for start, end in changing_intervals(recording)
-        ]
-        or None,
-        'phase_error_rad_max': float(np.abs(errors[settled]).max()) if settled.any() else None,
+        'changes': changes or None,
+        'phase_error_rad_max': float(settled.max()) if settled.size else None,
         'duty_factor': None if duty is None else float(duty.mean()),
-        'duty_factor_of_leg': None
-        if duty is None
-        else dict(zip(LEGS, map(float, duty), strict=True)),
+        'duty_factor_of_leg':
+            None if duty is None else dict(zip(LEGS, duty.tolist(), strict=True)),
         'duty_factor_planned': planned_duty_factor(recording, context),
         'period_s': gait_period(recording),
     }
@@ -82,9 +80,7 @@ def phase_errors(recording: Recording, context: RunContext) -> tuple[Array, Arra
 
 def settled_rows(recording: Recording, time: Array) -> NDArray[np.bool_]:
     """Which times lie in settled, moving walking, boolean ndarray (n,)."""
-    inside = np.zeros(len(time), dtype=bool)
-    for start, end in running_intervals(recording):
-        inside |= (time >= start + SETTLING) & (time < end)
+    inside = within(time, [(start + SETTLING, end) for start, end in running_intervals(recording)])
     if recording.reference.time.size and time.size:
         value = held(recording.reference.time, recording.reference.value, time)
         inside &= (np.abs(value) > MOVING).any(axis=1)

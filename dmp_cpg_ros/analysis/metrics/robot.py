@@ -8,9 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.analysis.body_modes import fall_noticed, should_stand
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import MOVING, gait_period, steady_segments
+from dmp_cpg_ros.analysis.episodes import (
+    MOVING,
+    fall_noticed,
+    gait_period,
+    should_stand,
+    steady_segments,
+)
 from dmp_cpg_ros.analysis.foot_motion import foot_slip
 from dmp_cpg_ros.analysis.ground import height_over_ground
 from dmp_cpg_ros.analysis.motion import held, integral, roll_pitch_yaw, smoothed, tilt
@@ -44,11 +49,7 @@ def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         ``down_at_start``, whether the recording begins with a fall that was before it.
     """
     distance = distance_walked(recording)
-    slip = (
-        None
-        if context.robot is None
-        else foot_slip(recording, context.robot, context.contact_force)
-    )
+    slip = foot_slip(recording, context.robot, context.contact_force) if context.robot else None
     total = None if slip is None else float(slip.sum())
     far = distance if distance is not None and distance >= SHORTEST_DISTANCE else None
     cost, source = cost_of_transport(recording, context, far)
@@ -100,27 +101,16 @@ def yaw_drift(recording: Recording) -> float | None:
     odometry = recording.odometry
     if not odometry.time.size:
         return None
-    yaw = roll_pitch_yaw(odometry.quaternion)[:, 2]
+    reference, yaw = recording.reference, roll_pitch_yaw(odometry.quaternion)[:, 2]
     gained = walked = 0.0
-    for start, end in steady_segments(recording):
-        v_x, v_y, gamma = held(
-            recording.reference.time, recording.reference.value, np.array([start])
-        )[0]
+    for interval in steady_segments(recording):
+        v_x, v_y, gamma = held(reference.time, reference.value, np.array(interval[:1]))[0]
         if abs(gamma) > MOVING or np.hypot(v_x, v_y) < MOVING:
             continue
-        there = [
-            np.array(
-                [
-                    np.interp(t, odometry.time, column)
-                    for column in odometry.position_in_world[:, :2].T
-                ]
-            )
-            for t in (start, end)
-        ]
-        walked += float(np.hypot(*(there[1] - there[0])))
-        gained += abs(
-            float(np.interp(end, odometry.time, yaw) - np.interp(start, odometry.time, yaw))
-        )
+        x, y, psi = (np.diff(np.interp(interval, odometry.time, column)).item()
+                     for column in (*odometry.position_in_world[:, :2].T, yaw))
+        walked += float(np.hypot(x, y))
+        gained += abs(psi)
     return float(np.rad2deg(gained)) * 10.0 / walked if walked >= SHORTEST_DISTANCE else None
 
 

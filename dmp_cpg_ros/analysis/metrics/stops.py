@@ -8,9 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.analysis.body_modes import stands_until
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import RUNNING, STARTING, STOPPING, Episode, episodes
+from dmp_cpg_ros.analysis.episodes import (
+    RUNNING,
+    STARTING,
+    Episode,
+    episodes,
+    requested_stops,
+    stands_until,
+)
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 
 STILL_SPEED = 0.01
@@ -22,12 +28,7 @@ REST_SETTLING = 0.5
 
 def stop_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     """Group ``stop`` of ``metrics.json``: the slowest completed stop, and ``all``."""
-    entries = [
-        _stop(recording, context, episode)
-        for episode in episodes(recording, STOPPING)
-        if episode.events[0].message != 'at_rest'
-    ]
-    return _summary(entries)
+    return _summary([_stop(recording, context, stop) for stop in requested_stops(recording)])
 
 
 def start_metrics(recording: Recording) -> dict[str, Any]:
@@ -63,14 +64,8 @@ def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[s
 
 
 def _start(recording: Recording, episode: Episode) -> dict[str, Any]:
-    walking = next(
-        (
-            event
-            for event in recording.inhibition
-            if event.time >= episode.end and event.message in RUNNING
-        ),
-        None,
-    )
+    walking = next((event for event in recording.inhibition
+                    if event.time >= episode.end and event.message in RUNNING), None)
     interrupted = walking is None or walking.time > episode.end
     return _times(episode, None if interrupted else walking)
 
@@ -99,8 +94,7 @@ def _first(episode: Episode, key: str) -> float | None:
 
 
 def _body_at_rest(
-    recording: Recording, request: float, window: tuple[float, float]
-) -> dict[str, Any]:
+        recording: Recording, request: float, window: tuple[float, float]) -> dict[str, Any]:
     odometry = recording.odometry
     rows = (odometry.time >= window[0]) & (odometry.time < window[1])
     if not rows.any():
@@ -118,8 +112,7 @@ def _body_at_rest(
 
 
 def _feet_at_rest(
-    recording: Recording, context: RunContext, window: tuple[float, float]
-) -> dict[str, Any]:
+        recording: Recording, context: RunContext, window: tuple[float, float]) -> dict[str, Any]:
     feet = recording.feet
     rows = (feet.time >= window[0]) & (feet.time < window[1])
     if not rows.any():

@@ -18,10 +18,8 @@ from dmp_cpg_ros.analysis.recording import Recording
 
 
 def compute_metrics(
-    recording: Recording,
-    context: RunContext | None = None,
-    certificate: Sequence[Any] | None = None,
-) -> dict[str, Any]:
+        recording: Recording, context: RunContext | None = None,
+        certificate: Sequence[Any] | None = None) -> dict[str, Any]:
     """Everything that a run's ``metrics.json`` holds.
 
     Parameters

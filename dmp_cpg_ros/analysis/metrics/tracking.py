@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.episodes import MOVING, cycle_count, gait_period, steady_segments
-from dmp_cpg_ros.analysis.motion import held, mean_between, smoothed, velocity_in_heading, yaw_rate
+from dmp_cpg_ros.analysis.motion import (
+    held,
+    mean_between,
+    root_mean_square,
+    smoothed,
+    velocity_in_heading,
+    yaw_rate,
+)
 from dmp_cpg_ros.analysis.recording import Recording
 
 Array = NDArray[np.float64]
@@ -33,11 +40,11 @@ def tracking_metrics(recording: Recording) -> dict[str, Any]:
     odometry, reference = recording.odometry, recording.reference
     if odometry.time.size and reference.time.size:
         error = body_motion(recording) - held(reference.time, reference.value, odometry.time)
-        metrics.update(zip(names, _rms(error), strict=True))
+        metrics.update(zip(names, root_mean_square(error), strict=True))
         period = gait_period(recording)
         if period is not None:
-            averaged = smoothed(odometry.time, error, period)
-            metrics.update(zip([f'{name}_cycle' for name in names], _rms(averaged), strict=True))
+            averaged = root_mean_square(smoothed(odometry.time, error, period))
+            metrics.update(zip([f'{name}_cycle' for name in names], averaged, strict=True))
     metrics['steady'] = steady = steady_errors(recording)
     errors = [abs(entry['v_error']) for entry in steady if entry['v_error'] is not None]
     metrics['v_error_max'] = max(errors, default=None)
@@ -67,27 +74,15 @@ def steady_errors(recording: Recording) -> list[dict[str, Any]]:
     for start, end in steady_segments(recording):
         v_x, v_y, gamma = mean_between(recording.odometry.time, motion, start, end)
         reference = mean_between(recording.reference.time, recording.reference.value, start, end)
-        entries.append(
-            {
-                'start_s': start,
-                'end_s': end,
-                'cycles': round(cycle_count(recording, start, end)),
-                'v': float(v_x),
-                'v_reference': float(reference[0]),
-                'v_error': _relative(v_x, reference[0]),
-                'v_y': float(v_y),
-                'v_y_reference': float(reference[1]),
-                'gamma': float(gamma),
-                'gamma_reference': float(reference[2]),
-                'gamma_error': _relative(gamma, reference[2]),
-            }
-        )
+        entries.append({
+            'start_s': start, 'end_s': end, 'cycles': round(cycle_count(recording, start, end)),
+            'v': float(v_x), 'v_reference': float(reference[0]),
+            'v_error': _relative(v_x, reference[0]),
+            'v_y': float(v_y), 'v_y_reference': float(reference[1]),
+            'gamma': float(gamma), 'gamma_reference': float(reference[2]),
+            'gamma_error': _relative(gamma, reference[2])})
     return entries
 
 
 def _relative(value: float, reference: float) -> float | None:
     return float((value - reference) / abs(reference)) if abs(reference) > MOVING else None
-
-
-def _rms(error: Array) -> list[float]:
-    return [float(value) for value in np.sqrt(np.mean(error**2, axis=0))]
