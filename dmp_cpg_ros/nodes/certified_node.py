@@ -39,7 +39,7 @@ from dmp_cpg_ros.core.suite_parameters import (
 )
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.nodes.conversions import read_twist
-from dmp_cpg_ros.nodes.gait_setup import description_of, gait_reader
+from dmp_cpg_ros.nodes.gait_setup import description_of, known_gaits
 from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.parameter_follower import ParameterFollower
@@ -94,7 +94,7 @@ class CertifiedNode(ManagedNode):
 
     def prepare_certificate(self) -> None:
         """Read what certificates are computed from, and follow the others; in ``configure``."""
-        self.gaits, self._scale = gait_reader(self), body_scale(description_of(self))
+        self.gaits, self._scale = known_gaits(self), body_scale(description_of(self))
         self._held = None
         others = {node: names for node, names in CHANGEABLE.items() if node != self.KIND}
         self._follower = ParameterFollower(self, others, self.follow)

@@ -4,36 +4,58 @@
 
 Values pass bit for bit. What enters is taken by name and checked;
 :class:`~dmp_cpg_ros.core.errors.DataError` is raised for what must not enter. The robot's state is
-in :mod:`~dmp_cpg_ros.nodes.robot_state_messages`, stop and start in
-:mod:`~dmp_cpg_ros.nodes.inhibition_messages`.
+in :mod:`~dmp_cpg_ros.nodes.robot_state_messages`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
+from dmp_cpg_ros.core.balance.body_command import MODES, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits, shares_of
+from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
+from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import FRAMES, PushForce
-from dmp_cpg_ros.layouts import CANONICAL_NAMES, CORRECTION_NAMES, SHIFT_NAMES
+from dmp_cpg_ros.layouts import (
+    CORRECTION_ROWS,
+    GAIN_ROWS,
+    MODE_ROWS,
+    MOVEMENT_ROWS,
+    OSCILLATOR_ROWS,
+    POSTURE_ROWS,
+    SHIFT_ROWS,
+    canonical_rows,
+    command_rows,
+    gait_rows,
+    read_command_rows,
+    read_gait_rows,
+)
 from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.message_values import (
     Array,
     checked,
     checked_numbers,
-    frame_of,
     header_ns,
 )
 from dmp_cpg_ros.nodes.robot_state_messages import BASE_FRAME
 from dmp_cpg_ros.nodes.serialized_messages import SerializedJointState, SerializedTwist
 from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraft
 
+_OSCILLATORS, _GAITS = slice(0, len(OSCILLATOR_ROWS)), slice(len(OSCILLATOR_ROWS), None)
 _JOINTS = slice(0, len(JOINT_NAMES))
-_FEET = slice(len(JOINT_NAMES), len(JOINT_NAMES) + len(SHIFT_NAMES))
-_BASE = slice(len(JOINT_NAMES) + len(SHIFT_NAMES), None)
+_FEET = slice(_JOINTS.stop, _JOINTS.stop + len(SHIFT_ROWS))
+_BASE = slice(_FEET.stop, _FEET.stop + len(CORRECTION_ROWS))
+_COMMAND = slice(_BASE.stop, None)
 
 
 def read_twist(message: Twist) -> tuple[float, float, float]:
@@ -82,31 +104,75 @@ def read_reference(message: TwistStamped | SerializedTwist) -> Array:
 
 
 class CanonicalStateWriter:
-    """Writes ``canonical_state``."""
+    """Writes ``canonical_state``.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    gaits : sequence of str
+        Names of all gaits that are known.
+    """
+
+    def __init__(self, gaits: Sequence[str]) -> None:
         """Lay the message out."""
-        self._writer = JointStateWriter(CANONICAL_NAMES, ('position', 'velocity'))
+        self._gaits, rows = tuple(gaits), canonical_rows(gaits)
+        self._writer = JointStateWriter(rows, FIELDS[:2])
+        self._position, self._velocity = (np.zeros(len(rows)) for _ in range(2))
 
-    def fill(self, time_ns: int, x: Array, x_dot: Array, gait: str = '',
-             ) -> SerializedJointState:
-        """Refill with states and rates [1/s], ndarrays (4, 2), and the word of the gait in which
-        their phases are to be read; raises DataError.
+    def fill(self, time_ns: int, x: Array, x_dot: Array, gait: GaitInForce,
+             cadence_rate: float = 0.0) -> SerializedJointState:
+        """Refill.
+
+        Parameters
+        ----------
+        time_ns : int
+            Stamp [ns].
+        x, x_dot : ndarray (4, 2)
+            States and rates [1/s].
+        gait : Gait or BlendedGait
+            In which the phases are to be read.
+        cadence_rate : float
+            Rate of the factor on the cadence [1/s].
+
+        Raises
+        ------
+        DataError
+            If a number is not finite.
         """
-        return self._writer.fill(time_ns, x, x_dot, frame=gait)
+        self._position[_OSCILLATORS] = x.reshape(-1)
+        self._velocity[_OSCILLATORS] = x_dot.reshape(-1)
+        self._position[_GAITS], self._velocity[_GAITS] = gait_rows(
+            shares_of(gait), cadence_rate, self._gaits)
+        return self._writer.fill(time_ns, self._position, self._velocity)
 
 
 class CanonicalStateReader:
-    """Reads ``canonical_state``."""
+    """Reads ``canonical_state``.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    gaits : KnownGaits
+        All gaits that are known.
+    """
+
+    def __init__(self, gaits: KnownGaits) -> None:
         """Prepare the order."""
-        self._reader = JointStateReader(CANONICAL_NAMES, ('position', 'velocity'))
+        rows = canonical_rows(gaits.gaits)
+        self._gaits, self._names = gaits, rows[_GAITS]
+        self._reader = JointStateReader(rows, FIELDS[:2])
+        self._last: tuple[bytes, GaitInForce] | None = None
 
-    def read(self, message: JointState | SerializedJointState) -> tuple[Array, Array]:
-        """States x and rates ẋ [1/s], ndarrays (4, 2); raises DataError."""
-        x, x_dot = self._reader.read(message)
-        return x.reshape(len(LEGS), 2), x_dot.reshape(len(LEGS), 2)
+    def read(self, message: JointState | SerializedJointState) -> tuple[Array, Array, GaitInForce]:
+        """States x and rates ẋ [1/s], ndarrays (4, 2), and the gait in force, the same object
+        while it stays; raises DataError.
+        """
+        position, velocity = self._reader.read(message)
+        shares, rates = position[_GAITS], velocity[_GAITS]
+        content = shares.tobytes() + rates.tobytes()
+        if self._last is None or content != self._last[0]:
+            given = read_gait_rows(self._names, shares.tolist(), rates.tolist())
+            self._last = content, self._gaits.in_force(given)
+        x, x_dot = (values[_OSCILLATORS].reshape(len(LEGS), 2) for values in (position, velocity))
+        return x, x_dot, self._last[1]
 
 
 class JointTargetsWriter:
@@ -142,16 +208,13 @@ class JointTargetsReader:
 
 class PostureFeedbackWriter:
     """Writes ``posture_feedback``: torques and measured angles of the joints, shift, drift and
-    measured forces of the feet, a velocity correction.
-
-    The body's mode is in ``frame_id``.
+    measured forces of the feet, a velocity correction, the body's mode and its movement.
     """
 
     def __init__(self) -> None:
         """Lay the message out."""
-        names = JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES
-        self._writer = JointStateWriter(names, FIELDS)
-        self._position, self._velocity, self._effort = (np.zeros(len(names)) for _ in FIELDS)
+        self._writer = JointStateWriter(POSTURE_ROWS, FIELDS)
+        self._position, self._velocity, self._effort = np.zeros((len(FIELDS), len(POSTURE_ROWS)))
 
     def fill(self, time_ns: int, feedback: PostureFeedback) -> SerializedJointState:
         """Refill with a feedback; raises DataError when it is not finite."""
@@ -161,8 +224,8 @@ class PostureFeedbackWriter:
         self._velocity[_BASE] = feedback.correction
         self._effort[_JOINTS] = feedback.torque
         self._effort[_FEET].reshape(len(LEGS), 3)[:, 2] = feedback.foot_force
-        return self._writer.fill(
-            time_ns, self._position, self._velocity, self._effort, frame=feedback.mode)
+        self._position[_COMMAND], self._velocity[_COMMAND] = command_rows(feedback.command)
+        return self._writer.fill(time_ns, self._position, self._velocity, self._effort)
 
 
 class PostureFeedbackReader:
@@ -170,7 +233,7 @@ class PostureFeedbackReader:
 
     def __init__(self) -> None:
         """Prepare the order."""
-        self._reader = JointStateReader(JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES, FIELDS)
+        self._reader, self._command = JointStateReader(POSTURE_ROWS, FIELDS), CommandReader()
 
     def read(self, message: JointState | SerializedJointState) -> PostureFeedback:
         """Read the feedback; raises DataError."""
@@ -178,4 +241,90 @@ class PostureFeedbackReader:
         return PostureFeedback(
             effort[_JOINTS], position[_FEET].reshape(len(LEGS), 3),
             velocity[_FEET].reshape(len(LEGS), 3)[:, :2], velocity[_BASE],
-            frame_of(message), position[_JOINTS], effort[_FEET].reshape(len(LEGS), 3)[:, 2])
+            self._command.of(position[_COMMAND], velocity[_COMMAND]), position[_JOINTS],
+            effort[_FEET].reshape(len(LEGS), 3)[:, 2])
+
+
+class CommandReader:
+    """Reads what the body does out of ``posture_feedback``."""
+
+    def __init__(self) -> None:
+        """Prepare the order."""
+        self._reader = JointStateReader((*MODE_ROWS, *MOVEMENT_ROWS), FIELDS[:2])
+        self._last: tuple[bytes, BodyCommand] | None = None
+
+    def read(self, message: JointState | SerializedJointState) -> BodyCommand:
+        """Read the command only; raises DataError."""
+        return self.of(*self._reader.read(message))
+
+    def of(self, position: Array, velocity: Array) -> BodyCommand:
+        """Command of its rows, the same object while they stay; raises DataError."""
+        content = position.tobytes() + velocity.tobytes()
+        if self._last is None or content != self._last[0]:
+            self._last = content, read_command_rows(position.tolist(), velocity.tolist())
+        return self._last[1]
+
+
+class InhibitionGainsWriter:
+    """Writes ``inhibition_gains``."""
+
+    def __init__(self) -> None:
+        """Lay the message out."""
+        self._writer = JointStateWriter(GAIN_ROWS, FIELDS[:1])
+
+    def fill(self, time_ns: int, inhibition: Inhibition) -> SerializedJointState:
+        """Refill; raises DataError when a number is not finite."""
+        return self._writer.fill(time_ns, np.array((
+            *inhibition.gains, inhibition.region_radius, inhibition.requested,
+            inhibition.at_rest)))
+
+
+_LARGEST_GAIN = (range_of(InhibitionParameters, 'inhibition_gain')[1]
+                 * range_of(VotingParameters, 'vote_limit')[1])
+_RADII = range_of(InhibitionParameters, 'region_radius')
+
+
+class InhibitionGainsReader:
+    """Reads ``inhibition_gains``."""
+
+    def __init__(self) -> None:
+        """Prepare the order."""
+        self._reader = JointStateReader(GAIN_ROWS, FIELDS[:1])
+
+    def read(self, message: JointState | SerializedJointState) -> Inhibition:
+        """Inhibition that is announced; raises DataError for numbers that no parameters allow."""
+        (values,) = self._reader.read(message)
+        gains, (radius, *flags) = values[:len(LEGS)], values[len(LEGS):].tolist()
+        if not (0.0 <= gains.min() and gains.max() <= _LARGEST_GAIN):
+            raise DataError(f'gains {gains} must be from 0 to {_LARGEST_GAIN:g}')
+        low, high = _RADII
+        if not low <= radius <= high:
+            raise DataError(f'region_radius = {radius} must be from {low:g} to {high:g}')
+        if not {0.0, 1.0}.issuperset(flags):
+            raise DataError(f'requested and at_rest must be 0 or 1, not {flags}')
+        return Inhibition(bool(flags[0]), gains, radius, bool(flags[1]))
+
+
+def read_votes(message: JointState) -> tuple[dict[str, float], str]:
+    """Weights by leg from ``effort`` and the voter's name, of rows ``<voter>/<leg>`` or ``<leg>``.
+
+    Raises
+    ------
+    DataError
+        If names and numbers do not match, or are of several voters; what they say is checked by
+        :meth:`~dmp_cpg_ros.core.inhibition.votes.VoteInbox.accept`.
+    """
+    voters, _, legs = zip(*(name.rpartition('/') for name in message.name), strict=True) if (
+        message.name) else ((), (), ())
+    if len(message.effort) != len(legs) or len(set(legs)) != len(legs) or len(set(voters)) > 1:
+        raise DataError(
+            f'votes {list(message.name)} need one weight in effort for each row voter/leg, none '
+            f'twice and all of one voter, not {list(message.effort)}')
+    return dict(zip(legs, map(float, message.effort), strict=True)), ''.join(voters[:1])
+
+
+def read_body_mode(message: String) -> str:
+    """Mode in ``body_mode``; raises DataError when it is none."""
+    if message.data not in MODES:
+        raise DataError(f"body mode '{message.data[:40]}' must be one of {', '.join(MODES)}")
+    return str(message.data)

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.certificates.certify import Certificate
-from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.suite_parameters import GaitParameters, RobotFileParameters
@@ -23,17 +22,13 @@ def description_of(node: ManagedNode) -> RobotDescription:
     return load_description(find_config(node.parameters_of(RobotFileParameters).robot))
 
 
-def gaits_of(node: ManagedNode) -> dict[str, Gait]:
-    """All gaits of the file that a node's parameters name."""
-    return load_gaits(node.parameters_of(GaitParameters).gaits_file)
-
-
-def gait_reader(node: ManagedNode) -> GaitReader:
-    """Read all gaits, so that none is read in mid-tick; a node's gait holds where a message says
-    nothing.
+def known_gaits(node: ManagedNode) -> KnownGaits:
+    """Read all gaits of the file that a node's parameters name; raises ParameterError when the
+    gait that they choose is not among them.
     """
-    gaits = gaits_of(node)
-    return GaitReader(gaits, unnamed=GaitReader(gaits).named(gait_name(node)))
+    gaits = KnownGaits(load_gaits(node.parameters_of(GaitParameters).gaits_file))
+    gaits.named(gait_name(node))
+    return gaits
 
 
 def gait_name(node: ManagedNode) -> str:

@@ -1,11 +1,10 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``inhibition_state``: stop and start as words and as text that reads back to the numbers."""
+"""``inhibition_state``: stop and start in words and decimal text, for people."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -52,44 +51,10 @@ class InhibitionStateWriter:
         return self.message
 
 
-@dataclass(frozen=True)
-class InhibitionMessage:
-    """Content of ``inhibition_state``.
-
-    Attributes
-    ----------
-    word : str
-        State.
-    values : dict of str to str
-        Values by key.
-    """
-
-    word: str
-    values: dict[str, str]
-
-    def number(self, key: str, low: float, high: float) -> float:
-        """Value of a key as a float; raises DataError unless it is a number in a closed range."""
-        try:
-            value = float(self.values[key])
-        except (KeyError, ValueError):
-            raise DataError(f"'{key}' must be a number, not {self.values.get(key)!r}") from None
-        if not low <= value <= high:
-            raise DataError(f"'{key}' = {value} must be from {low:g} to {high:g}")
-        return value
-
-    def flag(self, key: str) -> bool:
-        """Value of a key as a bool; raises DataError unless it is ``true`` or ``false``."""
-        value = self.values.get(key)
-        if value not in ('true', 'false'):
-            raise DataError(f"'{key}' must be true or false, not {value!r}")
-        return value == 'true'
-
-
-def read_inhibition_state(message: DiagnosticArray) -> InhibitionMessage:
-    """Read ``inhibition_state``; raises DataError when it holds no status named ``inhibition``."""
+def read_state_word(message: DiagnosticArray) -> str:
+    """State word of ``inhibition_state``, for people; raises DataError where there is none."""
     for status in message.status:
         if status.name == 'inhibition':
-            return InhibitionMessage(
-                status.message, {entry.key: entry.value for entry in status.values})
+            return str(status.message)
     raise DataError(
         f"no status named 'inhibition' among {[status.name for status in message.status]}")

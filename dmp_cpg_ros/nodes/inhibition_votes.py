@@ -22,12 +22,12 @@ from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import TickParameters
+from dmp_cpg_ros.nodes.conversions import read_votes
 from dmp_cpg_ros.nodes.gait_setup import description_of
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
 from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import FootContactsReader, read_imu
 from dmp_cpg_ros.nodes.tick_inputs import TickInputs
-from dmp_cpg_ros.nodes.vote_messages import read_votes
 
 CONTACTS, IMU = 'foot_contacts', 'imu'
 

@@ -25,6 +25,7 @@ from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import ParameterError
@@ -135,17 +136,19 @@ TOPICS: tuple[Interface, ...] = (
               other_type='; with stamped_cmd_vel:=true it reads TwistStamped'),
     Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z',
               (REFERENCE,), (CANONICAL, LEG, INHIBITION, POSTURE)),
-    Interface('canonical_state', JointState, 'oscillators: position = x, velocity = its rate',
+    Interface('canonical_state', JointState,
+              'oscillators, shares of gaits, cadence: position = state, velocity = its rate',
               (CANONICAL,), (LEG, INHIBITION, POSTURE)),
     Interface('posture_feedback', JointState,
-              'balance: torques, measured angles, shift, drift and forces of the feet',
-              (POSTURE,), (LEG,)),
+              'balance: torques, measured angles, shift, drift and forces of the feet; '
+              "the body's mode and the phase of its movement",
+              (POSTURE,), (LEG, INHIBITION)),
     Interface('joint_targets', JointState, 'targets of the three joints of one leg',
               (LEG,), (ROBOT,)),
     Interface('joint_states', JointState, 'measured joints; the tick of the suite',
               (ROBOT,), (REFERENCE, LEG, POSTURE), sometimes=(LEG,)),
     Interface('votes', JointState,
-              'votes for a stop: names = legs, effort or position = weights, frame_id = voter',
+              'votes for a stop: names = voter/leg, effort = weights',
               ('user',), (INHIBITION,), sometimes=(INHIBITION,)),
     Interface('push', WrenchStamped,
               'force on the base from its stamp on, for 0.1 s unless the next one comes before; '
@@ -167,11 +170,14 @@ TOPICS: tuple[Interface, ...] = (
               (POSTURE,), (), sometimes=(POSTURE,)),
     Interface(CLOCK_TOPIC, Clock, 'the clock of the robot', (ROBOT,), ()),
     Interface('inhibition_state', DiagnosticArray,
-              'stop and start: state word, gains, times',
+              'stop and start for people: state word, gains, times, when they change',
+              (INHIBITION,), ('user',), latched=True),
+    Interface('inhibition_gains', JointState,
+              'position = gain of each leg [1/s], region_radius, requested, at_rest',
               (INHIBITION,), (REFERENCE, CANONICAL), latched=True),
-    Interface('body_mode', DiagnosticArray,
-              'standing, lying, moving between the two, or fallen; with the reason',
-              (POSTURE,), (INHIBITION, ROBOT), latched=True),
+    Interface('body_mode', String,
+              'standing, lying, moving between the two, or fallen, when it changes',
+              (POSTURE,), (ROBOT,), latched=True),
     Interface(DIAGNOSTICS_TOPIC, DiagnosticArray, 'health of every node', tuple(KINDS), ()),
     Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds',
               (ROBOT,), ('user',), latched=True, sometimes=(ROBOT,), recorded=False),

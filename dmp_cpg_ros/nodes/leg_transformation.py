@@ -22,9 +22,9 @@ from dmp_cpg_ros.nodes.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, gait_reader
+from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, known_gaits
 from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
+from dmp_cpg_ros.nodes.message_values import header_ns
 from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
 from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 from dmp_cpg_ros.suite_table import KINDS, LEG
@@ -51,18 +51,18 @@ class LegTransformation(ManagedNode):
     def configure(self) -> None:
         """Build the leg's primitive and its topics."""
         leg, parameters = self.parameters_of(LegChoice).leg, self.parameters_of(LegParameters)
-        gaits, description = gait_reader(self), description_of(self)
+        gaits, description = known_gaits(self), description_of(self)
         self._leg = LegControl(leg, description, parameters, Movements(description))
         self._state = self._leg.initial_state()
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
         inputs = ['canonical_state', 'reference', 'posture_feedback']
-        canonical, feedback = CanonicalStateReader(), PostureFeedbackReader()
+        canonical, feedback = CanonicalStateReader(gaits), PostureFeedbackReader()
         self.listen(
             'canonical_state',
             lambda message: self._ticks.add(
                 'canonical_state',
                 header_ns(message),
-                (*canonical.read(message), gaits.read(frame_of(message))),
+                canonical.read(message),
             ),
         )
         self.listen(

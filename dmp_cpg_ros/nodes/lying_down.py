@@ -6,14 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
+from dmp_cpg_ros.nodes.conversions import read_body_mode
 from dmp_cpg_ros.nodes.interfaces import interface
 from dmp_cpg_ros.nodes.message_values import stamp_ns
 
@@ -57,7 +57,7 @@ class LyingDown:
         else:
             self._say(self._time_ns * 1e-9, f'  lie_down: {answer.message}')
 
-    def _on_mode(self, message: DiagnosticArray) -> None:
+    def _on_mode(self, message: String) -> None:
         try:
             self._mode = read_body_mode(message)
         except DataError:

@@ -17,10 +17,10 @@ from rclpy.clock_type import ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingSwitch
-from dmp_cpg_ros.core.modes.body_command import BALANCED
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
@@ -32,8 +32,7 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
     chosen_world,
 )
-from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
-from dmp_cpg_ros.nodes.conversions import JointTargetsReader, read_push_force
+from dmp_cpg_ros.nodes.conversions import JointTargetsReader, read_body_mode, read_push_force
 from dmp_cpg_ros.nodes.executors import run_node
 from dmp_cpg_ros.nodes.interfaces import BODY_TOPICS, Interface
 from dmp_cpg_ros.nodes.managed_node import ManagedNode

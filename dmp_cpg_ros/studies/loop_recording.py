@@ -20,6 +20,7 @@ from dmp_cpg_ros.analysis.recording import (
     VelocitySeries,
     WorkSeries,
 )
+from dmp_cpg_ros.core.gait.known_gaits import shares_of
 from dmp_cpg_ros.core.loop import Tick
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
@@ -56,7 +57,7 @@ def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> Re
         targets=JointSeries(time, _column(targets, 'position'), _column(targets, 'velocity'),
                             _column(targets, 'effort')),
         canonical=CanonicalSeries(time, _column(ticks, 'x'), _column(ticks, 'x_dot'),
-                                  tuple(tick.gait for tick in ticks)),
+                                  tuple(shares_of(tick.gait) for tick in ticks)),
         reference=VelocitySeries(time, _column(ticks, 'r')), inhibition=tuple(_events(ticks)),
         modes=tuple(_modes(ticks)))
 

@@ -92,7 +92,7 @@ def attitude(recording: Recording, context: RunContext) -> Figure | None:
     roll, pitch, yaw = np.rad2deg(roll_pitch_yaw(odometry.quaternion)).T
     figure, (tilts, heights, yaws), shades = style.time_panels(
         recording, 4.6, ('tilt [°]', 'height [cm]', 'yaw [°]'))
-    asked_for = {'color': style.INK, 'linewidth': 0.9, 'linestyle': style.DASHED}
+    asked_for: dict[str, Any] = {'color': style.INK, 'linewidth': 0.9, 'linestyle': style.DASHED}
     tilts.plot(odometry.time, roll, color=style.BLUE, linewidth=0.9)
     tilts.plot(odometry.time, pitch, color=style.ORANGE, linewidth=0.9)
     heights.plot(odometry.time, 100.0 * height_over_ground(odometry, context),

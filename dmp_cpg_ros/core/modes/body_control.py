@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.balance.controller import (
     PostureController,
     PostureFeedback,
@@ -20,7 +21,6 @@ from dmp_cpg_ros.core.canonical.phase import phase_rate
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE, REST_SPEED
 from dmp_cpg_ros.core.maths.updated import updated
-from dmp_cpg_ros.core.modes.body_command import BALANCED
 from dmp_cpg_ros.core.modes.body_condition import BodySense
 from dmp_cpg_ros.core.modes.body_mode import BodyModes, ModeParameters, ModeState
 from dmp_cpg_ros.core.modes.body_requests import ModeAnswer, request
@@ -113,7 +113,7 @@ class BodyControl:
         -------
         state : BodyState
         feedback : PostureFeedback
-            For the legs, with the mode's text.
+            For the legs, with what the body does.
         """
         at_rest = state.mode.mode == 'stopping' and self._rests(
             x, x_dot, r, state.balance.activity)
@@ -122,13 +122,13 @@ class BodyControl:
         if mode.mode in BALANCED:
             balance, feedback = self.posture.step(
                 state.balance, measured, gait, x, x_dot, r, dt)
-            if feedback.mode != mode.mode:
-                feedback = updated(feedback, mode=mode.mode)
+            if feedback.command.mode != mode.mode:
+                feedback = updated(feedback, command=self.modes.command(mode))
             return BodyState(mode, balance), feedback
         torque = self._sense.carrying_torque(measured, self.modes.carried(mode))
         return BodyState(mode, self.posture.initial_state()), PostureFeedback(
             torque, np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3),
-            self.modes.command(mode).text, measured.joint_position.copy(),
+            self.modes.command(mode), measured.joint_position.copy(),
         )
 
     def _rests(self, x: Array, x_dot: Array, r: Array, activity: Array) -> bool:

@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from dmp_cpg_ros.core.balance.body_command import BALANCED, BodyCommand
 from dmp_cpg_ros.core.maths.updated import updated
-from dmp_cpg_ros.core.modes.body_command import BALANCED, BodyCommand
 from dmp_cpg_ros.core.modes.body_condition import BodyCondition
 from dmp_cpg_ros.core.modes.fall_detection import FallDetector, FallParameters, FallState
-from dmp_cpg_ros.core.modes.motion import phase_at
+from dmp_cpg_ros.core.modes.motion import phase_at, unit_movement
 from dmp_cpg_ros.core.modes.movements import SIDES, Movements
 from dmp_cpg_ros.core.parameters import parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -62,8 +62,6 @@ class ModeState:
         See the module's text.
     movements : tuple of str
         Movements to come, the present one first.
-    count : int
-        Movements begun so far.
     begun_ns : int
         Stamp at which the present movement (or mode, where there is none) began [ns].
     tries : int
@@ -79,7 +77,6 @@ class ModeState:
     time_ns: int
     mode: str
     movements: tuple[str, ...] = ()
-    count: int = 0
     begun_ns: int = 0
     tries: int = 0
     reason: str = ''
@@ -113,8 +110,9 @@ class BodyModes:
         """What the legs have to do at the tick of a state."""
         if not state.movements:
             return BodyCommand(state.mode)
-        share = self._share(state)
-        return BodyCommand(state.mode, state.movements[0], state.count, phase_at(share))
+        name = state.movements[0]
+        x, decay = phase_at(self._share(state)), unit_movement().phase_decay
+        return BodyCommand(state.mode, name, x, -decay / self.movements.named(name).duration * x)
 
     def carried(self, state: ModeState) -> float:
         """Share of the weight that the legs are to carry by feed-forward in a movement."""
@@ -221,7 +219,7 @@ class BodyModes:
         """Enter a mode at the next tick, whose stamp is not known yet."""
         return replace(
             state, mode=mode, movements=movements, reason=reason, begun_ns=-1,
-            count=state.count + bool(movements), fall=FallState(),
+            fall=FallState(),
         )
 
     def _enter_now(

@@ -14,7 +14,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.gait_word import gait_word, read_gait_word
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import CADENCE_RATE, RunningGait
@@ -136,7 +136,7 @@ def test_a_scaled_gait_differs_in_its_cadence_only(gait: str) -> None:
 
 def test_the_cadence_moves_to_its_factor_at_its_rate() -> None:
     free, r, seen = Inhibition(False, np.zeros(4), 0.3), np.array([0.3, 0.0, 0.0]), []
-    before = RunningGait(CanonicalParameters(), RUNNING.scale, GaitReader(GAITS))
+    before = RunningGait(CanonicalParameters(), RUNNING.scale, KnownGaits(GAITS))
     state = before.initial_state(GAITS['amble'], InhibitionParameters())
     plain = before.network(state.gait).omega(r)
     others = GaitChangeParameters(), GaitChoiceParameters()

@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.arcs import arcs_between, crowding
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork, network_system
 from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitTransition
@@ -40,7 +40,7 @@ TOPOLOGIES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 
 
 def networks(**changes: object) -> RunningGait:
-    return RunningGait(CanonicalParameters(**changes), SCALE, GaitReader(ALL))  # type: ignore[arg-type]
+    return RunningGait(CanonicalParameters(**changes), SCALE, KnownGaits(ALL))  # type: ignore[arg-type]
 
 
 def changed(known: RunningGait, before: str, after: str, x: np.ndarray, ticks: int = 1500,
@@ -181,9 +181,9 @@ def test_ties_keep_more_feet_down_and_legs_go_forward() -> None:
 @given(st.floats(0.0, 1.0), st.floats(0.0, 50.0), st.sampled_from([1.0, 1.25, 0.3]))
 def test_the_word_of_a_blend_reads_back_to_the_same_floats(
         share: float, rate: float, cadence: float) -> None:
-    reader = GaitReader(ALL)
+    reader = KnownGaits(ALL)
     gait = reader.transition(GAITS['walk'], ODD).at(share, rate).scaled(cadence)
-    back = GaitReader(ALL).read(gait.word)
+    back = KnownGaits(ALL).read(gait.word)
     assert isinstance(back, BlendedGait)
     assert (back.share, back.rate, back.cadence_scale) == (share, rate, cadence)
     assert back.phases.tobytes() == gait.phases.tobytes()
@@ -198,7 +198,7 @@ def test_the_word_of_a_blend_reads_back_to_the_same_floats(
 ])
 def test_bad_words_are_refused_with_what_is_valid(word: str, text: str) -> None:
     with pytest.raises(DataError, match=text):
-        GaitReader(ALL).read(word)
+        KnownGaits(ALL).read(word)
 
 
 def test_a_gait_whose_name_would_not_read_back_is_refused() -> None:

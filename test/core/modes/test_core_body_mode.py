@@ -13,7 +13,7 @@ from core_examples import TICK, TICK_NS, quadruped, standing_state
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.modes.body_command import MODES, MOVING, BodyCommand
+from dmp_cpg_ros.core.balance.body_command import MODES, MOVING, BodyCommand
 from dmp_cpg_ros.core.modes.body_condition import BodyCondition, BodySense
 from dmp_cpg_ros.core.modes.body_mode import BodyModes, ModeParameters, ModeState
 from dmp_cpg_ros.core.modes.body_requests import REQUESTS, request

@@ -11,7 +11,7 @@ import pytest
 from core_examples import geometry, quadruped
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.modes.body_command import BodyCommand
+from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.modes.motion import LegMotion, phase_at
 from dmp_cpg_ros.core.modes.movements import Movements, minimum_jerk
 from dmp_cpg_ros.core.modes.postures import (
