@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from messages import canonical_writer
 
 pytest.importorskip('rclpy')
 
@@ -22,7 +23,7 @@ from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.nodes.body_state import sensor_readings
-from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, ReferenceWriter
+from dmp_cpg_ros.nodes.conversions import ReferenceWriter
 from dmp_cpg_ros.nodes.interfaces import interface
 from dmp_cpg_ros.nodes.robot_state_messages import (
     EstimatedOdometryWriter,
@@ -107,7 +108,7 @@ def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros:
     ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers.values()))
     # The node's robot is the package's own; the example stands much like it.
     oscillators = network()
-    writer, reference, canonical = RobotStateWriter(), ReferenceWriter(), CanonicalStateWriter()
+    writer, reference, canonical = RobotStateWriter(), ReferenceWriter(), canonical_writer()
 
     ticks = itertools.count(1)
 
