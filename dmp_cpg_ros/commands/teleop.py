@@ -18,9 +18,9 @@ from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, VelocityCommand
-from dmp_cpg_ros.nodes.conversions import InhibitionGainsReader
-from dmp_cpg_ros.nodes.inhibition_messages import read_state_word
-from dmp_cpg_ros.nodes.interfaces import interface
+from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader
+from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 
 STEPS = {'w': (0.1, 0.0), 's': (-0.1, 0.0), 'a': (0.0, 0.2), 'd': (0.0, -0.2)}
 """Change of v_x [m/s] and of the yaw rate [rad/s] by one press of a key."""

@@ -30,19 +30,23 @@ from dmp_cpg_ros.core.suite_parameters import (
     CertificateParameters,
     GaitParameters,
 )
-from dmp_cpg_ros.nodes.certified_node import CertifiedNode
-from dmp_cpg_ros.nodes.conversions import (
+from dmp_cpg_ros.nodes.framework.certified import CertifiedNode
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.gaits import (
+    certificate_words,
+    check_gait,
+    description_of,
+    gait_name,
+)
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.suite_node import Sets
+from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateWriter,
     InhibitionGainsReader,
     read_reference,
 )
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_changes import check_gait
-from dmp_cpg_ros.nodes.gait_setup import certificate_words, description_of, gait_name
-from dmp_cpg_ros.nodes.message_values import header_ns
-from dmp_cpg_ros.nodes.parameterized_node import Sets
-from dmp_cpg_ros.nodes.robot_state_messages import FootContactsReader
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader
+from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS
 
 Array = NDArray[np.float64]

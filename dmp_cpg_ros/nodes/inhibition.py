@@ -24,19 +24,19 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
 )
 from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.nodes.certified_node import CertifiedNode
-from dmp_cpg_ros.nodes.conversions import (
+from dmp_cpg_ros.nodes.framework.certified import CertifiedNode
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.gaits import certificate_words, gait_name
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.inputs.votes import NodeVotes
+from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
     CommandReader,
     InhibitionGainsWriter,
     read_reference,
 )
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import certificate_words, gait_name
-from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
-from dmp_cpg_ros.nodes.inhibition_votes import NodeVotes
-from dmp_cpg_ros.nodes.message_values import header_ns
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.messages.inhibition_state import InhibitionStateWriter
+from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS
 
 

@@ -15,25 +15,25 @@ from dmp_cpg_ros.core.modes.movements import Movements
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.core.suite_parameters import LegChoice
 from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.nodes.conversions import (
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
     JointTargetsWriter,
     PostureFeedbackReader,
     read_reference,
 )
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, known_gaits
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import header_ns
-from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.messages.robot_state import JointsReader
+from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS, LEG
 
 NO_JOINTS = (np.full(len(JOINT_NAMES), np.nan),) * 3
 """Measured joints where they are not read."""
 
 
-class LegTransformation(ManagedNode):
+class LegTransformation(SuiteNode):
     """Turns a leg's oscillator state and the reference into targets of its joints."""
 
     KIND = LEG

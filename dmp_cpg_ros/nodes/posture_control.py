@@ -17,21 +17,21 @@ from dmp_cpg_ros.core.modes.body_mode import ModeParameters
 from dmp_cpg_ros.core.modes.body_requests import REQUESTS
 from dmp_cpg_ros.core.robot_model.legs import RobotLegs
 from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.nodes.body_state import BodyState
-from dmp_cpg_ros.nodes.conversions import (
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.inputs.body_state import BodyState
+from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
     PostureFeedbackWriter,
     read_reference,
 )
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, known_gaits
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import header_ns
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS, POSTURE
 
 
-class PostureControl(ManagedNode):
+class PostureControl(SuiteNode):
     """Balances the body: torques for the stance legs, placement for the swinging feet.
 
     Decides its mode, too: stands it up, lays it down, notices a fall, brings it back.

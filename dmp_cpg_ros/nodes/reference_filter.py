@@ -12,11 +12,11 @@ import numpy as np
 
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
-from dmp_cpg_ros.nodes.certified_node import CertifiedNode
-from dmp_cpg_ros.nodes.conversions import InhibitionGainsReader, ReferenceWriter
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.message_values import header_ns
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.certified import CertifiedNode
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, ReferenceWriter
+from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS
 
 

@@ -21,12 +21,12 @@ from dmp_cpg_ros.core.modes.body_requests import REQUESTS
 from dmp_cpg_ros.core.scenario.events import Command
 from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.nodes.acknowledged_topic import AcknowledgedTopic
-from dmp_cpg_ros.nodes.conversions import read_body_mode
-from dmp_cpg_ros.nodes.inhibition_messages import read_state_word
-from dmp_cpg_ros.nodes.interfaces import GATE_OWNER, interface
-from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
-from dmp_cpg_ros.nodes.parameter_setter import ParameterSetter
+from dmp_cpg_ros.nodes.framework.parameter_services import ParameterSetter
+from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
+from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
+from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
+from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.scenario.acknowledged_topic import AcknowledgedTopic
 
 FAR_NS = 2**31 * 10**9 - 1
 """A stamp later than every run [ns]."""

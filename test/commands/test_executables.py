@@ -19,7 +19,7 @@ from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.layouts import CANONICAL_NAMES, CORRECTION_NAMES, SHIFT_NAMES
-from dmp_cpg_ros.nodes.interfaces import INTERFACES, published_by, read_by
+from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, published_by, read_by
 
 processes, ros, ros_domain = (
     ros_processes.processes,

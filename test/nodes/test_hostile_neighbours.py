@@ -16,7 +16,7 @@ import pytest
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.layouts import GAIN_ROWS
-from dmp_cpg_ros.nodes.conversions import InhibitionGainsReader
+from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader
 
 pytest.importorskip('rclpy')
 
@@ -43,14 +43,14 @@ from test_executables import NAMES, NODES
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import LARGEST_FORCE
-from dmp_cpg_ros.nodes.conversions import read_push_force
-from dmp_cpg_ros.nodes.gait_setup import follow_gait, gaits_of
-from dmp_cpg_ros.nodes.interfaces import Interface, interface, published_by, read_by
+from dmp_cpg_ros.nodes.framework.gaits import follow_gait, gaits_of
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
-from dmp_cpg_ros.nodes.message_values import set_stamp
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
+from dmp_cpg_ros.nodes.messages.conversions import read_push_force
+from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, published_by, read_by
+from dmp_cpg_ros.nodes.messages.robot_state import read_imu
+from dmp_cpg_ros.nodes.messages.values import set_stamp
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
-from dmp_cpg_ros.nodes.robot_state_messages import read_imu
-from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
 
 processes, ros, ros_domain = (
     ros_processes.processes,

@@ -27,7 +27,8 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets, RobotState
-from dmp_cpg_ros.nodes.conversions import (
+from dmp_cpg_ros.nodes.messages.cdr import Serialized
+from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
     CommandReader,
     InhibitionGainsReader,
@@ -41,9 +42,8 @@ from dmp_cpg_ros.nodes.conversions import (
     read_reference,
     read_twist,
 )
-from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter, read_state_word
-from dmp_cpg_ros.nodes.message_values import LARGEST, header_ns, set_stamp, stamp_ns, text
-from dmp_cpg_ros.nodes.robot_state_messages import (
+from dmp_cpg_ros.nodes.messages.inhibition_state import InhibitionStateWriter, read_state_word
+from dmp_cpg_ros.nodes.messages.robot_state import (
     FootContactsReader,
     JointsReader,
     RobotStateWriter,
@@ -51,7 +51,7 @@ from dmp_cpg_ros.nodes.robot_state_messages import (
     read_odom,
     robot_state,
 )
-from dmp_cpg_ros.nodes.serialized_messages import Serialized
+from dmp_cpg_ros.nodes.messages.values import LARGEST, header_ns, set_stamp, stamp_ns, text
 from dmp_cpg_ros.suite import load_gait, load_gaits
 
 FLOATS = st.floats(-LARGEST, LARGEST)

@@ -27,9 +27,9 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.scenario.scenario import play
-from dmp_cpg_ros.nodes.conversions import ReferenceWriter, read_votes
-from dmp_cpg_ros.nodes.interfaces import interface
-from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
+from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter, read_votes
+from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.suite import load_suite

@@ -17,8 +17,8 @@ from ros_processes import Processes
 from rosbags.highlevel import AnyReader
 
 from dmp_cpg_ros.core.balance.body_command import MODES
-from dmp_cpg_ros.nodes.interfaces import TOPICS
-from dmp_cpg_ros.nodes.robot_state_messages import BASE_FRAME, WORLD_FRAME
+from dmp_cpg_ros.nodes.messages.interfaces import TOPICS
+from dmp_cpg_ros.nodes.messages.robot_state import BASE_FRAME, WORLD_FRAME
 from dmp_cpg_ros.suite_table import WALKING
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain

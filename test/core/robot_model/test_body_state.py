@@ -22,17 +22,17 @@ from ros_processes import Processes, Ros
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
-from dmp_cpg_ros.nodes.body_state import sensor_readings
-from dmp_cpg_ros.nodes.conversions import ReferenceWriter
-from dmp_cpg_ros.nodes.interfaces import interface
-from dmp_cpg_ros.nodes.robot_state_messages import (
+from dmp_cpg_ros.nodes.inputs.body_state import sensor_readings
+from dmp_cpg_ros.nodes.messages.cdr import Serialized
+from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter
+from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.robot_state import (
     EstimatedOdometryWriter,
     FootContactsReader,
     RobotStateWriter,
     read_imu,
     read_odom,
 )
-from dmp_cpg_ros.nodes.serialized_messages import Serialized
 
 processes, ros_domain, ros = ros_processes.processes, ros_processes.ros_domain, ros_processes.ros
 

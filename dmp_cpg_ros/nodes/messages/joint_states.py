@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.message_values import Array, checked, sensed
-from dmp_cpg_ros.nodes.serialized_messages import SerializedJointState
-from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraft
+from dmp_cpg_ros.nodes.messages.cdr import RefilledMessage, SerializedDraft, SerializedJointState
+from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed
 
 FIELDS = ('position', 'velocity', 'effort')
 """The arrays of a ``JointState``."""

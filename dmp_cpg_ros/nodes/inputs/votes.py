@@ -22,12 +22,12 @@ from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import TickParameters
-from dmp_cpg_ros.nodes.conversions import read_votes
-from dmp_cpg_ros.nodes.gait_setup import description_of
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import header_ns
-from dmp_cpg_ros.nodes.robot_state_messages import FootContactsReader, read_imu
-from dmp_cpg_ros.nodes.tick_inputs import TickInputs
+from dmp_cpg_ros.nodes.framework.gaits import description_of
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.framework.ticks import TickInputs
+from dmp_cpg_ros.nodes.messages.conversions import read_votes
+from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, read_imu
+from dmp_cpg_ros.nodes.messages.values import header_ns
 
 CONTACTS, IMU = 'foot_contacts', 'imu'
 
@@ -37,7 +37,7 @@ class NodeVotes:
 
     Parameters
     ----------
-    node : ManagedNode
+    node : SuiteNode
         The node.
     network : GaitNetwork
         Its oscillators.
@@ -48,7 +48,7 @@ class NodeVotes:
         Sensors that belong to a tick; in real time it does not wait for them.
     """
 
-    def __init__(self, node: ManagedNode, network: GaitNetwork) -> None:
+    def __init__(self, node: SuiteNode, network: GaitNetwork) -> None:
         """Compute the clamp."""
         self._node, self._contacts = node, FootContactsReader(strict=False)
         self._weight, self.inbox = description_of(node).mass * GRAVITY, VoteInbox()

@@ -10,7 +10,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.message_values import set_stamp, text
+from dmp_cpg_ros.nodes.messages.values import set_stamp, text
 
 
 class InhibitionStateWriter:

@@ -13,9 +13,9 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.conversions import read_body_mode
-from dmp_cpg_ros.nodes.interfaces import interface
-from dmp_cpg_ros.nodes.message_values import stamp_ns
+from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
+from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.values import stamp_ns
 
 PATIENCE_NS = 12_000_000_000
 """Time on the robot's clock within which it must lie [ns]: coming to rest, and the movement."""

@@ -22,10 +22,9 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.legs import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
-from dmp_cpg_ros.nodes.interfaces import BODY_TOPICS
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import header_ns
-from dmp_cpg_ros.nodes.robot_state_messages import (
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS
+from dmp_cpg_ros.nodes.messages.robot_state import (
     EstimatedOdometryWriter,
     FootContactsReader,
     JointsReader,
@@ -33,6 +32,7 @@ from dmp_cpg_ros.nodes.robot_state_messages import (
     read_odom,
     robot_state,
 )
+from dmp_cpg_ros.nodes.messages.values import header_ns
 
 WELL_AGAIN_NS = 1_000_000_000
 """Time without a problem after which sensors count as well again [ns]."""
@@ -43,7 +43,7 @@ class BodyState:
 
     Parameters
     ----------
-    node : ManagedNode
+    node : SuiteNode
         The node that needs the state; its parameters choose where it comes from.
     description : RobotDescription
         The robot.
@@ -53,7 +53,7 @@ class BodyState:
     Attributes
     ----------
     inputs : tuple of str
-        Topics, for :meth:`~dmp_cpg_ros.nodes.managed_node.ManagedNode.match`.
+        Topics, for :meth:`~dmp_cpg_ros.nodes.framework.suite_node.SuiteNode.match`.
     optional : tuple of str
         Of these: those whose silence the estimator bears.
     readers : mapping of str to callable
@@ -63,7 +63,7 @@ class BodyState:
     """
 
     def __init__(
-        self, node: ManagedNode, description: RobotDescription, legs: RobotLegs | None = None
+        self, node: SuiteNode, description: RobotDescription, legs: RobotLegs | None = None
     ) -> None:
         """Build the estimator, where there is one, and its publisher."""
         self._node = node

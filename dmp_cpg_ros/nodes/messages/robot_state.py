@@ -15,14 +15,15 @@ from sensor_msgs.msg import Imu, JointState
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
-from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
-from dmp_cpg_ros.nodes.message_values import Array, checked, sensed, set_stamp
-from dmp_cpg_ros.nodes.serialized_messages import (
+from dmp_cpg_ros.nodes.messages.cdr import (
+    RefilledMessage,
+    SerializedDraft,
     SerializedImu,
     SerializedJointState,
     SerializedOdometry,
 )
-from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraft
+from dmp_cpg_ros.nodes.messages.joint_states import FIELDS, JointStateReader, JointStateWriter
+from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed, set_stamp
 
 BASE_FRAME, WORLD_FRAME = 'base_link', 'odom'
 

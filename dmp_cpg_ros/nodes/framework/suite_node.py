@@ -1,36 +1,51 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The base of all nodes: topics, ticks, readiness, diagnostics.
+"""The base of all nodes: parameters, topics, ticks, readiness, diagnostics.
 
-Guarded callbacks, lifecycle and parameters are those of
-:mod:`~dmp_cpg_ros.nodes.guarded_node`, :mod:`~dmp_cpg_ros.nodes.hooked_lifecycle` and
-:mod:`~dmp_cpg_ros.nodes.parameterized_node`. A node names its kind and its parameter sets and
-overrides the hooks that it needs: ``configure``, ``activate``, ``deactivate``, ``cleanup``,
+Guarded callbacks and the lifecycle are those of :mod:`~dmp_cpg_ros.nodes.framework.lifecycle`. A
+node overrides the hooks that it needs: ``configure``, ``activate``, ``deactivate``, ``cleanup``,
 ``on_tick``, ``on_parameters``, ``check_parameters``, ``diagnostic_values``, ``readers``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Any, ClassVar, TypeVar, cast
 
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from rclpy.subscription import Subscription
 
+from dmp_cpg_ros.core.certificates.gate import shown
 from dmp_cpg_ros.core.clock import TickClock
-from dmp_cpg_ros.nodes.interfaces import Interface, interface, partners
-from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, SuitePublisher
-from dmp_cpg_ros.nodes.parameterized_node import ParameterizedNode
-from dmp_cpg_ros.nodes.readiness import missing_connections
-from dmp_cpg_ros.nodes.ros_parameters import NodeParameters
-from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
-from dmp_cpg_ros.nodes.tick_inputs import TickInputs, drain
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
+from dmp_cpg_ros.core.parameters import Parameters
+from dmp_cpg_ros.core.suite_parameters import OWNER
+from dmp_cpg_ros.nodes.framework.health import missing_connections
+from dmp_cpg_ros.nodes.framework.lifecycle import GuardedLifecycleNode
+from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePublisher
+from dmp_cpg_ros.nodes.framework.parameters import (
+    NodeParameters,
+    ParameterTable,
+    declare,
+    plain,
+    ros_value,
+)
+from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
+from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, partners
+
+P = TypeVar('P', bound=Parameters)
+Sets = Mapping[type[Parameters], Parameters]
 
 
-class ManagedNode(ParameterizedNode):
-    """A managed node of the suite.
+class SuiteNode(GuardedLifecycleNode):
+    """A managed node of the suite, with declared and checked parameters.
+
+    A node names its kind and its parameter sets and overrides the hooks that it needs.
 
     Parameters
     ----------
@@ -41,18 +56,33 @@ class ManagedNode(ParameterizedNode):
 
     Attributes
     ----------
+    KIND : str
+        Kind of node in the interfaces table, also the name of its executable.
+    PARAMETER_SETS : tuple of Parameters classes
+        Parameter sets beyond :class:`~dmp_cpg_ros.nodes.framework.parameters.NodeParameters`.
+    CHANGEABLE : collection of str
+        Parameters that may change while the node runs; all others are read-only. Those that
+        another node owns are refused with its name, and change only by :meth:`follow`.
     elapsed : float
         Time since the tick before, 0 at the first one [s].
     local : LocalDelivery or None
         How it reaches nodes of the same process; None where it is alone.
     """
 
+    KIND: ClassVar[str] = ''
+    PARAMETER_SETS: ClassVar[tuple[type[Parameters], ...]] = ()
+    CHANGEABLE: ClassVar[Collection[str]] = ()
     local: LocalDelivery | None = None
     elapsed = 0.0
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
-        super().__init__(name, **options)
+        self._following = False
+        super().__init__(name or self.KIND, **options)
+        self._table = self.parameter_table()
+        self._sets = self._accepted = declare(self, self._table)
+        self.add_on_set_parameters_callback(self._check_change)
+        self.add_post_set_parameters_callback(self._accept_change)
         self._entities: list[Publisher | Subscription | Service] = []
         self._commands: list[Subscription] = []
         self._commands_taken: dict[str, int] = {}
@@ -77,6 +107,108 @@ class ManagedNode(ParameterizedNode):
         inside = self.local.kinds if self.local is not None else ()
         return tuple(kind for kind in partners(topic, readers=True) if kind not in inside)
 
+    def on_parameters(self) -> None:
+        """Take over changed parameters from :meth:`parameters_of`, at the start of a tick."""
+
+    def check_parameters(self, sets: Sets) -> None:
+        """Raise ParameterError to refuse a change that every field by itself would allow."""
+
+    # Parameters ------------------------------------------------------------------------------
+
+    @classmethod
+    def parameter_table(cls) -> ParameterTable:
+        """All parameters of this kind of node."""
+        return ParameterTable((NodeParameters, *cls.PARAMETER_SETS), cls.CHANGEABLE)
+
+    @classmethod
+    def default_name(cls, arguments: Sequence[str]) -> str:
+        """Name of the node when the command line does not give one."""
+        return cls.KIND
+
+    def parameters_of(self, parameter_set: type[P]) -> P:
+        """Return the values in effect of one parameter set."""
+        return cast(P, self._sets[parameter_set])
+
+    def start(self) -> None:
+        """Configure and activate, unless ``autostart`` is false; raises what made that fail."""
+        if self.parameters_of(NodeParameters).autostart:
+            super().start()
+
+    def take_changed_parameters(self) -> None:
+        """Let changes that were accepted since the last call take effect, all at once."""
+        if self._accepted is not self._sets:
+            self._sets = self._accepted
+            self.on_parameters()
+
+    def follow(self, values: Mapping[str, Any]) -> None:
+        """Take over what the owner of some parameters has accepted, where it is new.
+
+        Raises
+        ------
+        DataError
+            If it cannot be taken over; nothing is then changed.
+        """
+        accepted = self._table.values(self._accepted)
+        news = {name: value for name, value in values.items()
+                if name in accepted and value != ros_value(accepted[name])}
+        if not news:
+            return
+        self._following = True
+        try:
+            result = self.set_parameters_atomically(
+                [Parameter(name, value=value) for name, value in news.items()])
+        finally:
+            self._following = False
+        if not result.successful:
+            raise DataError(f'cannot follow {news}: {result.reason}')
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters; read-only ones may be set to the value that they have.
+
+        So a file that ``ros2 param dump`` wrote can be loaded by the node that it describes.
+        """
+        news = [entry for entry in parameter_list if not self._is_fixed(entry)]
+        if parameter_list and not news:
+            return SetParametersResult(successful=True)
+        return super().set_parameters_atomically(news)
+
+    def _is_fixed(self, entry: Parameter) -> bool:
+        """Whether a parameter is read-only and has this value."""
+        return (self.has_parameter(entry.name) and self.describe_parameter(entry.name).read_only
+                and self.get_parameter(entry.name).get_parameter_value()
+                == entry.get_parameter_value())
+
+    def _refuse_foreign(self, sets: Sets) -> None:
+        before, after = self._table.values(self._accepted), self._table.values(sets)
+        for name, value in after.items():
+            owner = OWNER.get(name, self.KIND)
+            if value != before[name] and owner != self.KIND:
+                raise ParameterError(
+                    f"'{name}' belongs to {owner}, which the other nodes follow; set it there: "
+                    f'ros2 param set /{owner} {name} {shown(value)}')
+
+    def _check_change(self, changes: list[Parameter]) -> SetParametersResult:
+        """Validate changes together with the values that were accepted last."""
+        try:
+            sets = self._changed(changes)
+            if not self._following:
+                self._refuse_foreign(sets)
+            self.check_parameters(sets)
+        except DmpCpgError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _accept_change(self, changes: list[Parameter]) -> None:
+        self._accepted = self._changed(changes)
+        if not self.configured:
+            self._sets = self._accepted
+
+    def _changed(self, changes: list[Parameter]) -> dict[type[Parameters], Parameters]:
+        values = self._table.values(self._accepted)
+        values.update({change.name: plain(change.value) for change in changes
+                       if change.name in self._table.fields})
+        return self._table.build(values)
+
     # Topics and services -----------------------------------------------------------------------
 
     def publisher(self, name: str) -> SuitePublisher:
@@ -94,8 +226,8 @@ class ManagedNode(ParameterizedNode):
 
         Messages that cannot be read, or that the callback refuses by raising
         :class:`~dmp_cpg_ros.core.errors.DataError`, are dropped and counted
-        (:class:`~dmp_cpg_ros.nodes.guarded_node.GuardedNode`). So the bytes are read here: what
-        the middleware cannot read it would drop without a word.
+        (:class:`~dmp_cpg_ros.nodes.framework.lifecycle.GuardedLifecycleNode`). So the bytes are
+        read here: what the middleware cannot read it would drop without a word.
 
         Parameters
         ----------
@@ -103,7 +235,7 @@ class ManagedNode(ParameterizedNode):
             Interface of the table, or its name.
         callback : callable (message)
             Latched topics are also delivered while the node is configured and not active. Kinds
-            that :mod:`~dmp_cpg_ros.nodes.serialized_messages` reads come as its classes from
+            that :mod:`~dmp_cpg_ros.nodes.messages.cdr` reads come as its classes from
             other processes, unless ``command``.
         command : bool
             Whether the queue is emptied at the start of every tick.
@@ -172,7 +304,7 @@ class ManagedNode(ParameterizedNode):
     # Ticks -------------------------------------------------------------------------------------
 
     def match(self, inputs: Sequence[str], trigger: str, **options: Any) -> TickInputs:
-        """Make a :class:`~dmp_cpg_ros.nodes.tick_inputs.TickInputs` that runs :meth:`on_tick`."""
+        """Make :class:`~dmp_cpg_ros.nodes.framework.ticks.TickInputs` that run :meth:`on_tick`."""
         self._clock_of_ticks = TickClock()
         return TickInputs(self._run_tick, inputs, trigger, **options)
 

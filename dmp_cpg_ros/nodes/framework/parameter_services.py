@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Copies of other nodes' parameters that are true while those nodes change them."""
+"""Parameters of other nodes: following what their owners accept, and setting them there."""
 
 from __future__ import annotations
 
@@ -9,16 +9,18 @@ from typing import Any
 
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent
-from rcl_interfaces.srv import GetParameters
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.task import Future
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.guarded_node import GuardedNode
-from dmp_cpg_ros.nodes.ros_parameters import plain
-from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
+from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
+from dmp_cpg_ros.nodes.framework.lifecycle import GuardedLifecycleNode
+from dmp_cpg_ros.nodes.framework.parameters import plain, ros_value
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 
 ASK_EVERY_S = 5.0
 """Period of asking the owners [s]: what an event did not tell, because a node was not there yet or
@@ -33,7 +35,7 @@ class ParameterFollower:
 
     Parameters
     ----------
-    node : GuardedNode
+    node : GuardedLifecycleNode
         The node that follows.
     owners : mapping of str to sequence of str
         Names of nodes in the same namespace, with the names of their parameters.
@@ -44,7 +46,7 @@ class ParameterFollower:
 
     def __init__(
         self,
-        node: GuardedNode,
+        node: GuardedLifecycleNode,
         owners: Mapping[str, Sequence[str]],
         take: Callable[[dict[str, Any]], None],
     ) -> None:
@@ -115,3 +117,69 @@ class ParameterFollower:
                             for name, value in zip(names, values, strict=True)})
 
         return answered
+
+
+Done = Callable[[str], None]
+
+
+class ParameterSetter:
+    """Calls the nodes' own parameter services, as ``ros2 param set`` does.
+
+    Parameters
+    ----------
+    node : Node
+        Who asks.
+    """
+
+    def __init__(self, node: Node) -> None:
+        """Create the clients."""
+        self._setters = {owner: node.create_client(
+            SetParametersAtomically, f'{owner}/set_parameters_atomically') for owner in CHANGEABLE}
+        self._getters = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
+                         for owner in CHANGEABLE}
+
+    def connected(self) -> bool:
+        """Whether all services are there."""
+        return all(client.service_is_ready()
+                   for client in (*self._setters.values(), *self._getters.values()))
+
+    def set(self, values: Mapping[str, Any], done: Done) -> None:
+        """Ask for a change.
+
+        Parameters
+        ----------
+        values : mapping of str to value
+            Parameters of one owner.
+        done : callable (reason)
+            Called with why the change is refused, or with an empty text once the owner has
+            accepted it and all followers know it.
+        """
+        owner = OWNER[next(iter(values))]
+        wanted = {name: ros_value(value) for name, value in values.items()}
+        request = SetParametersAtomically.Request(parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in wanted.items()])
+
+        def answered(future: Future) -> None:
+            answer = future.result()
+            if answer is None or not answer.result.successful:
+                done('no answer' if answer is None else answer.result.reason)
+                return
+            self._await([node for node in CHANGEABLE if node != owner], wanted, done)
+
+        self._setters[owner].call_async(request).add_done_callback(answered)
+
+    def _await(self, followers: list[str], wanted: Mapping[str, Any], done: Done) -> None:
+        """Ask each follower until it has the values."""
+        if not followers:
+            done('')
+            return
+
+        def answered(future: Future) -> None:
+            answer = future.result()
+            known = [] if answer is None else [
+                plain(parameter_value_to_python(value)) for value in answer.values]
+            follow = followers[1:] if known == list(wanted.values()) else followers
+            self._await(follow, wanted, done)
+
+        request = GetParameters.Request(names=list(wanted))
+        self._getters[followers[0]].call_async(request).add_done_callback(answered)

@@ -1,18 +1,20 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""ROS parameters declared from the fields of parameter sets."""
+"""Parameter sets as ROS parameters: declaration, values, help."""
 
 from __future__ import annotations
 
 import array
 import dataclasses
+import inspect
 import sys
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+import yaml
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -20,8 +22,13 @@ from rclpy.parameter import Parameter
 from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.nodes.scheduling import BATCH, POLICIES
+from dmp_cpg_ros.nodes.messages.interfaces import Interface, published_by, read_by, served_by
 from dmp_cpg_ros.suite_table import KINDS, WALKING
+
+BATCH, NORMAL = 'batch', 'normal'
+
+POLICIES = (BATCH, NORMAL)
+"""Values of the parameter ``scheduling``."""
 
 P = TypeVar('P', bound=Parameters)
 
@@ -208,3 +215,41 @@ def _flat_names(values: Mapping[str, Any], prefix: str = '') -> Iterable[str]:
             yield from _flat_names(value, f'{prefix}{name}.')
         else:
             yield f'{prefix}{name}'
+
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+
+
+def help_text(node_class: type[SuiteNode]) -> str:
+    """Say what a node does, and name its topics, services and parameters."""
+    kind = node_class.KIND
+    summary = inspect.cleandoc(node_class.__doc__ or '').split('\n\n')[0]
+    parts = [f'usage: {kind} [--help] [--ros-args [-p NAME:=VALUE] [-r FROM:=TO] '
+             '[--params-file FILE] ...]', summary]
+    for title, interfaces in (('subscribes to', read_by(kind)), ('publishes', published_by(kind)),
+                              ('serves', served_by(kind))):
+        if interfaces:
+            parts.append('\n'.join([f'{title}:', *_interface_lines(interfaces)]))
+    parts.append('\n'.join(['parameters:', *_parameter_lines(node_class.parameter_table())]))
+    return '\n\n'.join(parts)
+
+
+def _interface_lines(interfaces: Iterable[Interface]) -> list[str]:
+    return [f'  {entry.name} ({entry.type_name}{", latched" if entry.latched else ""})\n'
+            f'      {entry.meaning}' for entry in interfaces]
+
+
+def _parameter_lines(table: ParameterTable) -> list[str]:
+    lines = []
+    for name, field in table.fields.items():
+        notes = [f'default {_yaml(ros_value(field.default))}']
+        notes += [text for text in (constraint(field),) if text]
+        notes += ['changeable'] if name in table.changeable else []
+        lines += [f'  {name}: {describe(field)}', f"      {', '.join(notes)}"]
+    return lines
+
+
+def _yaml(value: object) -> str:
+    """Value as one would type it on the command line."""
+    return str(yaml.safe_dump(value, default_flow_style=True, width=1000)).splitlines()[0]

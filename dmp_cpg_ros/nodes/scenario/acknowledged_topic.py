@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
-from dmp_cpg_ros.nodes.interfaces import interface
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 
 
 class AcknowledgedTopic:

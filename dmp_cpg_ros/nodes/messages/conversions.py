@@ -4,7 +4,7 @@
 
 Values pass bit for bit. What enters is taken by name and checked;
 :class:`~dmp_cpg_ros.core.errors.DataError` is raised for what must not enter. The robot's state is
-in :mod:`~dmp_cpg_ros.nodes.robot_state_messages`.
+in :mod:`~dmp_cpg_ros.nodes.messages.robot_state`.
 """
 
 from __future__ import annotations
@@ -40,16 +40,20 @@ from dmp_cpg_ros.layouts import (
     read_command_rows,
     read_gait_rows,
 )
-from dmp_cpg_ros.nodes.joint_state_messages import FIELDS, JointStateReader, JointStateWriter
-from dmp_cpg_ros.nodes.message_values import (
+from dmp_cpg_ros.nodes.messages.cdr import (
+    RefilledMessage,
+    SerializedDraft,
+    SerializedJointState,
+    SerializedTwist,
+)
+from dmp_cpg_ros.nodes.messages.joint_states import FIELDS, JointStateReader, JointStateWriter
+from dmp_cpg_ros.nodes.messages.robot_state import BASE_FRAME
+from dmp_cpg_ros.nodes.messages.values import (
     Array,
     checked,
     checked_numbers,
     header_ns,
 )
-from dmp_cpg_ros.nodes.robot_state_messages import BASE_FRAME
-from dmp_cpg_ros.nodes.serialized_messages import SerializedJointState, SerializedTwist
-from dmp_cpg_ros.nodes.serialized_writing import RefilledMessage, SerializedDraft
 
 _OSCILLATORS, _GAITS = slice(0, len(OSCILLATOR_ROWS)), slice(len(OSCILLATOR_ROWS), None)
 _JOINTS = slice(0, len(JOINT_NAMES))

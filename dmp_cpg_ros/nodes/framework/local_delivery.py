@@ -15,7 +15,7 @@ from typing import Any
 
 from rclpy.publisher import Publisher
 
-from dmp_cpg_ros.nodes.serialized_messages import Serialized
+from dmp_cpg_ros.nodes.messages.cdr import Serialized
 
 
 class LocalDelivery:

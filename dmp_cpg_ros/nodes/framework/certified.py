@@ -38,19 +38,18 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
 )
 from dmp_cpg_ros.core.transformation.leg import body_scale
-from dmp_cpg_ros.nodes.conversions import read_twist
-from dmp_cpg_ros.nodes.gait_setup import description_of, known_gaits
-from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.parameter_follower import ParameterFollower
-from dmp_cpg_ros.nodes.parameterized_node import P, Sets
-from dmp_cpg_ros.nodes.tick_inputs import drain
+from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
+from dmp_cpg_ros.nodes.framework.parameter_services import ParameterFollower
+from dmp_cpg_ros.nodes.framework.suite_node import P, Sets, SuiteNode
+from dmp_cpg_ros.nodes.framework.ticks import drain
+from dmp_cpg_ros.nodes.messages.conversions import read_twist
+from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL
 
 PROBLEM = 'certificate'
 """Key of the warning on ``/diagnostics``."""
 
 
-class CertifiedNode(ManagedNode):
+class CertifiedNode(SuiteNode):
     """A managed node that owns certified parameters and follows those of the others.
 
     Its parameter sets hold all of :data:`~dmp_cpg_ros.core.suite_parameters.CERTIFIED` and
