@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -224,59 +223,41 @@ def _header(data: bytes) -> tuple[int, str, int]:
     return stamp_in_ns(seconds, rest), data[begin:end - 1].decode() if length else '', end
 
 
-@dataclass(frozen=True)
-class _Names:
-    """Layout of a sequence of names, and what it holds."""
+_KEY = 16
+"""Bytes by which names are looked up: their number and the begin of the first one."""
 
-    layout: struct.Struct
-    content: tuple[int | bytes, ...]
-    names: list[str]
+_MOST_NAMES, _LONGEST_NAMES = 256, 4096
+"""Sequences of names that are known at a time, and bytes of the longest of them."""
+
+_known_names: dict[bytes, tuple[bytes, list[str]]] = {}
+"""Bytes of what was read, and what they say, by the first bytes."""
 
 
 def _names(data: bytes, at: int) -> tuple[list[str], int]:
     """Sequence of texts and where what follows it begins.
 
-    Senders repeat their names in every message, so these are compared with known ones; the
-    bytes between texts are arbitrary and not compared.
+    Senders repeat their names in every message, so these are compared with known ones. The bytes
+    that align texts are arbitrary: where they differ, the names are read again.
     """
     at = aligned(at, 4)
-    known = _known_names.get(data[at:at + _KEY])
-    if known is not None:
-        end = at + known.layout.size
-        if end <= len(data) and known.layout.unpack_from(data, at) == known.content:
-            return known.names, end
-    return _new_names(data, at)
-
-
-_KEY = 16
-"""Bytes by which names are looked up: their number and the begin of the first one."""
-
-_MOST_NAMES = 256
-"""Sequences of names that are known at a time."""
-
-_known_names: dict[bytes, _Names] = {}
-"""What was read, by its first bytes."""
-
-
-def _new_names(data: bytes, begin: int) -> tuple[list[str], int]:
-    """Read a sequence of texts piece by piece, and remember it."""
-    (count,) = _COUNT.unpack_from(data, begin)
-    at, layout, names = begin + 4, '<I', []
-    content: list[int | bytes] = [count]
+    key = data[at:at + _KEY]
+    raw, names = _known_names.get(key, (b'', []))
+    end = at + len(raw)
+    if raw and data[at:end] == raw:
+        return names, end
+    (count,) = _COUNT.unpack_from(data, at)
+    end, names = at + 4, []
     for _ in range(count):
-        here = aligned(at, 4)
-        (length,) = _COUNT.unpack_from(data, here)
-        raw = data[here + 4:here + 4 + length]
-        if len(raw) < max(length, 1):
+        begin = aligned(end, 4) + 4
+        end = begin + _COUNT.unpack_from(data, begin - 4)[0]
+        if not begin < end <= len(data):
             raise ValueError('a name is cut short')
-        layout += f'{here - at}xI{length}s'
-        content += [length, raw]
-        names.append(raw[:-1].decode())
-        at = here + 4 + length
-    if len(_known_names) >= _MOST_NAMES:
-        _known_names.clear()
-    _known_names[data[begin:begin + _KEY]] = _Names(struct.Struct(layout), tuple(content), names)
-    return names, at
+        names.append(data[begin:end - 1].decode())
+    if end - at <= _LONGEST_NAMES:
+        if len(_known_names) >= _MOST_NAMES:
+            _known_names.clear()
+        _known_names[key] = data[at:end], names
+    return names, end
 
 
 def _doubles(data: bytes, at: int) -> tuple[int, int]:
