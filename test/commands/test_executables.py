@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from dmp_cpg_ros.suite import load_gaits
+
 pytest.importorskip('rclpy')
 
 import ros_processes
@@ -18,7 +20,7 @@ from ros_processes import Processes, Ros
 from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
-from dmp_cpg_ros.layouts import CANONICAL_NAMES, CORRECTION_NAMES, SHIFT_NAMES
+from dmp_cpg_ros.layouts import GAIN_ROWS, POSTURE_ROWS, canonical_rows
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, published_by, read_by
 
 processes, ros, ros_domain = (
@@ -50,8 +52,9 @@ COMMANDS = (
 
 NAMES = {
     'joint_states': JOINT_NAMES,
-    'canonical_state': CANONICAL_NAMES,
-    'posture_feedback': JOINT_NAMES + SHIFT_NAMES + CORRECTION_NAMES,
+    'canonical_state': canonical_rows(load_gaits()),
+    'posture_feedback': POSTURE_ROWS,
+    'inhibition_gains': GAIN_ROWS,
     'joint_targets': tuple(f'fl_{joint}' for joint in JOINTS_OF_LEG),
     'foot_contacts': tuple(f'{leg}_foot' for leg in LEGS),
 }
