@@ -7,7 +7,7 @@ the region C.
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import nan
 from typing import Any
 
@@ -46,7 +46,7 @@ from dmp_cpg_ros.nodes.messages.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader
-from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.nodes.messages.values import stamped
 from dmp_cpg_ros.suite_table import KINDS
 
 Array = NDArray[np.float64]
@@ -71,27 +71,16 @@ class CanonicalOscillators(CertifiedNode):
         self._lock: PhaseLock | None = None
         self._writer = CanonicalStateWriter(tuple(self.gaits.gaits))
         self._publisher = self.publisher('canonical_state')
-        contacts = self._read_contacts()
-        self._ticks = self.match(
+        contacts = self._contact_readers()
+        self.match(
             ('reference', *contacts),
             'reference',
-            optional=contacts,
+            optional=tuple(contacts),
             delayed=('inhibition_gains',),
             lock_step=self.parameters_of(LockStepParameters).lock_step,
         )
-        self.listen(
-            'reference',
-            lambda message: self._ticks.add(
-                'reference', header_ns(message), read_reference(message)
-            ),
-        )
-        gains = InhibitionGainsReader()
-        self.listen(
-            'inhibition_gains',
-            lambda message: self._ticks.add(
-                'inhibition_gains', header_ns(message), gains.read(message)
-            ),
-        )
+        self.feed({'reference': read_reference,
+                   'inhibition_gains': InhibitionGainsReader().read, **contacts})
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
@@ -142,18 +131,11 @@ class CanonicalOscillators(CertifiedNode):
         elif self._lock.level == LOCKED != former:
             self.clear('phase_lock')
 
-    def _read_contacts(self) -> tuple[str, ...]:
-        """Listen to the feet where they are fed back; returns the topics."""
+    def _contact_readers(self) -> dict[str, Callable[[Any], Any]]:
+        """How to read the feet, where they are fed back."""
         if not self.parameters_of(CanonicalParameters).contact_feedback:
-            return ()
-        reader = FootContactsReader(strict=False)
-        self.listen(
-            'foot_contacts',
-            lambda message: self._ticks.add(
-                'foot_contacts', header_ns(message), (header_ns(message), reader.read(message))
-            ),
-        )
-        return ('foot_contacts',)
+            return {}
+        return {'foot_contacts': stamped(FootContactsReader(strict=False).read)}
 
     @staticmethod
     def _foot_force(stamp_ns: int, values: dict[str, Any]) -> Array:

@@ -36,7 +36,6 @@ from dmp_cpg_ros.nodes.messages.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.messages.inhibition_state import InhibitionStateWriter
-from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS
 
 
@@ -70,37 +69,21 @@ class InhibitionNode(CertifiedNode):
         self._gains_publisher = self.publisher('inhibition_gains')
         self._votes = NodeVotes(self, self._network)
         self._body_mode = 'standing'
-        inputs = ('canonical_state', 'reference', *self._votes.inputs)
-        self._ticks = self.match(
+        inputs = ('canonical_state', 'reference', *self._votes.readers)
+        self.match(
             (*inputs, 'posture_feedback') if self._lock_step else inputs,
             'canonical_state',
             delayed=() if self._lock_step else ('posture_feedback',),
-            optional=self._votes.inputs,
+            optional=tuple(self._votes.readers),
             lock_step=self._lock_step,
         )
         body = CommandReader()
-        self.listen(
-            'posture_feedback',
-            lambda message: self._ticks.add(
-                'posture_feedback', header_ns(message), body.read(message).mode
-            ),
-        )
-        self._votes.listen(self._ticks)
-        canonical = CanonicalStateReader(gaits)
-        self.listen(
-            'canonical_state',
-            lambda message: self._ticks.add(
-                'canonical_state',
-                header_ns(message),
-                canonical.read(message),
-            ),
-        )
-        self.listen(
-            'reference',
-            lambda message: self._ticks.add(
-                'reference', header_ns(message), read_reference(message)
-            ),
-        )
+        self.feed({
+            'posture_feedback': lambda message: body.read(message).mode,
+            'canonical_state': CanonicalStateReader(gaits).read,
+            'reference': read_reference,
+            **self._votes.readers,
+        })
         self.listen_to_commands(self._gate)
         self.serve('inhibit', self._answer_inhibit)
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,6 @@ from dmp_cpg_ros.nodes.messages.conversions import (
     read_reference,
 )
 from dmp_cpg_ros.nodes.messages.robot_state import JointsReader
-from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS, LEG
 
 NO_JOINTS = (np.full(len(JOINT_NAMES), np.nan),) * 3
@@ -55,40 +54,16 @@ class LegTransformation(SuiteNode):
         self._leg = LegControl(leg, description, parameters, Movements(description))
         self._state = self._leg.initial_state()
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
-        inputs = ['canonical_state', 'reference', 'posture_feedback']
-        canonical, feedback = CanonicalStateReader(gaits), PostureFeedbackReader()
-        self.listen(
-            'canonical_state',
-            lambda message: self._ticks.add(
-                'canonical_state',
-                header_ns(message),
-                canonical.read(message),
-            ),
-        )
-        self.listen(
-            'reference',
-            lambda message: self._ticks.add(
-                'reference', header_ns(message), read_reference(message)
-            ),
-        )
-        self.listen(
-            'posture_feedback',
-            lambda message: self._ticks.add(
-                'posture_feedback', header_ns(message), feedback.read(message)
-            ),
-        )
+        readers: dict[str, Callable[[Any], Any]] = {
+            'canonical_state': CanonicalStateReader(gaits).read,
+            'reference': read_reference,
+            'posture_feedback': PostureFeedbackReader().read,
+        }
         if parameters.reading == 'torque':
-            joints = JointsReader()
-            inputs.append('joint_states')
-            self.listen(
-                'joint_states',
-                lambda message: self._ticks.add(
-                    'joint_states', header_ns(message), joints.read(message)
-                ),
-            )
-        self._ticks = self.match(
-            inputs, 'canonical_state', lock_step=self.parameters_of(LockStepParameters).lock_step
-        )
+            readers['joint_states'] = JointsReader().read
+        self.match(tuple(readers), 'canonical_state',
+                   lock_step=self.parameters_of(LockStepParameters).lock_step)
+        self.feed(readers)
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the leg to the stamp of the canonical state."""

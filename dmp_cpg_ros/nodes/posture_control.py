@@ -27,7 +27,6 @@ from dmp_cpg_ros.nodes.messages.conversions import (
     PostureFeedbackWriter,
     read_reference,
 )
-from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS, POSTURE
 
 
@@ -56,28 +55,23 @@ class PostureControl(SuiteNode):
         self._state, self._told = self._control.initial_state(), ''
         self._mode_publisher = self.publisher('body_mode')
         self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
-        self._ticks = self.match(
+        self.match(
             (*self._body.inputs, 'reference', 'canonical_state'),
             'canonical_state',
             optional=self._body.optional,
             lock_step=self.parameters_of(LockStepParameters).lock_step,
         )
-        readers: dict[str, Callable[[Any], Any]] = {
+        self.feed({
             **self._body.readers,
             'reference': read_reference,
             'canonical_state': canonical.read,
-        }
-        for name, read in readers.items():
-            self.listen(name, self._taking(name, read))
+        })
         for what in REQUESTS:
             self.serve(what, self._answering(what))
 
     def activate(self) -> None:
         """Tell late joiners the mode from the start."""
         self._tell()
-
-    def _taking(self, name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
-        return lambda message: self._ticks.add(name, header_ns(message), read(message))
 
     def on_parameters(self) -> None:
         """Take over the gains."""

@@ -16,7 +16,6 @@ from dmp_cpg_ros.nodes.framework.certified import CertifiedNode
 from dmp_cpg_ros.nodes.framework.execution import run_node
 from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, ReferenceWriter
-from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.suite_table import KINDS
 
 
@@ -35,23 +34,15 @@ class ReferenceFilter(CertifiedNode):
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
         self._r, self._requested = np.zeros(3), False
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
-        self._ticks = self.match(
+        self.match(
             ('joint_states',),
             'joint_states',
             delayed=('inhibition_gains',),
             lock_step=self.parameters_of(LockStepParameters).lock_step,
         )
-        self.listen(
-            'joint_states',
-            lambda message: self._ticks.add('joint_states', header_ns(message), None),
-        )
         gains = InhibitionGainsReader()
-        self.listen(
-            'inhibition_gains',
-            lambda message: self._ticks.add(
-                'inhibition_gains', header_ns(message), gains.read(message).requested
-            ),
-        )
+        self.feed({'joint_states': lambda _: None,
+                   'inhibition_gains': lambda message: gains.read(message).requested})
         self.listen_to_commands(self._gate)
 
     def on_parameters(self) -> None:

@@ -43,7 +43,7 @@ from test_executables import NAMES, NODES
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import LARGEST_FORCE
-from dmp_cpg_ros.nodes.framework.gaits import follow_gait, gaits_of
+from dmp_cpg_ros.nodes.framework.gaits import follow_gait
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.conversions import read_push_force
@@ -342,7 +342,7 @@ def test_a_leg_tells_the_gait_that_it_follows(ros: Ros) -> None:
     """The parameter is what is in force, and who asks for another one is sent to its owner."""
     node = LegTransformation('leg', context=ros.context)
     node.start()
-    follow_gait(node, gaits_of(node)['trot'].scaled(1.25))
+    follow_gait(node, known_gaits(node).gaits['trot'].scaled(1.25))
     assert node.get_parameter('gait').value == 'trot'
     result = node.set_parameters([Parameter('gait', value='amble')])[0]
     assert not result.successful

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot's description and the gaits of the nodes that walk, and which changes of gait are
 accepted.
-
-parameters.
 """
 
 from __future__ import annotations

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a node says about itself: counts and problems, timing, connections.
 
-deadlines.
-
 Discovery is not symmetric in time: a reader may know a writer before the writer knows the reader,
 and a reliable volatile writer sends nothing to readers that it does not know yet. So each node
 answers for its own ends only: its expected partners are in the graph, and as many ends as the

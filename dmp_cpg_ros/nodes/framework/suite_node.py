@@ -37,6 +37,7 @@ from dmp_cpg_ros.nodes.framework.parameters import (
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, partners
+from dmp_cpg_ros.nodes.messages.values import header_ns
 
 P = TypeVar('P', bound=Parameters)
 Sets = Mapping[type[Parameters], Parameters]
@@ -306,7 +307,16 @@ class SuiteNode(GuardedLifecycleNode):
     def match(self, inputs: Sequence[str], trigger: str, **options: Any) -> TickInputs:
         """Make :class:`~dmp_cpg_ros.nodes.framework.ticks.TickInputs` that run :meth:`on_tick`."""
         self._clock_of_ticks = TickClock()
-        return TickInputs(self._run_tick, inputs, trigger, **options)
+        self._ticks = TickInputs(self._run_tick, inputs, trigger, **options)
+        return self._ticks
+
+    def feed(self, readers: Mapping[str, Callable[[Any], Any]]) -> None:
+        """Let what readers make of the messages of topics fill the inputs of :meth:`match`."""
+        def feeding(name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
+            return lambda message: self._ticks.add(name, header_ns(message), read(message))
+
+        for name, read in readers.items():
+            self.listen(name, feeding(name, read))
 
     def begin_tick(self, stamp_ns: int) -> None:
         """Start a tick: waiting commands are taken and changed parameters take effect."""

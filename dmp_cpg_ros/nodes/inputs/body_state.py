@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from sensor_msgs.msg import Imu, JointState
 
 from dmp_cpg_ros.core.estimation.estimate import BodyEstimate, estimated_state
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
@@ -32,7 +31,7 @@ from dmp_cpg_ros.nodes.messages.robot_state import (
     read_odom,
     robot_state,
 )
-from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.nodes.messages.values import stamped
 
 WELL_AGAIN_NS = 1_000_000_000
 """Time without a problem after which sensors count as well again [ns]."""
@@ -79,7 +78,7 @@ class BodyState:
             return
         self.optional = BODY_TOPICS[ESTIMATE]
         contacts = FootContactsReader(strict=False)
-        self.readers |= {'imu': _stamped(read_imu), 'foot_contacts': _stamped(contacts.read)}
+        self.readers |= {'imu': stamped(read_imu), 'foot_contacts': stamped(contacts.read)}
         self._estimator = BodyEstimator(
             description, node.parameters_of(EstimationParameters), legs)
         self._writer, self._publisher = (
@@ -160,10 +159,3 @@ def sensor_readings(stamp_ns: int, values: Mapping[str, Any]) -> SensorReadings:
     if feet is not None and feet[0] == stamp_ns:
         contacts = feet[1]
     return SensorReadings(stamp_ns, position, velocity, effort, rate, force, contacts)
-
-
-def _stamped(read: Callable[[Any], Any]) -> Callable[[Imu | JointState], tuple[int, Any]]:
-    """Keep the stamp with what is read, so that old readings are told from new ones."""
-    return lambda message: (header_ns(message), read(message))
-
-

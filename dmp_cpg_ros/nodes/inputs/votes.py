@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -24,10 +25,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import TickParameters
 from dmp_cpg_ros.nodes.framework.gaits import description_of
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.framework.ticks import TickInputs
 from dmp_cpg_ros.nodes.messages.conversions import read_votes
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, read_imu
-from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.nodes.messages.values import stamped
 
 CONTACTS, IMU = 'foot_contacts', 'imu'
 
@@ -44,35 +44,22 @@ class NodeVotes:
 
     Attributes
     ----------
-    inputs : tuple of str
-        Sensors that belong to a tick; in real time it does not wait for them.
+    readers : mapping of str to callable
+        How to read the sensors that belong to a tick; in real time it does not wait for them.
     """
 
     def __init__(self, node: SuiteNode, network: GaitNetwork) -> None:
         """Compute the clamp."""
-        self._node, self._contacts = node, FootContactsReader(strict=False)
+        self._node = node
         self._weight, self.inbox = description_of(node).mass * GRAVITY, VoteInbox()
         self.follow()
         self._state = self.voting.initial_state(network)
-        self.inputs: tuple[str, ...] = (CONTACTS, IMU) if self.voting.voting.voting else ()
-
-    def listen(self, ticks: TickInputs) -> None:
-        """Listen to the sensors of the ticks, and to votes from outside."""
-        if not self.inputs:
-            return
-        box, node = self.inbox, self._node
-
-        def contacts(message: Any) -> None:
-            stamp_ns = header_ns(message)
-            ticks.add(CONTACTS, stamp_ns, (stamp_ns, self._contacts.read(message)))
-
-        def imu(message: Any) -> None:
-            stamp_ns = header_ns(message)
-            ticks.add(IMU, stamp_ns, (stamp_ns, *read_imu(message)))
-
-        node.listen(CONTACTS, contacts)
-        node.listen(IMU, imu)
-        node.listen('votes', lambda message: box.accept(*read_votes(message)), command=True)
+        self.readers: dict[str, Callable[[Any], Any]] = {}
+        if self.voting.voting.voting:
+            contacts = FootContactsReader(strict=False)
+            self.readers = {CONTACTS: stamped(contacts.read), IMU: stamped(read_imu)}
+            node.listen(
+                'votes', lambda message: self.inbox.accept(*read_votes(message)), command=True)
 
     def follow(self) -> None:
         """Take over changed parameters."""
@@ -101,7 +88,7 @@ class NodeVotes:
         """
         nothing = np.full(3, np.nan)
         contact_ns, load = values.get(CONTACTS) or (stamp_ns, np.full(len(LEGS), np.nan))
-        imu_ns, rate, force = values.get(IMU) or (stamp_ns, nothing, nothing)
+        imu_ns, (rate, force) = values.get(IMU) or (stamp_ns, (nothing, nothing))
         sensors = VoteSensors(contact_ns, imu_ns, load, rate, force)
         x, r = values['canonical_state'][0], values['reference']
         self._state = self.voting.step(self._state, stamp_ns, network, sensors, x, r,
@@ -124,7 +111,7 @@ class NodeVotes:
 
     def told(self, state: SupervisorState) -> dict[str, Any]:
         """Values of ``inhibition_state`` about the votes."""
-        if not self.inputs:
+        if not self.readers:
             return {}
         tally = state.tally
         values: dict[str, Any] = {

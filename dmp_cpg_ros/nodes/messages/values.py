@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,11 @@ def header_ns(message: Any) -> int:
     """Stamp of a message's header [ns]; raises DataError when it is not valid."""
     known: int | None = getattr(message, 'stamp_ns', None)  # of what was read from bytes
     return stamp_ns(message.header.stamp) if known is None else known
+
+
+def stamped(read: Callable[[Any], Any]) -> Callable[[Any], tuple[int, Any]]:
+    """Return a reader that keeps the stamp too, so that old readings are told from new ones."""
+    return lambda message: (header_ns(message), read(message))
 
 
 def frame_of(message: Any) -> str:
