@@ -43,7 +43,7 @@ from test_executables import NAMES, NODES
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import LARGEST_FORCE
-from dmp_cpg_ros.nodes.framework.gaits import follow_gait
+from dmp_cpg_ros.nodes.framework.gaits import follow_gait, known_gaits
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.conversions import read_push_force
