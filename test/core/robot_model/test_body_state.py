@@ -124,7 +124,8 @@ def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros:
         publishers['joint_states'].publish(writer.joint_states.serialized)
         publishers['reference'].publish(reference.fill(time_ns, np.zeros(3)).serialized)
         publishers['canonical_state'].publish(
-            canonical.fill(time_ns, oscillators.locked_state(), np.zeros((4, 2)), oscillators.gait).serialized)
+            canonical.fill(time_ns, oscillators.locked_state(), np.zeros((4, 2)),
+                           oscillators.gait).serialized)
         return True
 
     def told_problems() -> str:
