@@ -18,7 +18,6 @@ from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
 from dmp_cpg_ros.core.suite_parameters import (
-    CANONICAL,
     PART_OF,
     GaitParameters,
     RobotFileParameters,
@@ -29,7 +28,7 @@ from dmp_cpg_ros.core.suite_parameters import (
 )
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.primitive_files import load_motion
-from dmp_cpg_ros.suite_table import KINDS, LEG, ROBOT, WALKING
+from dmp_cpg_ros.suite_table import CANONICAL, KINDS, LEG, ROBOT, WALKING
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
+from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.canonical.phase import phase
-from dmp_cpg_ros.core.modes.command import BALANCED
 
 Array = NDArray[np.float64]
 
@@ -96,10 +96,10 @@ def within(time: Array, intervals: list[tuple[float, float]]) -> NDArray[np.bool
 
 def changing_intervals(recording: Recording) -> list[tuple[float, float]]:
     """Intervals in which gaits changed [s]."""
-    frames, time = recording.canonical.frame, recording.canonical.time
-    if not frames:
+    gaits, time = recording.canonical.gaits, recording.canonical.time
+    if not gaits:
         return []
-    changing = np.array(['>' in frame for frame in frames])
+    changing = np.array([bool(gait.after) for gait in gaits])
     return [(float(time[first]), float(time[min(past, len(time) - 1)]))
             for first, past in stretches(changing)]
 

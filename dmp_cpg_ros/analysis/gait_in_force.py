@@ -14,7 +14,7 @@ from dmp_cpg_ros.analysis.motion import held
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.transformation.leg import body_scale
 
@@ -44,15 +44,16 @@ def gait_rows(recording: Recording, context: RunContext) -> list[GaitRow] | None
     the context.
     """
     count = len(recording.canonical.time)
-    frames = recording.canonical.frame or ('',) * count
     if context.gait is None or not count:
         return None
-    reader = GaitReader({**context.gaits, context.gait.name: context.gait}, unnamed=context.gait)
-    borders = [0, *(k for k in range(1, count) if frames[k] != frames[k - 1]), count]
+    shares = recording.canonical.gaits or (shares_of(context.gait),) * count
+    known = KnownGaits({**context.gaits, context.gait.name: context.gait})
+    borders = [0, *(k for k in range(1, count) if shares[k] != shares[k - 1]), count]
     try:
         return [
-            GaitRow(slice(first, past), reader.read(frames[first]))
-            for first, past in zip(borders, borders[1:], strict=False)]
+            GaitRow(slice(first, past), known.in_force(shares[first]))
+            for first, past in zip(borders, borders[1:], strict=False)
+        ]
     except DataError:
         return None
 
@@ -94,5 +95,5 @@ def planned_stance(recording: Recording, context: RunContext) -> tuple[NDArray[n
 
 def gaits_walked(recording: Recording) -> list[str]:
     """Names of the gaits in force, each time one takes over; empty in old recordings."""
-    frames = [frame for frame in recording.canonical.frame if frame and '>' not in frame]
-    return [name for k, name in enumerate(frames) if k == 0 or name != frames[k - 1]]
+    names = [gait.before for gait in recording.canonical.gaits if not gait.after]
+    return [name for k, name in enumerate(names) if k == 0 or name != names[k - 1]]

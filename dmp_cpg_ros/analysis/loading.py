@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +26,15 @@ from dmp_cpg_ros.analysis.recording import (
     WorkSeries,
 )
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
-from dmp_cpg_ros.layouts import CANONICAL_NAMES
+from dmp_cpg_ros.layouts import (
+    CADENCE_ROW,
+    GAIT_PREFIX,
+    MODE_ROWS,
+    OSCILLATOR_ROWS,
+    read_gait_rows,
+)
 
 Array = NDArray[np.float64]
 Pairs = list[tuple[int, int]]
@@ -147,7 +154,7 @@ class _Collector:
             estimate=OdometrySeries(*self._stacked('estimated_odom', (3, 4, 3, 3))),
             feet=self._feet(),
             inhibition=self._changes('inhibition_state'),
-            modes=self._changes('body_mode'),
+            modes=self._modes(),
             statuses={name: tuple(history)
                       for name, history in self._statuses['diagnostics'].items()},
             arrivals=self._arrivals(),
@@ -164,11 +171,31 @@ class _Collector:
 
     def _canonical(self) -> CanonicalSeries:
         named = self._named['canonical_state']
-        time, values = named.table(CANONICAL_NAMES)
+        time, values = named.table(OSCILLATOR_ROWS)
         x, x_dot = (values[name].reshape(-1, len(LEGS), 2) for name in FIELDS[:2])
-        frames = tuple(frame for _, frame in sorted(named.frames.items()))
-        return CanonicalSeries(
-            time, x, x_dot, frames if len(frames) == len(time) and any(frames) else ())
+        gaits = self._gaits()
+        return CanonicalSeries(time, x, x_dot, gaits if len(gaits) == len(time) else ())
+
+    def _gaits(self) -> tuple[GaitShares, ...]:
+        """Gait in force of each canonical state, in the order of the stamps."""
+        named = self._named['canonical_state']
+        rows = [name for name in named.names if name.startswith(GAIT_PREFIX)]
+        if not rows:
+            texts = [text for _, text in sorted(named.frames.items())]
+            return tuple(map(_former_gait, texts)) if all(texts) else ()
+        _, values = named.table([*rows, CADENCE_ROW])
+        position, velocity = (values[name].tolist() for name in FIELDS[:2])
+        return tuple(read_gait_rows(rows, *row) for row in zip(position, velocity, strict=True))
+
+    def _modes(self) -> tuple[StatusEvent, ...]:
+        """When which mode of the body began."""
+        time, values = self._named['posture_feedback'].table(MODE_ROWS)
+        if not time.size:  # a recording from before modes were states
+            return self._changes('body_mode')
+        modes = values['position'].argmax(axis=1)
+        first = np.flatnonzero(np.diff(modes, prepend=-1))
+        return tuple(StatusEvent(float(time[k]), 0, MODE_ROWS[modes[k]].partition('/')[2], {})
+                     for k in first)
 
     def _feet(self) -> FootForceSeries:
         time, values = self._named['foot_contacts'].table(LEGS)
@@ -231,6 +258,21 @@ def _robot_clock(bag_ns: list[int], clock: Pairs) -> list[int]:
     return [stamps[max(index, 0)] for index in before]
 
 
+@cache
+def _former_gait(text: str) -> GaitShares:
+    """Gait in force by the text that former recordings have: ``trot *1.25``, or
+    ``amble>trot 0.35 0.61``.
+    """
+    gait, _, factor = text.partition(' *')
+    names, *numbers = gait.split(' ')
+    before, _, after = names.partition('>')
+    try:
+        share, rate = map(float, numbers) if after else (0.0, 0.0)
+        return GaitShares(before, after, share, rate, float(factor or 1.0))
+    except ValueError as error:
+        raise DataError(f"gait '{text}' of a canonical state cannot be read: {error}") from None
+
+
 class _NamedValues:
     """Collects JointState messages and lays them out as one table: columns by name, rows by stamp.
 
@@ -241,6 +283,7 @@ class _NamedValues:
     def __init__(self) -> None:
         self._messages: dict[tuple[str, ...], tuple[list[int], list[Any]]] = defaultdict(
             lambda: ([], []))
+        self.names: dict[str, None] = {}  # in the order of their first message
         self.arrivals: Pairs = []  # bag time, stamp [ns]
         self.frames: dict[int, str] = {}  # by stamp [ns]
 
@@ -249,7 +292,10 @@ class _NamedValues:
         stamp = stamp_ns(message.header.stamp)
         self.arrivals.append((bag_ns, stamp))
         self.frames[stamp] = message.header.frame_id
-        stamps, messages = self._messages[tuple(message.name)]
+        names = tuple(message.name)
+        if names not in self._messages:
+            self.names.update(dict.fromkeys(names))
+        stamps, messages = self._messages[names]
         stamps.append(stamp)
         messages.append(message)
 

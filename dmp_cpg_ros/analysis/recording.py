@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
 Array = NDArray[np.float64]
@@ -87,14 +88,13 @@ class CanonicalSeries(Series):
     ----------
     x, x_dot : ndarray (n, 4, 2)
         States and their time derivatives [1/s].
-    frame : tuple of str
-        Gait in which the phases are to be read, one per state
-        (:mod:`~dmp_cpg_ros.core.gait.gait_reader`); empty where it was not recorded.
+    gaits : tuple of GaitShares
+        Gait in which the phases are to be read, one per state; empty where it was not recorded.
     """
 
     x: Array = no_rows(N_LEGS, 2)
     x_dot: Array = no_rows(N_LEGS, 2)
-    frame: tuple[str, ...] = ()
+    gaits: tuple[GaitShares, ...] = ()
 
 
 @dataclass(frozen=True)

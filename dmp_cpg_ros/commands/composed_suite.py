@@ -8,9 +8,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from importlib import import_module
 
-from dmp_cpg_ros.nodes.executors import run_nodes
-from dmp_cpg_ros.nodes.local_delivery import LocalDelivery
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
+from dmp_cpg_ros.nodes.framework.execution import run_nodes
+from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.suite_table import WALKING
 
 
@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
 
-    def make() -> Iterator[ManagedNode]:
+    def make() -> Iterator[SuiteNode]:
         local = LocalDelivery([kind.name for kind in WALKING])
         for kind in WALKING:
             node_class = getattr(import_module(kind.module), kind.class_name)

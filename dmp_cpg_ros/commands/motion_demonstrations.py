@@ -77,7 +77,7 @@ def read_motion(
     run = (bag if bag.is_dir() else bag.parent).parent
     joints = recording.targets if topic == 'joint_targets' else recording.joints
     canonical = recording.canonical
-    walked = next((frame for frame in canonical.frame if frame and '>' not in frame), 'amble')
+    walked = next((gait.before for gait in canonical.gaits if not gait.after), 'amble')
     parameters = read_json(run / 'manifest.json').get('parameters') or {'gait': walked}
     context, _ = run_context(parameters, robot_file)
     rows, at, attitude = common_rows(joints.time, canonical.time, recording.odometry.time)

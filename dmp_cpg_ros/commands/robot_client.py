@@ -32,9 +32,9 @@ from dmp_cpg_ros.commands.suite_client import (
 )
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
-from dmp_cpg_ros.nodes.interfaces import INTERFACES, TOPICS, interface
-from dmp_cpg_ros.nodes.middleware import prepare_middleware
-from dmp_cpg_ros.nodes.ros_parameters import plain
+from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.framework.parameters import plain
+from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130

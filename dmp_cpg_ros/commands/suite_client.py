@@ -18,7 +18,7 @@ from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.nodes.interfaces import STAMPED_CMD_VEL, Interface, interface
+from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, Interface, interface
 
 ASK_AGAIN_S = 0.3
 """Time after which a request that may be repeated is repeated [s]."""

@@ -29,11 +29,10 @@ from std_srvs.srv import Trigger
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.nodes.claims import AlreadyRunningError, already_running, claim, claimed
-from dmp_cpg_ros.nodes.executors import make_executor
-from dmp_cpg_ros.nodes.lying_down import LyingDown
-from dmp_cpg_ros.nodes.middleware import prepare_middleware
-from dmp_cpg_ros.nodes.readiness import Intervals, ReadinessOfOthers
+from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, already_running, claim, claimed
+from dmp_cpg_ros.nodes.framework.execution import make_executor, prepare_middleware
+from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers
+from dmp_cpg_ros.nodes.scenario.lying_down import LyingDown
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, WALKING_NODES, instances
 

@@ -18,8 +18,9 @@ from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, VelocityCommand
-from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
-from dmp_cpg_ros.nodes.interfaces import interface
+from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader
+from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 
 STEPS = {'w': (0.1, 0.0), 's': (-0.1, 0.0), 'a': (0.0, 0.2), 'd': (0.0, -0.2)}
 """Change of v_x [m/s] and of the yaw rate [rad/s] by one press of a key."""
@@ -52,12 +53,17 @@ class Teleop:
 
     def __init__(self, client: SuiteClient) -> None:
         """Create clients, and listen to the state of the stop."""
-        node, state, inhibit = client.node, interface('inhibition_state'), interface('inhibit')
+        node, inhibit, gains = client.node, interface('inhibit'), InhibitionGainsReader()
         self.velocity = (0.0, 0.0, 0.0)
         self._word, self._requested, self._shown = '', False, ''
         self._inhibit = node.create_client(inhibit.type, inhibit.name)
         self._modes = {key: node.create_client(Trigger, name) for key, name in MODES.items()}
-        node.create_subscription(state.type, state.name, self._on_state, state.reader_qos)
+        for name, callback in (
+            ('inhibition_state', self._on_state),
+            ('inhibition_gains', lambda message: self._on_gains(gains.read(message).requested)),
+        ):
+            topic = interface(name)
+            node.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
         client.meet((*inhibit.publishers, *interface('stand_up').publishers),
                     self._inhibit, *self._modes.values())
 
@@ -84,8 +90,10 @@ class Teleop:
             print(f'\r\x1b[K{line}', end='', flush=True)
 
     def _on_state(self, message: Any) -> None:
-        state = read_inhibition_state(message)
-        self._word, self._requested = state.word, state.flag('requested')
+        self._word = read_state_word(message)
+
+    def _on_gains(self, requested: bool) -> None:
+        self._requested = requested
 
     def _answered(self, future: Future) -> None:
         answer = future.result()

@@ -27,9 +27,10 @@ from dmp_cpg_ros.core.gait.choice import highest_speed
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
+from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.voters import vote_sensors
@@ -72,8 +73,8 @@ class Tick:
         Of all twelve joints.
     mode : ModeState
         What the body does.
-    gait : str
-        Word of the gait in which the phases are to be read, as in ``canonical_state``.
+    gait : Gait or BlendedGait
+        In which the phases are to be read.
     """
 
     time_ns: int
@@ -84,7 +85,7 @@ class Tick:
     feedback: PostureFeedback
     targets: JointTargets
     mode: ModeState
-    gait: str = ''
+    gait: GaitInForce
 
 
 class WalkingLoop:
@@ -108,7 +109,7 @@ class WalkingLoop:
     ) -> None:
         """Build the parts at rest (or free, with ``start_inhibited`` false)."""
         self.parameters = p = parameters or SuiteParameters()
-        self._reader = reader = GaitReader({**(gaits or {}), gait.name: gait}, unnamed=gait)
+        self._reader = reader = KnownGaits({**(gaits or {}), gait.name: gait})
         scale, legs = body_scale(description), RobotLegs(description)
         self._weight = description.mass * GRAVITY
         self.gate = CommandGate(
@@ -171,7 +172,7 @@ class WalkingLoop:
         self.inhibition = self.supervisor.inhibition(self.stop)
         targets = self._joint_targets(state, x_dot, feedback, dt)
         return Tick(
-            state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait.word)
+            state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait)
 
     def _joint_targets(
         self, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,

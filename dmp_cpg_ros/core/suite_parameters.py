@@ -216,10 +216,10 @@ UNCERTIFIED_VOTES = ('vote_fade', 'vote_resume')
 """Parameters of the counting of votes that no inequality depends on."""
 
 PART_OF: dict[str, tuple[type[Parameters], ...]] = {
-    'reference_filter': (ReferenceParameters,),
-    'canonical_oscillators': (CanonicalParameters, GaitChangeParameters, GaitChoiceParameters),
+    REFERENCE: (ReferenceParameters,),
+    CANONICAL: (CanonicalParameters, GaitChangeParameters, GaitChoiceParameters),
     'leg_transformation': (LegParameters,),
-    'inhibition': (InhibitionParameters, VotingParameters, VoteSourceParameters),
+    INHIBITION: (InhibitionParameters, VotingParameters, VoteSourceParameters),
     'posture_control': (
         PostureParameters, EstimationParameters, StateSourceParameters, ModeParameters,
     ),

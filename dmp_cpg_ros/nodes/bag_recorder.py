@@ -18,11 +18,11 @@ from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.nodes.bag_writing import STORAGES, BagWriter, RecordingError
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.interfaces import RECORDED, STAMPED_CMD_VEL, Interface
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.tick_inputs import drain
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.framework.ticks import drain
+from dmp_cpg_ros.nodes.messages.interfaces import RECORDED, STAMPED_CMD_VEL, Interface
+from dmp_cpg_ros.nodes.recording.bag_writing import STORAGES, BagWriter, RecordingError
 from dmp_cpg_ros.suite_table import RECORDER
 
 ALL = 'all'
@@ -50,7 +50,7 @@ class RecorderParameters(Parameters):
     stamped_cmd_vel: bool = parameter(False, 'whether cmd_vel is TwistStamped')
 
 
-class BagRecorder(ManagedNode):
+class BagRecorder(SuiteNode):
     """Records the suite's topics into a rosbag2 folder (MCAP or SQLite), bytes as received.
 
     It records while it is active. The bag is opened when the node is configured and completed when

@@ -7,7 +7,7 @@ the region C.
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import nan
 from typing import Any
 
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import (
-    Inhibition,
     InhibitionParameters,
     initial_inhibition,
 )
@@ -25,23 +24,29 @@ from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
-from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
     CANONICAL,
     CertificateParameters,
     GaitParameters,
 )
-from dmp_cpg_ros.nodes.certified_node import CertifiedNode
-from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, read_reference
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_changes import check_gait
-from dmp_cpg_ros.nodes.gait_setup import certificate_words, description_of, gait_name
-from dmp_cpg_ros.nodes.inhibition_messages import InhibitionMessage, read_inhibition_state
-from dmp_cpg_ros.nodes.message_values import header_ns
-from dmp_cpg_ros.nodes.parameterized_node import Sets
-from dmp_cpg_ros.nodes.robot_state_messages import FootContactsReader
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.certified import CertifiedNode
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.gaits import (
+    certificate_words,
+    check_gait,
+    description_of,
+    gait_name,
+)
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.suite_node import Sets
+from dmp_cpg_ros.nodes.messages.conversions import (
+    CanonicalStateWriter,
+    InhibitionGainsReader,
+    read_reference,
+)
+from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader
+from dmp_cpg_ros.nodes.messages.values import stamped
 from dmp_cpg_ros.suite_table import KINDS
 
 Array = NDArray[np.float64]
@@ -64,29 +69,18 @@ class CanonicalOscillators(CertifiedNode):
         self._inhibition = initial_inhibition(inhibition)
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
-        self._writer, self._publisher = CanonicalStateWriter(), self.publisher('canonical_state')
-        contacts = self._read_contacts()
-        self._ticks = self.match(
+        self._writer = CanonicalStateWriter(tuple(self.gaits.gaits))
+        self._publisher = self.publisher('canonical_state')
+        contacts = self._contact_readers()
+        self.match(
             ('reference', *contacts),
             'reference',
-            optional=contacts,
-            delayed=('inhibition_state',),
+            optional=tuple(contacts),
+            delayed=('inhibition_gains',),
             lock_step=self.parameters_of(LockStepParameters).lock_step,
         )
-        self.listen(
-            'reference',
-            lambda message: self._ticks.add(
-                'reference', header_ns(message), read_reference(message)
-            ),
-        )
-        self.listen(
-            'inhibition_state',
-            lambda message: self._ticks.add(
-                'inhibition_state',
-                header_ns(message),
-                inhibition_from(read_inhibition_state(message)),
-            ),
-        )
+        self.feed({'reference': read_reference,
+                   'inhibition_gains': InhibitionGainsReader().read, **contacts})
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
@@ -113,13 +107,14 @@ class CanonicalOscillators(CertifiedNode):
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the oscillators to the stamp of the reference."""
         dt = self.elapsed
-        self._inhibition = values['inhibition_state'] or self._inhibition
+        self._inhibition = values['inhibition_gains'] or self._inhibition
         r = values['reference']
         self._state = state = self._canonical.step(
             self._state, r, self._inhibition, dt, self._foot_force(stamp_ns, values),
             self.certificate.contact)
         self._publisher.publish(
-            self._writer.fill(stamp_ns, state.x, state.x_dot, state.gait.word))
+            self._writer.fill(stamp_ns, state.x, state.x_dot, state.gait,
+                              self._canonical.cadence_rate(state)))
         self._watch_phases(self._canonical.network(state.gait), r, dt)
 
     def _watch_phases(self, network: GaitNetwork, r: Any, dt: float) -> None:
@@ -136,18 +131,11 @@ class CanonicalOscillators(CertifiedNode):
         elif self._lock.level == LOCKED != former:
             self.clear('phase_lock')
 
-    def _read_contacts(self) -> tuple[str, ...]:
-        """Listen to the feet where they are fed back; returns the topics."""
+    def _contact_readers(self) -> dict[str, Callable[[Any], Any]]:
+        """How to read the feet, where they are fed back."""
         if not self.parameters_of(CanonicalParameters).contact_feedback:
-            return ()
-        reader = FootContactsReader(strict=False)
-        self.listen(
-            'foot_contacts',
-            lambda message: self._ticks.add(
-                'foot_contacts', header_ns(message), (header_ns(message), reader.read(message))
-            ),
-        )
-        return ('foot_contacts',)
+            return {}
+        return {'foot_contacts': stamped(FootContactsReader(strict=False).read)}
 
     @staticmethod
     def _foot_force(stamp_ns: int, values: dict[str, Any]) -> Array:
@@ -170,26 +158,12 @@ class CanonicalOscillators(CertifiedNode):
         return {
             'phase_error_rad': nan if self._lock is None else self._lock.error,
             'phase_error_bound_rad': nan if self._lock is None else self._lock.bound,
-            'gait': self._state.gait.word,
+            'gait': self._state.gait.name,
+            'cadence_scale': self._state.cadence_scale,
             'gait_wanted': self._state.wanted.name,
             'highest_speed': self._canonical.network(self._state.gait).highest_speed,
             'certificate': certificate_words(self.certificate),
         }
-
-
-def inhibition_from(message: InhibitionMessage) -> Inhibition:
-    """Inhibition that ``inhibition_state`` announces; raises DataError for numbers that no
-    parameters allow.
-    """
-    largest_gain = range_of(InhibitionParameters, 'inhibition_gain')[1]
-    largest_gain *= range_of(InhibitionParameters, 'vote_limit')[1]
-    gains = np.array([message.number(f'gain_{leg}', 0.0, largest_gain) for leg in LEGS])
-    return Inhibition(
-        message.flag('requested'),
-        gains,
-        message.number('region_radius', *range_of(InhibitionParameters, 'region_radius')),
-        message.word == 'at_rest',
-    )
 
 
 def main() -> int:

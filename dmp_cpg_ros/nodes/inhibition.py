@@ -24,15 +24,18 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
 )
 from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
-from dmp_cpg_ros.nodes.certified_node import CertifiedNode
-from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import certificate_words
-from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
-from dmp_cpg_ros.nodes.inhibition_votes import NodeVotes
-from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.certified import CertifiedNode
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.gaits import certificate_words, gait_name
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.inputs.votes import NodeVotes
+from dmp_cpg_ros.nodes.messages.conversions import (
+    CanonicalStateReader,
+    CommandReader,
+    InhibitionGainsWriter,
+    read_reference,
+)
+from dmp_cpg_ros.nodes.messages.inhibition_state import InhibitionStateWriter
 from dmp_cpg_ros.suite_table import KINDS
 
 
@@ -50,7 +53,7 @@ class InhibitionNode(CertifiedNode):
         self.prepare_certificate()
         gaits = self.gaits
         self._running_gait = self.new_running()
-        self._network = self._running_gait.network(gaits.read(''))
+        self._network = self._running_gait.network(gaits.named(gait_name(self)))
         self._supervisor = self._new_supervisor()
         self._gate = self.new_gate()
         self._reference = ReferenceSystem(self.parameters_of(ReferenceParameters))
@@ -62,38 +65,25 @@ class InhibitionNode(CertifiedNode):
         self._told: tuple[Any, ...] = ()
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = InhibitionStateWriter(), self.publisher('inhibition_state')
+        self._gains_writer = InhibitionGainsWriter()
+        self._gains_publisher = self.publisher('inhibition_gains')
         self._votes = NodeVotes(self, self._network)
         self._body_mode = 'standing'
-        inputs = ('canonical_state', 'reference', *self._votes.inputs)
-        self._ticks = self.match(
-            (*inputs, 'body_mode') if self._lock_step else inputs,
+        inputs = ('canonical_state', 'reference', *self._votes.readers)
+        self.match(
+            (*inputs, 'posture_feedback') if self._lock_step else inputs,
             'canonical_state',
-            delayed=() if self._lock_step else ('body_mode',),
-            optional=self._votes.inputs,
+            delayed=() if self._lock_step else ('posture_feedback',),
+            optional=tuple(self._votes.readers),
             lock_step=self._lock_step,
         )
-        self.listen(
-            'body_mode',
-            lambda message: self._ticks.add(
-                'body_mode', header_ns(message), read_body_mode(message)
-            ),
-        )
-        self._votes.listen(self._ticks)
-        canonical = CanonicalStateReader()
-        self.listen(
-            'canonical_state',
-            lambda message: self._ticks.add(
-                'canonical_state',
-                header_ns(message),
-                (*canonical.read(message), gaits.read(frame_of(message))),
-            ),
-        )
-        self.listen(
-            'reference',
-            lambda message: self._ticks.add(
-                'reference', header_ns(message), read_reference(message)
-            ),
-        )
+        body = CommandReader()
+        self.feed({
+            'posture_feedback': lambda message: body.read(message).mode,
+            'canonical_state': CanonicalStateReader(gaits).read,
+            'reference': read_reference,
+            **self._votes.readers,
+        })
         self.listen_to_commands(self._gate)
         self.serve('inhibit', self._answer_inhibit)
 
@@ -101,6 +91,7 @@ class InhibitionNode(CertifiedNode):
         """Tell late joiners the state from the start; in lock-step the first tick does."""
         if not self._lock_step:
             self._publish()
+            self._publish_gains()
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
@@ -122,7 +113,7 @@ class InhibitionNode(CertifiedNode):
         self._r = values['reference']
         self._network = network = self._running_gait.network(gait)
         before = self._state
-        self._body_mode = values['body_mode'] or self._body_mode
+        self._body_mode = values['posture_feedback'] or self._body_mode
         tally = self._votes.count(stamp_ns, values, network, before.word)
         self._state = self._supervisor.step(
             before,
@@ -138,8 +129,11 @@ class InhibitionNode(CertifiedNode):
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
             self._predict(self._acting)
-        if self._lock_step or self._news() != self._told:
+        news = self._news() != self._told
+        if news:
             self._publish()
+        if news or self._lock_step:
+            self._publish_gains()
 
     def _certificate_in_force(self) -> Certificate:
         return self.certificate_in(self._network.gait)
@@ -223,6 +217,10 @@ class InhibitionNode(CertifiedNode):
         )
         if self._state.voted:
             self._bound = self._votes.bound(self._supervisor, self._network, self._state)
+
+    def _publish_gains(self) -> None:
+        self._gains_publisher.publish(
+            self._gains_writer.fill(self._state.time_ns, self._acting))
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,18 +15,17 @@ from dmp_cpg_ros.core.modes.motion_library import Movements
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.core.suite_parameters import LegChoice
 from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.nodes.conversions import (
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
     JointTargetsWriter,
     PostureFeedbackReader,
     read_reference,
 )
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, gait_reader
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
-from dmp_cpg_ros.nodes.robot_state_messages import JointsReader
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.messages.robot_state import JointsReader
 from dmp_cpg_ros.primitive_files import load_motion
 from dmp_cpg_ros.suite_table import KINDS, LEG
 
@@ -34,7 +33,7 @@ NO_JOINTS = (np.full(len(JOINT_NAMES), np.nan),) * 3
 """Measured joints where they are not read."""
 
 
-class LegTransformation(ManagedNode):
+class LegTransformation(SuiteNode):
     """Turns a leg's oscillator state and the reference into targets of its joints."""
 
     KIND = LEG
@@ -52,45 +51,21 @@ class LegTransformation(ManagedNode):
     def configure(self) -> None:
         """Build the leg's primitive and its topics."""
         leg, parameters = self.parameters_of(LegChoice).leg, self.parameters_of(LegParameters)
-        gaits, description = gait_reader(self), description_of(self)
+        gaits, description = known_gaits(self), description_of(self)
         self._leg = LegControl(
             leg, description, parameters, Movements(description), load_motion(parameters.motion))
         self._state = self._leg.initial_state()
         self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
-        inputs = ['canonical_state', 'reference', 'posture_feedback']
-        canonical, feedback = CanonicalStateReader(), PostureFeedbackReader()
-        self.listen(
-            'canonical_state',
-            lambda message: self._ticks.add(
-                'canonical_state',
-                header_ns(message),
-                (*canonical.read(message), gaits.read(frame_of(message))),
-            ),
-        )
-        self.listen(
-            'reference',
-            lambda message: self._ticks.add(
-                'reference', header_ns(message), read_reference(message)
-            ),
-        )
-        self.listen(
-            'posture_feedback',
-            lambda message: self._ticks.add(
-                'posture_feedback', header_ns(message), feedback.read(message)
-            ),
-        )
+        readers: dict[str, Callable[[Any], Any]] = {
+            'canonical_state': CanonicalStateReader(gaits).read,
+            'reference': read_reference,
+            'posture_feedback': PostureFeedbackReader().read,
+        }
         if parameters.reading == 'torque':
-            joints = JointsReader()
-            inputs.append('joint_states')
-            self.listen(
-                'joint_states',
-                lambda message: self._ticks.add(
-                    'joint_states', header_ns(message), joints.read(message)
-                ),
-            )
-        self._ticks = self.match(
-            inputs, 'canonical_state', lock_step=self.parameters_of(LockStepParameters).lock_step
-        )
+            readers['joint_states'] = JointsReader().read
+        self.match(tuple(readers), 'canonical_state',
+                   lock_step=self.parameters_of(LockStepParameters).lock_step)
+        self.feed(readers)
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the leg to the stamp of the canonical state."""

@@ -17,10 +17,10 @@ from rclpy.clock_type import ClockType
 from rosgraph_msgs.msg import Clock as ClockMessage
 
 from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingSwitch
-from dmp_cpg_ros.core.modes.command import BALANCED
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
@@ -32,16 +32,18 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
     chosen_world,
 )
-from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
-from dmp_cpg_ros.nodes.conversions import JointTargetsReader, read_push_force
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.interfaces import BODY_TOPICS, Interface
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
-from dmp_cpg_ros.nodes.readiness import Intervals, ReadinessOfOthers
-from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
-from dmp_cpg_ros.nodes.robot_timing import RobotTiming
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters, NodeParameters
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers, RobotTiming
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters, NodeParameters
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.messages.conversions import (
+    JointTargetsReader,
+    read_body_mode,
+    read_push_force,
+)
+from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS, Interface
+from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
+from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
 from dmp_cpg_ros.robot.fallback import FallbackController
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
@@ -78,7 +80,7 @@ RETREATS = {
 """What the robot does by itself, in words."""
 
 
-class MujocoRobotNode(ManagedNode):
+class MujocoRobotNode(SuiteNode):
     """Publishes the robot's state at every control tick and moves its joints to their targets."""
 
     KIND = ROBOT

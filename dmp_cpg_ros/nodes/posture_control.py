@@ -8,6 +8,8 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from std_msgs.msg import String
+
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.modes.body_control import BodyControl
@@ -15,22 +17,20 @@ from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.nodes.body_mode_messages import BodyModeWriter
-from dmp_cpg_ros.nodes.body_state import BodyState
-from dmp_cpg_ros.nodes.conversions import (
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.inputs.body_state import BodyState
+from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
     PostureFeedbackWriter,
     read_reference,
 )
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import description_of, follow_gait, gait_reader
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
 from dmp_cpg_ros.suite_table import KINDS, POSTURE
 
 
-class PostureControl(ManagedNode):
+class PostureControl(SuiteNode):
     """Balances the body: torques for the stance legs, placement for the swinging feet.
 
     Decides its mode, too: stands it up, lays it down, notices a fall, brings it back.
@@ -45,7 +45,7 @@ class PostureControl(ManagedNode):
 
     def configure(self) -> None:
         """Build the controller and its topics."""
-        gaits, canonical = gait_reader(self), CanonicalStateReader()
+        canonical = CanonicalStateReader(known_gaits(self))
         description = description_of(self)
         legs = RobotLegs(description)
         self._body = BodyState(self, description, legs)
@@ -53,35 +53,25 @@ class PostureControl(ManagedNode):
             description, self.parameters_of(PostureParameters),
             self.parameters_of(ModeParameters), legs)
         self._state, self._told = self._control.initial_state(), ''
-        self._mode_writer, self._mode_publisher = BodyModeWriter(), self.publisher('body_mode')
-        self._lock_step = self.parameters_of(LockStepParameters).lock_step
+        self._mode_publisher = self.publisher('body_mode')
         self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
-        self._ticks = self.match(
+        self.match(
             (*self._body.inputs, 'reference', 'canonical_state'),
             'canonical_state',
             optional=self._body.optional,
-            lock_step=self._lock_step,
+            lock_step=self.parameters_of(LockStepParameters).lock_step,
         )
-        readers: dict[str, Callable[[Any], Any]] = {
+        self.feed({
             **self._body.readers,
             'reference': read_reference,
-            'canonical_state': lambda message: (
-                *canonical.read(message),
-                gaits.read(frame_of(message)),
-            ),
-        }
-        for name, read in readers.items():
-            self.listen(name, self._taking(name, read))
+            'canonical_state': canonical.read,
+        })
         for what in REQUESTS:
             self.serve(what, self._answering(what))
 
     def activate(self) -> None:
-        """Tell late joiners the mode from the start; in lock-step the first tick does."""
-        if not self._lock_step:
-            self._tell()
-
-    def _taking(self, name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
-        return lambda message: self._ticks.add(name, header_ns(message), read(message))
+        """Tell late joiners the mode from the start."""
+        self._tell()
 
     def on_parameters(self) -> None:
         """Take over the gains."""
@@ -96,8 +86,7 @@ class PostureControl(ManagedNode):
         self._state, feedback = self._control.step(
             self._state, state, gait, x, x_dot, values['reference'], self.elapsed)
         self._publisher.publish(self._writer.fill(stamp_ns, feedback))
-        if self._lock_step or self._state.mode.mode != self._told:
-            self._tell()
+        self._tell()
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """What the body does and why, and what the estimator found out."""
@@ -129,11 +118,11 @@ class PostureControl(ManagedNode):
         return answer
 
     def _tell(self) -> None:
-        """Publish the mode; a new one is logged, a fall is an error until it is over."""
-        self._mode_publisher.publish(self._mode_writer.fill(self._state.mode))
+        """Publish and log a new mode; a fall is an error until it is over."""
         mode, reason = self._state.mode.mode, self._state.mode.reason
         if mode == self._told:
             return
+        self._mode_publisher.publish(String(data=mode))
         if self._told:
             self.get_logger().info(f'{self._told} -> {mode}: {reason}')
         self._told = mode
@@ -141,6 +130,7 @@ class PostureControl(ManagedNode):
             self.warn('fell', f'{reason}; the joints are damped, call recover', error=True)
         elif mode in ('standing', 'lying'):
             self.clear('fell')
+        self.report()
 
 
 def main() -> int:

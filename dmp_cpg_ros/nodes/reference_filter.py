@@ -12,12 +12,10 @@ import numpy as np
 
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
-from dmp_cpg_ros.nodes.certified_node import CertifiedNode
-from dmp_cpg_ros.nodes.conversions import ReferenceWriter
-from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
-from dmp_cpg_ros.nodes.message_values import header_ns
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.certified import CertifiedNode
+from dmp_cpg_ros.nodes.framework.execution import run_node
+from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, ReferenceWriter
 from dmp_cpg_ros.suite_table import KINDS
 
 
@@ -36,24 +34,15 @@ class ReferenceFilter(CertifiedNode):
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
         self._r, self._requested = np.zeros(3), False
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
-        self._ticks = self.match(
+        self.match(
             ('joint_states',),
             'joint_states',
-            delayed=('inhibition_state',),
+            delayed=('inhibition_gains',),
             lock_step=self.parameters_of(LockStepParameters).lock_step,
         )
-        self.listen(
-            'joint_states',
-            lambda message: self._ticks.add('joint_states', header_ns(message), None),
-        )
-        self.listen(
-            'inhibition_state',
-            lambda message: self._ticks.add(
-                'inhibition_state',
-                header_ns(message),
-                read_inhibition_state(message).flag('requested'),
-            ),
-        )
+        gains = InhibitionGainsReader()
+        self.feed({'joint_states': lambda _: None,
+                   'inhibition_gains': lambda message: gains.read(message).requested})
         self.listen_to_commands(self._gate)
 
     def on_parameters(self) -> None:
@@ -64,7 +53,7 @@ class ReferenceFilter(CertifiedNode):
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
         dt = self.elapsed
-        command, self._requested = self._gate.at(stamp_ns), bool(values['inhibition_state'])
+        command, self._requested = self._gate.at(stamp_ns), bool(values['inhibition_gains'])
         r_ext = np.zeros(3) if self._requested else np.array(command)
         self._r = self._system.step(self._r, r_ext, dt)
         self._publisher.publish(self._writer.fill(stamp_ns, self._r))

@@ -13,6 +13,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import DmpCpgError
@@ -20,12 +21,12 @@ from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.scenario.events import Command
 from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.nodes.acknowledged_topic import AcknowledgedTopic
-from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
-from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
-from dmp_cpg_ros.nodes.interfaces import GATE_OWNER, interface
-from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp, stamp_ns
-from dmp_cpg_ros.nodes.parameter_setter import ParameterSetter
+from dmp_cpg_ros.nodes.framework.parameter_services import ParameterSetter
+from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
+from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
+from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
+from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.scenario.acknowledged_topic import AcknowledgedTopic
 
 FAR_NS = 2**31 * 10**9 - 1
 """A stamp later than every run [ns]."""
@@ -106,6 +107,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         for name, callback in (
             (f'{GATE_OWNER}/holding_at', self._on_holding),
             ('inhibition_state', self._on_inhibition),
+            ('inhibition_gains', self._on_gains),
             ('body_mode', self._on_body_mode),
             ('/clock', self._on_clock),
         ):
@@ -138,11 +140,14 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._continue()
 
     def _on_inhibition(self, message: DiagnosticArray) -> None:
-        self._inhibition_ns = header_ns(message)
-        word = read_inhibition_state(message).word
+        word = read_state_word(message)
         if word != self._word:
             self._word = word
-            self._say(self._inhibition_ns * 1e-9, word.replace('_', ' '))
+            self._say(header_ns(message) * 1e-9, word.replace('_', ' '))
+
+    def _on_gains(self, message: JointState) -> None:
+        """Note that the inhibition node, which is the last of a tick, has finished it."""
+        self._inhibition_ns = header_ns(message)
         if self._lock_step:
             self._continue()
 
@@ -205,8 +210,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._finish(self._pushes)
 
     def _vote(self, weights: dict[str, float]) -> None:
-        message = JointState(name=list(weights), effort=list(weights.values()))
-        message.header.frame_id = 'scenario'
+        message = JointState(
+            name=[f'scenario/{leg}' for leg in weights], effort=list(weights.values()))
         self._votes.send(message)
         self._finish(self._votes)
 
@@ -252,12 +257,12 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
         return ask
 
-    def _on_body_mode(self, message: DiagnosticArray) -> None:
+    def _on_body_mode(self, message: String) -> None:
         mode = read_body_mode(message)
         if mode != self.mode:
             known, self.mode = self.mode, mode
             if known or mode != 'standing':
-                self._say(header_ns(message) * 1e-9, mode)
+                self._say(self.time_ns * 1e-9, mode)
 
     def _set(self, values: dict[str, Any]) -> None:
         """Ask the owner for a change; the robot walks on when it is refused."""

@@ -1,6 +1,7 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the cost of the core: time steps, networks of growing size, the parts of one tick.
+"""Measures the cost of the core: time steps, networks of growing size, the parts of one tick,
+messages.
 
 Every row is the best of several repetitions and is also given as a ratio within the same run, for
 absolute times drift with the machine.
@@ -9,13 +10,20 @@ absolute times drift with the machine.
 from __future__ import annotations
 
 import sys
+import time
 import timeit
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import rclpy
+from geometry_msgs.msg import TwistStamped
 from numpy.typing import NDArray
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.typesys import Stores, get_typestore
+from sensor_msgs.msg import JointState
 
+from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph, Edges, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
@@ -25,6 +33,13 @@ from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.transformation.leg import LegFeedback
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
+from dmp_cpg_ros.nodes.messages.conversions import (
+    PostureFeedbackReader,
+    PostureFeedbackWriter,
+    ReferenceWriter,
+    read_reference,
+)
 from dmp_cpg_ros.paper.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
 from dmp_cpg_ros.paper.network import OscillatorNetwork
 from dmp_cpg_ros.paper.oscillators import HopfOscillators
@@ -68,6 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         'One time step of four coupled oscillators (ratio: to the first row)': steps_of_four(),
         'A time step per oscillator (ratio: to 1,000 oscillators)': steps_of_many(options.sizes),
         'The parts of one tick of the plain loop (ratio: to the whole tick)': parts_of_a_tick(),
+        'Messages of every tick (ratio: to the first row)': messages(),
     }
     for title, rows in tables.items():
         width = max(len(row.what) for row in rows)
@@ -146,6 +162,48 @@ def parts_of_a_tick() -> list[Row]:
             loop.supervisor, loop.reference, stopping, loop.inhibition, network, x, r, command,
             dt)),
     ])
+
+
+def messages() -> list[Row]:
+    """Reading and writing by the suite, rclpy and rosbags; and what one message more costs."""
+    writer, reader, feedback = PostureFeedbackWriter(), PostureFeedbackReader(), PostureFeedback(
+        np.ones(12), np.ones((4, 3)), np.ones((4, 2)), np.ones(3))
+    data, read = writer.fill(0, feedback).serialized, serialized_reader(JointState)
+    message, store = deserialize_message(data, JointState), get_typestore(Stores.ROS2_JAZZY)
+    kind, twist_kind = (f'{package}/msg/{name}' for package, name in (
+        ('sensor_msgs', 'JointState'), ('geometry_msgs', 'TwistStamped')))
+    other, r = store.deserialize_cdr(data, kind), np.ones(3)
+    twist_writer, read_twist = ReferenceWriter(), serialized_reader(TwistStamped)
+    twist = twist_writer.fill(0, r).serialized
+    with rclpy.context.Context() as context:
+        node = rclpy.create_node('bench', context=context, enable_rosout=False)
+        publisher = node.create_publisher(JointState, 'bench', 10)
+        ends = [node.create_subscription(JointState, 'bench', lambda _: None, 10, raw=True)
+                for _ in range(4)]
+        while publisher.get_subscription_count() < len(ends):
+            time.sleep(0.01)
+
+        def deliver() -> None:
+            publisher.publish(data)
+            for end in ends:
+                while end.handle.take_message(JointState, True) is None:
+                    pass
+
+        rows = _with_ratios([
+            ('read posture_feedback', lambda: reader.read(read(data))),
+            ('the same by rclpy', lambda: reader.read(deserialize_message(data, JointState))),
+            ('the same by rosbags, arrays only', lambda: store.deserialize_cdr(data, kind)),
+            ('write posture_feedback', lambda: writer.fill(0, feedback)),
+            ('the same by rclpy, filled already', lambda: serialize_message(message)),
+            ('the same by rosbags, filled already', lambda: store.serialize_cdr(other, kind)),
+            ('read reference', lambda: read_reference(read_twist(twist))),
+            ('the same by rclpy', lambda: read_reference(
+                deserialize_message(twist, TwistStamped))),
+            ('the same by rosbags', lambda: store.deserialize_cdr(twist, twist_kind)),
+            ('deliver one message to four readers', deliver),
+        ])
+        node.destroy_node()
+    return rows
 
 
 def seconds_of(what: Callable[[], object], repetitions: int = 7, least: float = 0.01) -> float:

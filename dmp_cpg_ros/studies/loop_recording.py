@@ -20,6 +20,7 @@ from dmp_cpg_ros.analysis.recording import (
     VelocitySeries,
     WorkSeries,
 )
+from dmp_cpg_ros.core.gait.known_gaits import shares_of
 from dmp_cpg_ros.core.loop import Tick
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
@@ -53,7 +54,7 @@ def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> Re
     targets = _columns([tick.targets for tick in ticks], 'position', 'velocity', 'effort')
     return replace(
         robot, targets=JointSeries(time, *targets),
-        canonical=CanonicalSeries(time, x, x_dot, tuple(tick.gait for tick in ticks)),
+        canonical=CanonicalSeries(time, x, x_dot, tuple(shares_of(tick.gait) for tick in ticks)),
         reference=VelocitySeries(time, r),
         inhibition=_changes(time, [(tick.supervisor.word, {}) for tick in ticks]),
         modes=_changes(time, [(tick.mode.mode, {'reason': tick.mode.reason}) for tick in ticks]))

@@ -61,7 +61,8 @@ class FreezingLoop(WalkingLoop):
             self.posture.balance, state, self.canon.gait, x, x_dot, self.r, dt)
         self.posture = replace(self.posture, balance=balance)
         targets = self._joint_targets(state, x_dot, feedback, dt)
-        return Tick(state.time_ns, self.r, x, x_dot, self.stop, feedback, targets, self.mode)
+        return Tick(state.time_ns, self.r, x, x_dot, self.stop, feedback, targets, self.mode,
+                    self.canon.gait)
 
     def _swinging(self) -> NDArray[np.bool_]:
         """Which legs are in the swing of their cycle, (4,)."""

@@ -26,6 +26,8 @@ from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.recording import JointSeries, Recording, StatusEvent
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.core.gait.known_gaits import GaitShares
+from dmp_cpg_ros.layouts import OSCILLATOR_ROWS
 
 SERIES = ('joints', 'targets', 'canonical', 'reference', 'odometry', 'estimate', 'feet')
 
@@ -115,6 +117,25 @@ def test_joint_values_go_by_name_and_missing_ones_are_nan(tmp_path: Path) -> Non
     assert joints.position[0, 11] == 3.0
     assert np.isnan(joints.position[0, 1:11]).all()
     assert np.isnan(joints.velocity).all()
+
+
+@pytest.mark.parametrize(('text', 'gait'), [
+    ('trot', GaitShares('trot')), ('trot *1.25', GaitShares('trot', cadence_scale=1.25)),
+    ('amble>trot 0.35 0.61 *0.9', GaitShares('amble', 'trot', 0.35, 0.61, 0.9)),
+])
+def test_gaits_of_former_recordings_are_read_from_their_text(
+        text: str, gait: GaitShares, tmp_path: Path) -> None:
+    with Writer(tmp_path / 'bag', version=9) as writer:
+        connection = writer.add_connection(
+            '/canonical_state', 'sensor_msgs/msg/JointState', typestore=STORE)
+        stamp = make('builtin_interfaces/msg/Time', sec=1, nanosec=0)
+        message = make(
+            'sensor_msgs/msg/JointState',
+            header=make('std_msgs/msg/Header', stamp=stamp, frame_id=text),
+            name=list(OSCILLATOR_ROWS), position=np.ones(8), velocity=np.ones(8),
+            effort=np.array([]))
+        writer.write(connection, 10**9, STORE.serialize_cdr(message, connection.msgtype))
+    assert load_recording(tmp_path / 'bag').canonical.gaits == (gait,)
 
 
 def test_the_legs_targets_are_merged_where_their_stamps_agree(

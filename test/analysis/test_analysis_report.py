@@ -29,6 +29,7 @@ from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 from dmp_cpg_ros.analysis.report_parts import flattened, label
 from dmp_cpg_ros.analysis.run import RunResults, write_results
 from dmp_cpg_ros.commands.analyze import BAD_INPUT, analyze_run, main
+from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 
 WALK = SyntheticWalk(rate_hz=50.0, turn_rate=0.3)
 
@@ -179,7 +180,7 @@ def test_texts_of_a_recording_are_no_markup(context: RunContext, tmp_path: Path)
         statuses={hostile: (StatusEvent(1.0, 2, hostile, {hostile: hostile}),)},
         modes=(StatusEvent(0.0, 0, hostile, {'reason': hostile}),),
         canonical=dataclasses.replace(
-            walk.canonical, frame=(hostile,) * len(walk.canonical.time)))
+            walk.canonical, gaits=(GaitShares(hostile),) * len(walk.canonical.time)))
     manifest = {'scenario': hostile, hostile: [hostile, {hostile: hostile}],
                 'parameters': {hostile: hostile}}
     certificate = [{'name': hostile, hostile: hostile, 'holds': True}]

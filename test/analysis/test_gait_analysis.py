@@ -18,6 +18,7 @@ from dmp_cpg_ros.analysis.metrics.gait import gait_metrics, phase_errors
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.gait.transition import BlendedGait
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -88,7 +89,7 @@ def test_a_recording_without_names_was_walked_in_the_gait_of_its_parameters(
     canonical = recording.canonical
     old = replace(recording, canonical=replace(
         canonical, time=canonical.time[early], x=canonical.x[early], x_dot=canonical.x_dot[early],
-        frame=()))
+        gaits=()))
     assert gait_metrics(old, context())['phase_error_rad_max'] < 1e-6
     assert gait_metrics(old, context())['names'] is None
     unknown = RunContext(robot=ROBOT)
@@ -98,6 +99,6 @@ def test_a_recording_without_names_was_walked_in_the_gait_of_its_parameters(
 def test_a_name_that_is_not_known_falls_back_to_the_walk_itself(recording: Recording) -> None:
     canonical = recording.canonical
     strange = replace(recording, canonical=replace(
-        canonical, frame=('gallop',) * len(canonical.time)))
+        canonical, gaits=(GaitShares('gallop'),) * len(canonical.time)))
     assert gait_rows(strange, context()) is None
     assert gait_metrics(strange, context())['phase_error_rad_max'] > 0.1

@@ -19,7 +19,7 @@ from ros_processes import Processes, Ros
 from std_srvs.srv import SetBool
 
 from dmp_cpg_ros.__main__ import COMMANDS, STUDIES
-from dmp_cpg_ros.nodes.interfaces import INTERFACES, published_by, read_by
+from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, published_by, read_by
 from dmp_cpg_ros.suite_table import KINDS
 
 processes, ros, ros_domain = (

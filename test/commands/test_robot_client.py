@@ -26,10 +26,10 @@ from ros_processes import NodeProcess, Processes, Ros, reserved_domain, wait_unt
 from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
-from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
-from dmp_cpg_ros.nodes.interfaces import interface
-from dmp_cpg_ros.nodes.middleware import prepare_middleware
+from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
+from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.suite_table import WALKING_NODES
 
 CLIENT = ('-m', 'dmp_cpg_ros.commands.robot_client', '--wait', '20')
@@ -106,7 +106,7 @@ def await_stop(ros: Ros, word: str, name: str = 'inhibition_state') -> None:
     """Wait for a state of the stop."""
     topic = interface('inhibition_state')
     states = ros.collect(topic.type, name, topic.reader_qos)
-    ros.spin_until(lambda: states and read_inhibition_state(states[-1]).word == word,
+    ros.spin_until(lambda: states and read_state_word(states[-1]) == word,
                    what=lambda: word)
 
 

@@ -18,7 +18,7 @@ from ros_processes import NodeProcess, Processes, Ros, wait_until
 from dmp_cpg_ros.analysis.digests import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.suite_run import alone_in_domain
-from dmp_cpg_ros.nodes.claims import AlreadyRunningError
+from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 

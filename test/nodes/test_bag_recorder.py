@@ -23,9 +23,9 @@ from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.analysis.bag import opened
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.nodes.bag_writing import BagWriter
-from dmp_cpg_ros.nodes.interfaces import interface
-from dmp_cpg_ros.nodes.message_values import set_stamp
+from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.values import set_stamp
+from dmp_cpg_ros.nodes.recording.bag_writing import BagWriter
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 

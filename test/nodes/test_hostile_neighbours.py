@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import random
 import signal
 from pathlib import Path
@@ -12,12 +13,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sensor_msgs.msg import JointState
+
+from dmp_cpg_ros.layouts import GAIN_ROWS
+from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader
 
 pytest.importorskip('rclpy')
 
 import ros_processes
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from entry_names import ENTRY_NAMES
 from geometry_msgs.msg import Twist, WrenchStamped
 from lifecycle_msgs.msg import Transition
@@ -38,16 +43,14 @@ from std_srvs.srv import SetBool, Trigger
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import LARGEST_FORCE
-from dmp_cpg_ros.nodes.canonical_oscillators import inhibition_from
-from dmp_cpg_ros.nodes.conversions import read_push_force
-from dmp_cpg_ros.nodes.gait_setup import follow_gait, gaits_of
-from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
-from dmp_cpg_ros.nodes.interfaces import Interface, interface, published_by, read_by
+from dmp_cpg_ros.nodes.framework.gaits import follow_gait, known_gaits
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
-from dmp_cpg_ros.nodes.message_values import set_stamp
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
+from dmp_cpg_ros.nodes.messages.conversions import read_push_force
+from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, published_by, read_by
+from dmp_cpg_ros.nodes.messages.robot_state import read_imu
+from dmp_cpg_ros.nodes.messages.values import set_stamp
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
-from dmp_cpg_ros.nodes.robot_state_messages import read_imu
-from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
 from dmp_cpg_ros.suite_table import KINDS
 
 processes, ros, ros_domain = (
@@ -244,22 +247,17 @@ def test_an_interrupt_ends_a_lone_node_without_complaint(
         assert 'FATAL' not in process.output, process
 
 
-@pytest.mark.parametrize(('key', 'value'), [
-    ('gain_fl', '-1e6'), ('gain_fl', '1e300'), ('gain_rr', 'nan'),
-    ('region_radius', '1e300'), ('region_radius', '-1.0'),
+@pytest.mark.parametrize(('row', 'value'), [
+    ('fl', -1e6), ('fl', 1e300), ('rr', math.nan), ('region_radius', 1e300),
+    ('region_radius', -1.0), ('requested', 0.5), ('at_rest', -1.0),
 ])
-def test_an_inhibition_that_no_parameters_allow_is_refused(key: str, value: str) -> None:
-    values = {'requested': 'true', 'region_radius': '0.3',
-              **{f'gain_{leg}': '400.0' for leg in ('fl', 'fr', 'rl', 'rr')}}
-
-    def message() -> DiagnosticArray:
-        return DiagnosticArray(status=[DiagnosticStatus(name='inhibition', values=[
-            KeyValue(key=name, value=text) for name, text in values.items()])])
-
-    assert inhibition_from(read_inhibition_state(message())).gains.tolist() == [400.0] * 4
-    values[key] = value
-    with pytest.raises(DataError, match=key):
-        inhibition_from(read_inhibition_state(message()))
+def test_an_inhibition_that_no_parameters_allow_is_refused(row: str, value: float) -> None:
+    message = JointState(name=list(GAIN_ROWS), position=[400.0] * 4 + [0.3, 1.0, 0.0])
+    read = InhibitionGainsReader().read(message)
+    assert read.gains.tolist() == [400.0] * 4 and read.requested and not read.at_rest
+    message.position[GAIN_ROWS.index(row)] = value
+    with pytest.raises(DataError):
+        InhibitionGainsReader().read(message)
 
 
 def test_a_turn_rate_that_cannot_be_is_none() -> None:
@@ -345,7 +343,7 @@ def test_a_leg_tells_the_gait_that_it_follows(ros: Ros) -> None:
     """The parameter is what is in force, and who asks for another one is sent to its owner."""
     node = LegTransformation('leg', context=ros.context)
     node.start()
-    follow_gait(node, gaits_of(node)['trot'].scaled(1.25))
+    follow_gait(node, known_gaits(node).gaits['trot'].scaled(1.25))
     assert node.get_parameter('gait').value == 'trot'
     result = node.set_parameters([Parameter('gait', value='amble')])[0]
     assert not result.successful

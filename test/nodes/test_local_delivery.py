@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from dmp_cpg_ros.nodes.local_delivery import LocalDelivery, SuitePublisher
+from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePublisher
 
 
 class Outside:

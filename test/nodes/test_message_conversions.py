@@ -16,26 +16,34 @@ from geometry_msgs.msg import Twist, TwistStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from messages import canonical_writer
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
+from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets, RobotState
-from dmp_cpg_ros.nodes.conversions import (
+from dmp_cpg_ros.nodes.messages.cdr import Serialized
+from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
-    CanonicalStateWriter,
+    CommandReader,
+    InhibitionGainsReader,
+    InhibitionGainsWriter,
     JointTargetsReader,
     JointTargetsWriter,
     PostureFeedbackReader,
     PostureFeedbackWriter,
     ReferenceWriter,
+    read_body_mode,
     read_reference,
     read_twist,
 )
-from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter, read_inhibition_state
-from dmp_cpg_ros.nodes.message_values import LARGEST, header_ns, set_stamp, stamp_ns, text
-from dmp_cpg_ros.nodes.robot_state_messages import (
+from dmp_cpg_ros.nodes.messages.inhibition_state import InhibitionStateWriter, read_state_word
+from dmp_cpg_ros.nodes.messages.robot_state import (
     FootContactsReader,
     JointsReader,
     RobotStateWriter,
@@ -43,7 +51,8 @@ from dmp_cpg_ros.nodes.robot_state_messages import (
     read_odom,
     robot_state,
 )
-from dmp_cpg_ros.nodes.serialized_messages import Serialized
+from dmp_cpg_ros.nodes.messages.values import LARGEST, header_ns, set_stamp, stamp_ns, text
+from dmp_cpg_ros.suite import load_gait, load_gaits
 
 FLOATS = st.floats(-LARGEST, LARGEST)
 STAMPS = st.integers(0, 2**31 * 10**9 - 1)
@@ -79,10 +88,24 @@ def test_stamps_that_are_no_time_are_refused(stamp: Time) -> None:
 
 @given(STAMPS, numbers(4, 2), numbers(4, 2))
 def test_canonical_state(time_ns: int, x: np.ndarray, x_dot: np.ndarray) -> None:
-    message = wire(CanonicalStateWriter().fill(time_ns, x, x_dot))
-    assert list(message.name[:3]) == ['fl_x1', 'fl_x2', 'fr_x1']
-    assert bits(*CanonicalStateReader().read(message)) == bits(x, x_dot)
+    known = KnownGaits(load_gaits())
+    gait = known.transition(known.named('trot'), known.named('amble')).at(0.3, 0.0).scaled(1.25)
+    message = wire(canonical_writer().fill(time_ns, x, x_dot, gait, -0.5))
+    assert list(message.name[:3]) == ['fl_x1', 'fl_x2', 'fr_x1'] and not message.header.frame_id
+    x_read, rate_read, gait_read = CanonicalStateReader(known).read(message)
+    assert bits(x_read, rate_read) == bits(x, x_dot) and gait_read == gait
     assert header_ns(message) == time_ns
+    entries = dict(zip(message.name, zip(message.position, message.velocity, strict=True),
+                       strict=True))
+    assert entries['gait/walk'] == (0.0, 0.0) and entries['gait/amble'] == (0.3, 0.0)
+    assert entries['cadence_scale'] == (1.25, -0.5)
+
+
+def test_a_gait_that_is_not_known_to_the_reader_is_refused() -> None:
+    message = wire(canonical_writer().fill(0, np.ones((4, 2)), np.ones((4, 2)), load_gait('trot')))
+    others = {name: gait for name, gait in load_gaits().items() if name != 'trot'}
+    with pytest.raises(DataError, match='shares of gaits'):
+        CanonicalStateReader(KnownGaits(others)).read(message)
 
 
 @given(numbers(3))
@@ -105,12 +128,15 @@ def test_joint_targets(leg: str, values: np.ndarray) -> None:
 def test_posture_feedback(torque: np.ndarray, shift: np.ndarray, drift: np.ndarray,
                           correction: np.ndarray, measured: np.ndarray,
                           force: np.ndarray) -> None:
-    sent = PostureFeedback(torque, shift, drift, correction, 'damped', measured, force)
-    read = PostureFeedbackReader().read(wire(PostureFeedbackWriter().fill(0, sent)))
+    command = BodyCommand('rising', 'rise', 1.0 / 3.0, -0.1)
+    sent = PostureFeedback(torque, shift, drift, correction, command, measured, force)
+    message = wire(PostureFeedbackWriter().fill(0, sent))
+    read = PostureFeedbackReader().read(message)
     assert bits(read.torque, read.shift_in_base, read.drift_in_base, read.correction,
                 read.measured, read.foot_force) == bits(
                     torque, shift, drift, correction, measured, force)
-    assert read.mode == sent.mode
+    assert read.command == command == CommandReader().read(message)
+    assert not message.header.frame_id
 
 
 def state_of(values: np.ndarray, time_ns: int = 0) -> RobotState:
@@ -243,7 +269,7 @@ def test_no_bad_number_leaves(bad: float) -> None:
     x = np.zeros((4, 2))
     x[2, 1] = bad
     with pytest.raises(DataError, match='velocity'):
-        CanonicalStateWriter().fill(0, np.zeros((4, 2)), x)
+        canonical_writer().fill(0, np.zeros((4, 2)), x, load_gait('trot'))
     with pytest.raises(DataError, match='effort'):
         JointTargetsWriter('fl').fill(0, JointTargets(np.zeros(3), np.zeros(3), np.full(3, bad)))
     with pytest.raises(DataError, match='reference'):
@@ -276,23 +302,30 @@ def test_inhibition_state(time_ns: int, number: float, flag: bool) -> None:
     writer = InhibitionStateWriter()
     writer.fill(0, 'free', {'gain': 1.0, 'requested': not flag})
     message = wire(writer.fill(time_ns, 'at_rest', {'gain': number, 'requested': flag}))
-    read = read_inhibition_state(message)
-    assert (read.word, header_ns(message)) == ('at_rest', time_ns)
-    assert bits(read.number('gain', -math.inf, math.inf)) == bits(number)
-    assert read.flag('requested') is flag
-
-
-def test_inhibition_values_that_cannot_be_used_are_named() -> None:
-    writer = InhibitionStateWriter()
-    read = read_inhibition_state(writer.fill(0, 'free', {'gain': math.nan, 'word': 'x'}))
-    for key in ('gain', 'word', 'absent'):
-        with pytest.raises(DataError, match=key):
-            read.number(key, 0.0, 1.0)
-        with pytest.raises(DataError, match=key):
-            read.flag(key)
+    assert (read_state_word(message), header_ns(message)) == ('at_rest', time_ns)
+    told = {entry.key: entry.value for entry in message.status[0].values}
+    assert bits(float(told['gain'])) == bits(number)
+    assert told['requested'] == ('true' if flag else 'false')
     writer.message.status[0].name = 'other'
     with pytest.raises(DataError, match='inhibition'):
-        read_inhibition_state(writer.message)
+        read_state_word(writer.message)
+
+
+@given(STAMPS, numbers(4), st.booleans(), st.booleans())
+def test_inhibition_gains(time_ns: int, values: np.ndarray, requested: bool, rests: bool) -> None:
+    gains = np.minimum(np.abs(values), 1000.0)
+    sent = Inhibition(requested, gains, 0.25, rests)
+    message = wire(InhibitionGainsWriter().fill(time_ns, sent))
+    read = InhibitionGainsReader().read(message)
+    assert bits(read.gains, read.region_radius) == bits(gains, 0.25)
+    assert (read.requested, read.at_rest, header_ns(message)) == (requested, rests, time_ns)
+
+
+@pytest.mark.parametrize('word', ['', 'flying', 'rising rise 3 0.5'])
+def test_a_body_mode_is_one_of_the_words(word: str) -> None:
+    assert read_body_mode(String(data='lying')) == 'lying'
+    with pytest.raises(DataError, match='standing, stopping, lying'):
+        read_body_mode(String(data=word))
 
 
 @given(st.floats())

@@ -43,12 +43,18 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
-from dmp_cpg_ros.nodes import middleware
-from dmp_cpg_ros.nodes.conversions import ReferenceWriter, read_twist
-from dmp_cpg_ros.nodes.diagnostics import LOG_EVERY_S, NodeHealth
-from dmp_cpg_ros.nodes.executors import make_executor, spin
-from dmp_cpg_ros.nodes.help_text import help_text
-from dmp_cpg_ros.nodes.interfaces import (
+from dmp_cpg_ros.nodes.framework import execution
+from dmp_cpg_ros.nodes.framework.execution import make_executor, spin
+from dmp_cpg_ros.nodes.framework.health import LOG_EVERY_S, NodeHealth
+from dmp_cpg_ros.nodes.framework.parameters import (
+    LockStepParameters,
+    NodeParameters,
+    ParameterTable,
+    help_text,
+)
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter, read_twist
+from dmp_cpg_ros.nodes.messages.interfaces import (
     INTERFACES,
     TOPICS,
     expected_count,
@@ -57,9 +63,7 @@ from dmp_cpg_ros.nodes.interfaces import (
     read_by,
     served_by,
 )
-from dmp_cpg_ros.nodes.managed_node import ManagedNode
-from dmp_cpg_ros.nodes.message_values import header_ns, set_stamp
-from dmp_cpg_ros.nodes.ros_parameters import LockStepParameters, NodeParameters, ParameterTable
+from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp
 from dmp_cpg_ros.suite_table import KINDS
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
@@ -83,7 +87,7 @@ class OtherParameters(Parameters):
             raise ParameterError(f'upper = {self.upper} must not be below count = {self.count}')
 
 
-class Relay(ManagedNode):
+class Relay(SuiteNode):
     """Publishes the newest command at every tick.
 
     And more that --help does not say.
@@ -647,20 +651,20 @@ def test_bad_arguments_end_a_process_with_status_two(processes: Processes) -> No
 def test_the_middleware_profile_is_named_unless_the_user_has_one(
         monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
-    for name in middleware.VARIABLES:
+    for name in execution.VARIABLES:
         monkeypatch.setenv(name, '')
-    middleware.prepare_middleware()
-    paths = {os.environ[name] for name in middleware.VARIABLES}
+    execution.prepare_middleware()
+    paths = {os.environ[name] for name in execution.VARIABLES}
     root = ElementTree.parse(paths.pop()).getroot()
     period = next(part for part in root.iter() if part.tag.endswith('heartbeatPeriod'))
     assert int(period[0].text or '') == 0 and 0 < int(period[1].text or '') < 100_000_000
     assert not paths
-    for name in middleware.VARIABLES:
+    for name in execution.VARIABLES:
         monkeypatch.setenv(name, '')
-    monkeypatch.setenv(middleware.VARIABLES[0], 'mine.xml')
-    middleware.prepare_middleware()
-    assert os.environ[middleware.VARIABLES[0]] == 'mine.xml'
-    assert not os.environ[middleware.VARIABLES[1]]
+    monkeypatch.setenv(execution.VARIABLES[0], 'mine.xml')
+    execution.prepare_middleware()
+    assert os.environ[execution.VARIABLES[0]] == 'mine.xml'
+    assert not os.environ[execution.VARIABLES[1]]
 
 
 
@@ -670,7 +674,7 @@ def test_every_thread_of_a_process_is_scheduled_in_batches() -> None:
         pytest.skip('this system has no such policy')
     told = subprocess.run(
         [sys.executable, '-c', 'import os, threading\n'
-         'from dmp_cpg_ros.nodes.scheduling import schedule\n'
+         'from dmp_cpg_ros.nodes.framework.execution import schedule\n'
          'event = threading.Event()\n'
          'threading.Thread(target=event.wait).start()\n'
          'print(schedule("normal"), schedule("batch"), schedule("batch"))\n'

@@ -17,8 +17,8 @@ from rclpy.parameter import Parameter
 from ros_processes import Ros
 
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
-from dmp_cpg_ros.nodes.conversions import ReferenceWriter
-from dmp_cpg_ros.nodes.interfaces import interface
+from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 
 ros, ros_domain = ros_processes.ros, ros_processes.ros_domain
 

@@ -16,10 +16,10 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu, JointState
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.conversions import read_reference
-from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
-from dmp_cpg_ros.nodes.robot_state_messages import read_imu
-from dmp_cpg_ros.nodes.serialized_messages import serialized_reader
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
+from dmp_cpg_ros.nodes.messages.conversions import read_reference
+from dmp_cpg_ros.nodes.messages.robot_state import read_imu
+from dmp_cpg_ros.nodes.messages.values import frame_of, header_ns
 
 TEXTS = st.text(st.characters(exclude_characters='\x00', exclude_categories=['Cs']), max_size=12)
 NUMBERS = st.lists(st.floats(width=64), max_size=9)

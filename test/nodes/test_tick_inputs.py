@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from ros_processes import Ros
 from std_msgs.msg import Int64
 
-from dmp_cpg_ros.nodes.executors import make_executor
-from dmp_cpg_ros.nodes.tick_inputs import (
+from dmp_cpg_ros.nodes.framework.execution import make_executor
+from dmp_cpg_ros.nodes.framework.ticks import (
     HOLD_TICKS,
     PATIENCE,
     PENDING_TICKS,

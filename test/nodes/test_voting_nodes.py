@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from messages import canonical_writer
 
 pytest.importorskip('rclpy')
 
@@ -26,11 +27,9 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.scenario.scenario import play
-from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, ReferenceWriter
-from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
-from dmp_cpg_ros.nodes.interfaces import interface
-from dmp_cpg_ros.nodes.robot_state_messages import RobotStateWriter
-from dmp_cpg_ros.nodes.vote_messages import read_votes
+from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter, read_votes
+from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.suite import load_suite
@@ -121,7 +120,7 @@ def test_sensors_that_fall_silent_by_their_stamps_stop_the_gait(
     ros.spin_until(lambda: all(end.get_subscription_count() == 1 for end in say.values()),
                    what=lambda: str(node))
     gait = network()
-    x, oscillators, reference = gait.locked_state(), CanonicalStateWriter(), ReferenceWriter()
+    x, oscillators, reference = gait.locked_state(), canonical_writer(), ReferenceWriter()
     rate = gait.rate(x, np.zeros(3), Inhibition(False, np.zeros(4), 0.3))
     robot = RobotStateWriter()
     at = {'ns': 0}
@@ -133,10 +132,11 @@ def test_sensors_that_fall_silent_by_their_stamps_stop_the_gait(
         if imu:
             say['imu'].publish(robot.imu.serialized)
         say['reference'].publish(reference.fill(at['ns'], np.zeros(3)).serialized)
-        say['canonical_state'].publish(oscillators.fill(at['ns'], x, rate).serialized)
+        say['canonical_state'].publish(oscillators.fill(
+            at['ns'], x, rate, gait.gait).serialized)
 
     def last() -> dict[str, str]:
-        return read_inhibition_state(told[-1]).values if told else {}
+        return {entry.key: entry.value for entry in told[-1].status[0].values} if told else {}
 
     def until(wanted: Callable[[], bool], imu: bool) -> None:
         def ticked() -> bool:
@@ -162,16 +162,17 @@ def test_sensors_that_fall_silent_by_their_stamps_stop_the_gait(
 # Messages --------------------------------------------------------------------------------------
 
 
-def test_votes_are_read_by_name_from_effort_or_position() -> None:
-    message = JointState(name=['rr', 'fl'], effort=[0.5, 0.25])
-    message.header.frame_id = 'cliff detector'
+def test_votes_are_read_by_voter_and_leg() -> None:
+    message = JointState(name=['cliff detector/rr', 'cliff detector/fl'], effort=[0.5, 0.25])
     assert read_votes(message) == ({'rr': 0.5, 'fl': 0.25}, 'cliff detector')
-    assert read_votes(JointState(name=['rr'], position=[0.5])) == ({'rr': 0.5}, '')
+    assert read_votes(JointState(name=['rr'], effort=[0.5])) == ({'rr': 0.5}, '')
 
 
 @pytest.mark.parametrize(('message', 'text'), [
     (JointState(name=['fl', 'fr'], effort=[1.0]), 'one weight'),
     (JointState(name=['fl']), 'one weight'),
+    (JointState(name=['fl'], position=[1.0]), 'one weight'),
+    (JointState(name=['a/fl', 'b/fr'], effort=[1.0, 1.0]), 'one voter'),
     (JointState(name=['fl', 'fl'], effort=[1.0, 1.0]), 'none twice'),
     (JointState(), 'one or more of the legs'),
     (JointState(name=['fl_foot'], effort=[1.0]), 'one or more of the legs'),

@@ -15,11 +15,11 @@ pytest.importorskip('rclpy')
 from ros_processes import NodeProcess, Processes, Ros, reserved_domain
 from test_readme import as_shown, transcripts
 
-from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
-from dmp_cpg_ros.nodes.inhibition_messages import read_inhibition_state
-from dmp_cpg_ros.nodes.interfaces import interface
-from dmp_cpg_ros.nodes.message_values import stamp_ns
-from dmp_cpg_ros.nodes.middleware import prepare_middleware
+from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
+from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
+from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.values import stamp_ns
 
 BIN = Path(sys.prefix) / 'bin'
 pytestmark = pytest.mark.skipif(
@@ -43,7 +43,7 @@ class Reader:
         self.changes = 0
         self.listen('/clock', lambda message: setattr(self, 'now_ns', stamp_ns(message.clock)))
         self.listen('inhibition_state', lambda message: self.take(
-            'gait', read_inhibition_state(message).word))
+            'gait', read_state_word(message)))
         self.listen('body_mode', lambda message: self.take('body', read_body_mode(message)))
 
     def listen(self, name: str, take: object) -> None:

@@ -31,7 +31,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
-from dmp_cpg_ros.nodes.middleware import prepare_middleware
+from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 
 ROOT = Path(__file__).resolve().parents[2]
 

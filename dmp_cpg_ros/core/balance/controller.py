@@ -17,6 +17,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.com_plan import (
     SIDEWAYS,
     STRAIGHT,
@@ -70,8 +71,8 @@ class PostureFeedback:
         What standing feet add to the velocity of their paths [m/s].
     correction : ndarray (3,)
         What the legs add to the reference velocity of the stance feet: v_x, v_y [m/s], γ [rad/s].
-    mode : str
-        What the body does, see :mod:`~dmp_cpg_ros.core.modes.command`.
+    command : BodyCommand
+        What the body does.
     measured : ndarray (12,)
         Measured joint angles that the feedback was made of [rad].
     foot_force : ndarray (4,)
@@ -82,7 +83,7 @@ class PostureFeedback:
     shift_in_base: Array
     drift_in_base: Array
     correction: Array
-    mode: str = 'standing'
+    command: BodyCommand = STANDING
     measured: Array = field(default_factory=lambda: np.zeros(12))
     foot_force: Array = field(default_factory=lambda: np.zeros(4))
 

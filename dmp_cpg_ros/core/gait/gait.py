@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups
-from dmp_cpg_ros.core.gait.gait_word import gait_word
 from dmp_cpg_ros.core.gait.speed_limit import within_limit
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
@@ -205,11 +204,6 @@ class Gait(CycleOfLegs):
     def phases(self) -> Array:
         """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
         return -2.0 * np.pi * self.lag
-
-    @property
-    def word(self) -> str:
-        """Text that travels with the phases, see :mod:`~dmp_cpg_ros.core.gait.gait_word`."""
-        return gait_word(self.name, self.cadence_scale)
 
     @property
     def moving_phases(self) -> None:

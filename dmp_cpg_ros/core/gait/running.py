@@ -20,6 +20,7 @@ new parameters at once: they enter ẋ and leave x as it is. The factor on the c
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import copysign
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ from dmp_cpg_ros.core.gait.contact_feedback import (
     initial_contact_state,
 )
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.maths.updated import updated
@@ -99,7 +100,7 @@ class RunningGait:
         Oscillators, coupling, cadence, contact feedback.
     scale : BodyScale
         The robot's lengths.
-    gaits : GaitReader
+    gaits : KnownGaits
         The gaits that are known, and the ways between them.
     change : GaitChangeParameters, optional
         How gaits change.
@@ -110,7 +111,7 @@ class RunningGait:
     """
 
     def __init__(
-        self, parameters: CanonicalParameters, scale: BodyScale, gaits: GaitReader,
+        self, parameters: CanonicalParameters, scale: BodyScale, gaits: KnownGaits,
         change: GaitChangeParameters | None = None, choice: GaitChoiceParameters | None = None,
         quarter: float = float('nan'),
     ) -> None:
@@ -148,6 +149,11 @@ class RunningGait:
         x = network.rest_state(acting) if inhibition.start_inhibited else network.locked_state()
         return CanonicalState(network.gait, gait, factor, x, np.zeros_like(x),
                               initial_contact_state())
+
+    def cadence_rate(self, state: CanonicalState) -> float:
+        """Rate of the factor on the cadence [1/s]."""
+        way = self.parameters.cadence_scale - state.cadence_scale
+        return copysign(CADENCE_RATE, way) if way else 0.0
 
     def want(self, state: CanonicalState, name: str) -> CanonicalState:
         """Ask for a gait; raises ParameterError with the valid names."""

@@ -36,7 +36,6 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.arcs import arcs_between
 from dmp_cpg_ros.core.gait.com_height import Bounce
 from dmp_cpg_ros.core.gait.gait import BodyScale, CycleOfLegs, Gait
-from dmp_cpg_ros.core.gait.gait_word import gait_word
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 
@@ -169,13 +168,6 @@ class BlendedGait(CycleOfLegs):
     def name(self) -> str:
         """Both names, as ``amble>trot``."""
         return f'{self.transition.before.name}>{self.transition.after.name}'
-
-    @property
-    def word(self) -> str:
-        """Text that :class:`~dmp_cpg_ros.core.gait.gait_reader.GaitReader` reads back to the same
-        blend.
-        """
-        return gait_word(f'{self.name} {self.share!r} {self.rate!r}', self.cadence_scale)
 
     def scaled(self, cadence_scale: float) -> BlendedGait:
         """Return this blend with this factor on its cadences."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.balance.controller import (
     PostureController,
     PostureFeedback,
@@ -18,7 +19,6 @@ from dmp_cpg_ros.core.balance.controller import (
 )
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths.updated import updated
-from dmp_cpg_ros.core.modes.command import BALANCED
 from dmp_cpg_ros.core.modes.manager import ModeManager, ModeParameters, ModeState
 from dmp_cpg_ros.core.modes.requests import ModeAnswer, request
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -108,11 +108,11 @@ class BodyControl:
         -------
         state : BodyState
         feedback : PostureFeedback
-            For the legs, with the mode's text.
+            For the legs, with what the body does.
         """
         mode = self.modes.step(state.mode, measured, x, x_dot, r, state.balance.activity)
         if mode.mode not in BALANCED:
             return (BodyState(mode, self.posture.initial_state()),
                     self.modes.feedback(mode, measured))
         balance, feedback = self.posture.step(state.balance, measured, gait, x, x_dot, r, dt)
-        return BodyState(mode, balance), updated(feedback, mode=mode.mode)
+        return BodyState(mode, balance), updated(feedback, command=self.modes.command(mode))

@@ -5,14 +5,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.gait.transition import GaitInForce
-from dmp_cpg_ros.core.modes.command import STANDING, BodyCommand
 from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
 from dmp_cpg_ros.core.modes.motion_library import Movements
 from dmp_cpg_ros.core.primitives.spring_damper import SpringState
@@ -22,8 +21,6 @@ from dmp_cpg_ros.core.transformation.foot_motion import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
 
 Array = NDArray[np.float64]
-
-_command = lru_cache(maxsize=8)(BodyCommand.from_text)
 
 
 @dataclass(frozen=True)
@@ -91,7 +88,7 @@ class LegControl:
         r : ndarray (3,)
             Reference.
         feedback : PostureFeedback
-            Of the posture block, with the mode's text.
+            Of the posture block, with what the body does.
         position, velocity : ndarray (12,)
             Measured joints [rad], [rad/s]; only the torque reading uses them.
         dt : float
@@ -103,7 +100,7 @@ class LegControl:
         targets : JointTargets
             Of the leg's three joints.
         """
-        place, joints, command = self.primitive.place, self.joints, _command(feedback.mode)
+        place, joints, command = self.primitive.place, self.joints, feedback.command
         if command.balanced:
             motion = None
             leg, goal, goal_velocity = self.primitive.step(

@@ -16,11 +16,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.balance.body_command import BALANCED, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase_rate
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE, REST_SPEED
 from dmp_cpg_ros.core.maths.updated import updated
-from dmp_cpg_ros.core.modes.command import BALANCED, BodyCommand
 from dmp_cpg_ros.core.modes.falls import (
     BodyCondition,
     BodySense,
@@ -28,7 +28,7 @@ from dmp_cpg_ros.core.modes.falls import (
     FallParameters,
     FallState,
 )
-from dmp_cpg_ros.core.modes.motion import phase_at
+from dmp_cpg_ros.core.modes.motion import phase_at, unit_movement
 from dmp_cpg_ros.core.modes.motion_library import SIDES, Movements
 from dmp_cpg_ros.core.parameters import parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -78,8 +78,6 @@ class ModeState:
         See the module's text.
     movements : tuple of str
         Movements to come, the present one first.
-    count : int
-        Movements begun so far.
     begun_ns : int
         Stamp at which the present movement (or mode, where there is none) began [ns].
     tries : int
@@ -95,7 +93,6 @@ class ModeState:
     time_ns: int
     mode: str
     movements: tuple[str, ...] = ()
-    count: int = 0
     begun_ns: int = 0
     tries: int = 0
     reason: str = ''
@@ -135,14 +132,15 @@ class ModeManager:
         """What the legs have to do at the tick of a state."""
         if not state.movements:
             return BodyCommand(state.mode)
-        share = self._share(state)
-        return BodyCommand(state.mode, state.movements[0], state.count, phase_at(share))
+        name = state.movements[0]
+        x, decay = phase_at(self._share(state)), unit_movement().phase_decay
+        return BodyCommand(state.mode, name, x, -decay / self.movements.named(name).duration * x)
 
     def feedback(self, mode: ModeState, state: RobotState) -> PostureFeedback:
         """What the legs get while the balance controller does not act."""
         torque = self._sense.carrying_torque(state, self._carried(mode))
         return PostureFeedback(
-            torque, np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3), self.command(mode).text,
+            torque, np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3), self.command(mode),
             state.joint_position.copy(),
         )
 
@@ -272,7 +270,7 @@ def enter(state: ModeState, mode: str, movements: tuple[str, ...], reason: str) 
     """Enter a mode at the next tick, whose stamp is not known yet."""
     return replace(
         state, mode=mode, movements=movements, reason=reason, begun_ns=-1,
-        count=state.count + bool(movements), fall=FallState(),
+        fall=FallState(),
     )
 
 

@@ -20,8 +20,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
-from dmp_cpg_ros.core.modes.command import BodyCommand
 from dmp_cpg_ros.core.modes.motion_library import Movement, Movements
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, minimum_jerk
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
@@ -41,8 +41,8 @@ class MotionState:
 
     Attributes
     ----------
-    count : int
-        Count of the command that began it.
+    movement : str
+        Its name.
     primitive : DiscretePrimitive
         With the weights of this movement.
     duration : float
@@ -51,7 +51,7 @@ class MotionState:
         Of the primitive.
     """
 
-    count: int
+    movement: str
     primitive: DiscretePrimitive
     duration: float
     state: DiscreteState
@@ -132,7 +132,8 @@ class LegMotion:
         dt: float,
     ) -> MotionState:
         """Begin the command's movement, or advance it to the command's phase."""
-        if motion is None or motion.count != command.count:
+        if (motion is None or motion.movement != command.movement
+                or command.x > motion.state.x):
             motion = self._begun(joints, command)
         if dt <= 0.0:
             return motion
@@ -158,7 +159,7 @@ class LegMotion:
         )
         state = primitive.initial_state(velocity=joints.velocity, tau=movement.duration)
         return MotionState(
-            command.count, primitive, movement.duration, replace(state, x=command.x)
+            command.movement, primitive, movement.duration, replace(state, x=command.x)
         )
 
     def _path(self, movement: Movement) -> DiscretePrimitive:

@@ -71,6 +71,10 @@ ROLLING: dict[str, tuple[LegPosture, LegPosture, float]] = {
 RISE, FOLD, TUCK = 9.0, 6.0, 3.6
 """Durations in √(l/g)."""
 
+MOVEMENT_NAMES = (
+    'rise', 'lower', 'fold', 'tuck', *(f'{name}_{side}' for name in ROLLING for side in SIDES))
+"""Names of all movements."""
+
 PAUSE = 1.5
 """Rest after every movement in √(l/g)."""
 

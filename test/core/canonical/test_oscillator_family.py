@@ -15,7 +15,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at, wrapped
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.transformation.leg import body_scale
@@ -121,7 +121,7 @@ class ConicalParameters(CanonicalParameters):
 
 
 def test_a_gait_runs_changes_and_stops_on_it() -> None:
-    block = RunningGait(ConicalParameters(), body_scale(quadruped()), GaitReader(GAITS))
+    block = RunningGait(ConicalParameters(), body_scale(quadruped()), KnownGaits(GAITS))
     state = block.initial_state(GAITS['amble'], InhibitionParameters(start_inhibited=False))
     free, r = Inhibition(False, np.zeros(4), 0.3), np.array([0.4, 0.0, 0.0])
     state = block.want(state, 'trot')

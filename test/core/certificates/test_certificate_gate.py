@@ -12,10 +12,9 @@ from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_sta
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
-from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
-from dmp_cpg_ros.core.gait.gait_word import gait_word, read_gait_word
+from dmp_cpg_ros.core.gait.known_gaits import GaitShares, KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import CADENCE_RATE, RunningGait
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
@@ -109,18 +108,6 @@ def test_every_changeable_parameter_has_one_owner() -> None:
     assert set(names) <= {*RUNNING.values, 'gait'}
 
 
-@pytest.mark.parametrize('scale', [1.0, 0.25, 1.1, 1.0 + 2**-52, 3.999999999999999])
-@pytest.mark.parametrize('name', ['trot', 'my gait', 'amble>trot 0.3500'])
-def test_the_word_of_a_gait_reads_back_exactly(name: str, scale: float) -> None:
-    assert read_gait_word(gait_word(name, scale)) == (name, scale)
-
-
-@pytest.mark.parametrize('word', ['trot *', 'trot *fast', 'trot *nan', 'trot *-1.0', 'trot *inf'])
-def test_a_bad_word_is_refused(word: str) -> None:
-    with pytest.raises(DataError, match='positive number'):
-        read_gait_word(word)
-
-
 @pytest.mark.parametrize('gait', sorted(GAITS))
 def test_a_scaled_gait_differs_in_its_cadence_only(gait: str) -> None:
     plain, scale = GAITS[gait], RUNNING.scale
@@ -136,7 +123,7 @@ def test_a_scaled_gait_differs_in_its_cadence_only(gait: str) -> None:
 
 def test_the_cadence_moves_to_its_factor_at_its_rate() -> None:
     free, r, seen = Inhibition(False, np.zeros(4), 0.3), np.array([0.3, 0.0, 0.0]), []
-    before = RunningGait(CanonicalParameters(), RUNNING.scale, GaitReader(GAITS))
+    before = RunningGait(CanonicalParameters(), RUNNING.scale, KnownGaits(GAITS))
     state = before.initial_state(GAITS['amble'], InhibitionParameters())
     plain = before.network(state.gait).omega(r)
     others = GaitChangeParameters(), GaitChoiceParameters()
@@ -145,7 +132,7 @@ def test_the_cadence_moves_to_its_factor_at_its_rate() -> None:
         state = running.step(state, r, free, TICK)
         seen.append(state.cadence_scale)
         assert running.network(state.gait).omega(r) == pytest.approx(plain * state.cadence_scale)
-        assert read_gait_word(state.gait.word) == ('amble', state.cadence_scale)
+        assert shares_of(state.gait) == GaitShares('amble', cadence_scale=state.cadence_scale)
     assert np.all(np.diff([1.0, *seen]) <= CADENCE_RATE * TICK + 1e-12)
     assert seen[-1] == 1.2 == seen[int(0.2 / CADENCE_RATE / TICK) + 1]
     weaker = CanonicalParameters(cadence_scale=1.2, coupling_gain=50.0)

@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.certificates.lock_watch import (
 )
 from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
@@ -130,7 +130,7 @@ def test_places_that_move_are_followed_without_an_alarm() -> None:
 
 def test_changed_couplings_are_watched_with_their_own_rate() -> None:
     start = network()
-    running = RunningGait(start.parameters, start.scale, GaitReader(GAITS))
+    running = RunningGait(start.parameters, start.scale, KnownGaits(GAITS))
     state = running.initial_state(GAITS['amble'], InhibitionParameters(start_inhibited=False))
     watcher, bounds = PhaseLockWatch(), []
     for gain in (100.0, 25.0):

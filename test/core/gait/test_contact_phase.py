@@ -236,7 +236,7 @@ def test_legs_keep_their_places_while_a_gait_changes_under_random_contacts() -> 
             loop.change_gait('trot')
         tick = loop.tick(replace(state, foot_force=force))
         state = robot.step(tick.targets)
-        words.add(loop.network.gait.word)
+        words.add(loop.network.gait.name)
         if k > 100:
             assert np.abs(loop.network.phase_errors(loop.x)).max() <= LOCKED_PHASE_ERROR
     assert {'amble', 'trot'} < words

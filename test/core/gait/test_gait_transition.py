@@ -21,11 +21,12 @@ from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.arcs import arcs_between, crowding
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.gait.gait_reader import GaitReader
+from dmp_cpg_ros.core.gait.known_gaits import GaitShares, KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork, network_system
 from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitTransition
 from dmp_cpg_ros.core.transformation.leg import body_scale
+from dmp_cpg_ros.layouts import canonical_rows, gait_rows, read_gait_rows
 
 ODD = Gait('odd', np.array([0.1, 0.33, 0.9, 0.61]), np.array([0.0, 0.5]), np.array([0.3, 0.5]),
            np.array([0.7, 0.6]))
@@ -40,7 +41,7 @@ TOPOLOGIES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 
 
 def networks(**changes: object) -> RunningGait:
-    return RunningGait(CanonicalParameters(**changes), SCALE, GaitReader(ALL))  # type: ignore[arg-type]
+    return RunningGait(CanonicalParameters(**changes), SCALE, KnownGaits(ALL))  # type: ignore[arg-type]
 
 
 def changed(known: RunningGait, before: str, after: str, x: np.ndarray, ticks: int = 1500,
@@ -179,26 +180,57 @@ def test_ties_keep_more_feet_down_and_legs_go_forward() -> None:
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 50.0), st.sampled_from([1.0, 1.25, 0.3]))
-def test_the_word_of_a_blend_reads_back_to_the_same_floats(
+def test_the_shares_of_a_blend_read_back_to_the_same_floats(
         share: float, rate: float, cadence: float) -> None:
-    reader = GaitReader(ALL)
-    gait = reader.transition(GAITS['walk'], ODD).at(share, rate).scaled(cadence)
-    back = GaitReader(ALL).read(gait.word)
+    known = KnownGaits(ALL)
+    gait = known.transition(GAITS['walk'], ODD).at(share, rate).scaled(cadence)
+    back = KnownGaits(ALL).in_force(shares_of(gait))
     assert isinstance(back, BlendedGait)
     assert (back.share, back.rate, back.cadence_scale) == (share, rate, cadence)
     assert back.phases.tobytes() == gait.phases.tobytes()
-    assert reader.read(gait.word) is reader.read(gait.word)
+    assert known.in_force(shares_of(gait)) is known.in_force(shares_of(gait))
 
 
-@pytest.mark.parametrize(('word', 'text'), [
-    ('gallop', 'valid are amble'), ('amble>gallop 0.1 0.1', 'valid are amble'),
-    ('amble>trot', 'must be the name'), ('amble>trot x 0.1', 'must be the name'),
-    ('amble>trot 1.5 0.1', r'share in \[0, 1\]'), ('amble>trot nan 0.1', r'share in \[0, 1\]'),
-    ('amble>trot 0.5 -1.0', 'not negative'), ('', 'no gait'),
+@given(st.floats(0.0, 1.0), st.sampled_from([0.0, 1e-300, 0.7]), st.sampled_from([1.0, 1.25]),
+       st.permutations(sorted(ALL)))
+def test_the_rows_of_a_change_tell_its_direction_also_while_it_pauses(
+        share: float, rate: float, cadence: float, names: list[str]) -> None:
+    one, other, *_ = names
+    for shares in (GaitShares(one, other, share, rate, cadence),
+                   GaitShares(other, one, share, rate, cadence)):
+        position, velocity = gait_rows(shares, 0.0, names)
+        assert sum(position[:-1]) == pytest.approx(1.0) and sum(velocity) == 0.0
+        read = read_gait_rows(canonical_rows(names)[8:], position, velocity)
+        if 0.0 < share < 1.0:
+            assert read == shares
+        else:  # of a change that has not begun, or is over, one gait is in force
+            assert read == GaitShares(
+                shares.after if share else shares.before, cadence_scale=cadence)
+
+
+@pytest.mark.parametrize(('shares', 'text'), [
+    (GaitShares('gallop'), 'valid are amble'),
+    (GaitShares('amble', 'gallop', 0.1, 0.1), 'valid are amble'),
+    (GaitShares('amble', 'trot', 1.5, 0.1), r'share in \[0, 1\]'),
+    (GaitShares('amble', 'trot', float('nan'), 0.1), r'share in \[0, 1\]'),
+    (GaitShares('amble', 'trot', 0.5, -1.0), 'not negative'),
+    (GaitShares('amble', cadence_scale=0.0), 'must be positive'),
+    (GaitShares('amble', cadence_scale=float('nan')), 'must be positive'),
 ])
-def test_bad_words_are_refused_with_what_is_valid(word: str, text: str) -> None:
+def test_impossible_shares_are_refused_with_what_is_valid(shares: GaitShares, text: str) -> None:
     with pytest.raises(DataError, match=text):
-        GaitReader(ALL).read(word)
+        KnownGaits(ALL).in_force(shares)
+
+
+@pytest.mark.parametrize(('position', 'velocity'), [
+    ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0]), ([1.0, 1.0, 0.0], [0.0, 0.0, 0.0]),
+    ([0.4, 0.6, 0.0], [0.1, 0.1, 0.0]), ([0.4, 0.5, 0.0], [-0.1, 0.1, 0.0]),
+    ([0.2, 0.3, 0.5], [-0.1, 0.1, 0.0]), ([float('nan'), 1.0, 0.0], [0.0, 0.0, 0.0]),
+])
+def test_rows_that_are_no_gait_are_refused(position: list[float], velocity: list[float]) -> None:
+    with pytest.raises(DataError, match='must be 1 of one gait'):
+        read_gait_rows(['gait/a', 'gait/b', 'gait/c', 'cadence_scale'], [*position, 1.0],
+                       [*velocity, 0.0])
 
 
 def test_a_gait_whose_name_would_not_read_back_is_refused() -> None:

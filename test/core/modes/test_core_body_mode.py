@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from core_examples import TICK, TICK_NS, quadruped, standing_state
 
+from dmp_cpg_ros.core.balance.body_command import MODES, MOVING, BodyCommand
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.modes.command import MODES, MOVING, BodyCommand
 from dmp_cpg_ros.core.modes.falls import (
     BodyCondition,
     BodySense,
@@ -22,9 +22,11 @@ from dmp_cpg_ros.core.modes.falls import (
     FallState,
 )
 from dmp_cpg_ros.core.modes.manager import ModeManager, ModeParameters, ModeState
+from dmp_cpg_ros.core.modes.motion_library import MOVEMENT_NAMES, Movements
 from dmp_cpg_ros.core.modes.requests import REQUESTS, request
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.layouts import MODE_ROWS, MOVEMENT_ROWS, command_rows, read_command_rows
 
 ROBOT = quadruped()
 HEIGHT = ROBOT.stance_height
@@ -59,19 +61,29 @@ class Machine:
 
 @pytest.mark.parametrize('command', [
     *(BodyCommand(mode) for mode in MODES if mode not in MOVING),
-    *(BodyCommand(mode, 'rise', 7, x) for mode in MOVING for x in (1.0, 1.0 / 3.0, 1e-300, 0.0)),
+    *(BodyCommand(mode, name, x, -x) for mode in MOVING for name in ('rise', 'push_left')
+      for x in (1.0, 1.0 / 3.0, 1e-300)),
 ])
-def test_the_text_reads_back_bit_for_bit(command: BodyCommand) -> None:
-    assert BodyCommand.from_text(command.text) == command
+def test_the_rows_of_a_command_read_back_bit_for_bit(command: BodyCommand) -> None:
+    assert read_command_rows(*command_rows(command)) == command
 
 
-@pytest.mark.parametrize('text', [
-    '', 'flying', 'base_link', 'rising', 'rising rise 3', 'standing rise 3 0.5', 'rising rise x 1',
-    'rising rise 3 nan', 'rising rise 3 1.5', 'rising rise 3 0.5 6',
+@pytest.mark.parametrize(('rows', 'text'), [
+    ({}, 'must be 1'), ({'mode/standing': 1.0, 'mode/lying': 1.0}, 'must be 1'),
+    ({'mode/standing': 0.5}, 'must be 1'), ({'mode/rising': 1.0}, 'with 0 movements'),
+    ({'mode/standing': 1.0, 'movement/rise': 0.5}, 'with 1 movements'),
+    ({'mode/rising': 1.0, 'movement/rise': 0.5, 'movement/lower': 0.5}, 'with 2 movements'),
+    ({'mode/rising': 1.0, 'movement/rise': 1.5}, 'phase 1.5'),
+    ({'mode/rising': 1.0, 'movement/rise': float('nan')}, 'phase nan'),
 ])
-def test_other_texts_are_refused_with_what_is_valid(text: str) -> None:
-    with pytest.raises(DataError, match='standing, stopping, lying|body mode|phase in'):
-        BodyCommand.from_text(text)
+def test_other_rows_are_refused_with_what_is_valid(rows: dict[str, float], text: str) -> None:
+    position = [rows.get(name, 0.0) for name in (*MODE_ROWS, *MOVEMENT_ROWS)]
+    with pytest.raises(DataError, match=text):
+        read_command_rows(position, [0.0] * len(position))
+
+
+def test_the_table_of_movements_has_their_names() -> None:
+    assert [Movements(ROBOT).named(name).name for name in MOVEMENT_NAMES] == list(MOVEMENT_NAMES)
 
 
 def test_up_and_down_again() -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from core_examples import geometry, quadruped
 
+from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.modes.command import BodyCommand
 from dmp_cpg_ros.core.modes.motion import LegMotion, phase_at
 from dmp_cpg_ros.core.modes.motion_library import (
     Movements,
@@ -147,7 +147,7 @@ class Mover:
     """The four legs of a robot, driven by commands."""
 
     def __init__(self, start: np.ndarray, dt: float = 0.004) -> None:
-        self.dt, self.count, self.movements = dt, 0, Movements(ROBOT)
+        self.dt, self.movements = dt, Movements(ROBOT)
         primitives = [LegPrimitive(leg, ROBOT, LegParameters()) for leg in LEGS]
         self.legs = [LegMotion(slice(3 * i, 3 * i + 3), self.movements, one.transformation)
                      for i, one in enumerate(primitives)]
@@ -175,11 +175,10 @@ class Mover:
         self.velocities.append(np.concatenate([s.joints.velocity for s in self.states]))
 
     def move(self, name: str, share: float = 1.0) -> Mover:
-        self.count += 1
         duration = self.movements.named(name).duration
         for k in range(round(share * duration / self.dt) + 1):
             x = phase_at(k * self.dt / duration)
-            self.tick(BodyCommand('recovering', name, self.count, x))
+            self.tick(BodyCommand('recovering', name, x))
         return self
 
 
@@ -235,7 +234,7 @@ def test_the_phase_of_the_command_rules_when_ticks_are_lost() -> None:
     whole, gappy = Mover(lying_posture(ROBOT)), Mover(lying_posture(ROBOT))
     duration = whole.movements.named('rise').duration
     for k in range(201):
-        command = BodyCommand('rising', 'rise', 1, phase_at(k * 0.004 / duration))
+        command = BodyCommand('rising', 'rise', phase_at(k * 0.004 / duration))
         whole.tick(command)
         if k % 7 != 3:
             gappy.dt = 0.008 if k % 7 == 4 else 0.004

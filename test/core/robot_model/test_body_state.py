@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from messages import canonical_writer
 
 pytest.importorskip('rclpy')
 
@@ -21,17 +22,17 @@ from ros_processes import Processes, Ros
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
-from dmp_cpg_ros.nodes.body_state import sensor_readings
-from dmp_cpg_ros.nodes.conversions import CanonicalStateWriter, ReferenceWriter
-from dmp_cpg_ros.nodes.interfaces import interface
-from dmp_cpg_ros.nodes.robot_state_messages import (
+from dmp_cpg_ros.nodes.inputs.body_state import sensor_readings
+from dmp_cpg_ros.nodes.messages.cdr import Serialized
+from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter
+from dmp_cpg_ros.nodes.messages.interfaces import interface
+from dmp_cpg_ros.nodes.messages.robot_state import (
     EstimatedOdometryWriter,
     FootContactsReader,
     RobotStateWriter,
     read_imu,
     read_odom,
 )
-from dmp_cpg_ros.nodes.serialized_messages import Serialized
 
 processes, ros_domain, ros = ros_processes.processes, ros_processes.ros_domain, ros_processes.ros
 
@@ -107,7 +108,7 @@ def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros:
     ros.spin_until(lambda: all(each.get_subscription_count() for each in publishers.values()))
     # The node's robot is the package's own; the example stands much like it.
     oscillators = network()
-    writer, reference, canonical = RobotStateWriter(), ReferenceWriter(), CanonicalStateWriter()
+    writer, reference, canonical = RobotStateWriter(), ReferenceWriter(), canonical_writer()
 
     ticks = itertools.count(1)
 
@@ -123,7 +124,8 @@ def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros:
         publishers['joint_states'].publish(writer.joint_states.serialized)
         publishers['reference'].publish(reference.fill(time_ns, np.zeros(3)).serialized)
         publishers['canonical_state'].publish(
-            canonical.fill(time_ns, oscillators.locked_state(), np.zeros((4, 2))).serialized)
+            canonical.fill(time_ns, oscillators.locked_state(), np.zeros((4, 2)),
+                           oscillators.gait).serialized)
         return True
 
     def told_problems() -> str:

@@ -1,0 +1,287 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Running nodes: middleware, executor, scheduling, and what the process says at its end.
+
+Every message wakes its reader, and a reader that Linux wakes takes the core from the writer, who
+has four more messages to publish: ten processes on two cores changed places 9,000 times a second.
+Under ``SCHED_BATCH`` (sched(7)) whoever is woken waits until the writer has finished its tick and
+sleeps. The policy needs no privilege and changes nobody's share of the processor.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from types import FrameType
+
+import rclpy
+from rclpy.context import Context
+from rclpy.exceptions import ParameterException
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rclpy.utilities import get_default_context, remove_ros_args
+
+from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
+from dmp_cpg_ros.nodes.framework.claims import claim_node
+from dmp_cpg_ros.nodes.framework.parameters import BATCH, NodeParameters, help_text
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+
+PROFILE = 'fastdds.xml'
+"""Profile of Fast DDS in the config folder; it says why it is there."""
+
+VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
+"""Environment variables that name a profile: of Fast DDS 2 (Jazzy has it) and of 3."""
+
+_IN_WORKING_FOLDER = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
+
+
+def prepare_middleware() -> None:
+    """Name our profile to Fast DDS unless the user has one; call before ``rclpy.init``.
+
+    Other middlewares do not look at these variables. Processes that are started later inherit
+    them.
+    """
+    if any(os.environ.get(name) for name in VARIABLES):
+        return
+    if any(Path(name).is_file() for name in _IN_WORKING_FOLDER):
+        return
+    profile = str(find_config(PROFILE))
+    for name in VARIABLES:
+        os.environ[name] = profile
+
+
+_THREADS = '/proc/self/task'
+
+
+def schedule(policy: str) -> int:
+    """Schedule all threads of this process; those that they start inherit the policy.
+
+    Parameters
+    ----------
+    policy : str
+        ``batch``, or ``normal`` for leaving everything as it is. A thread whose policy somebody
+        has chosen already (``chrt``) keeps it, and so do all where the operating system has no
+        such policy.
+
+    Returns
+    -------
+    int
+        Number of threads that changed.
+    """
+    if policy != BATCH or not hasattr(os, 'SCHED_BATCH') or not os.path.isdir(_THREADS):
+        return 0
+    changed = 0
+    for thread in map(int, os.listdir(_THREADS)):
+        with contextlib.suppress(OSError):  # one that has just ended, or may not be changed
+            if os.sched_getscheduler(thread) == os.SCHED_OTHER:
+                os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0))
+                changed += 1
+    return changed
+
+
+FOREVER_S = 1e6
+"""A bounded wait: unbounded ones of the events executor do not work in some builds [s]."""
+
+YOUNG_OBJECTS = 20_000
+"""New objects after which the garbage collector looks for cycles; Python's own figure is 700."""
+
+OK, FAILED, BAD_INPUT = 0, 1, 2
+"""Exit statuses."""
+
+_BAD_ARGUMENTS = (ParameterError, MissingFileError, ParameterException,
+                  rclpy_implementation.RCLInvalidROSArgsError,
+                  rclpy_implementation.UnknownROSArgsError)
+
+
+def make_executor(kind: str, context: Context | None = None) -> Executor:
+    """Make an executor.
+
+    Parameters
+    ----------
+    kind : str
+        ``events`` or ``single``. Where the events executor is missing or does not run a first
+        task, the single-threaded one is returned, with a warning.
+    context : Context, optional
+        Default: the global one.
+    """
+    if kind == 'events':
+        try:
+            from rclpy.experimental import EventsExecutor
+            executor = EventsExecutor(context=context or get_default_context())
+            task = executor.create_task(lambda: True)
+            executor.spin_until_future_complete(task, timeout_sec=2.0)
+            if task.done():
+                return executor
+            reason = 'it did not run a first task'
+        except (ImportError, AttributeError, TypeError, RuntimeError) as error:
+            reason = str(error)
+        get_logger('executor').warning(
+            f'no events executor ({reason}); using the single-threaded one')
+    return SingleThreadedExecutor(context=context)
+
+
+def spin(nodes: Node | Sequence[Node], kind: str = 'events', until: Future | None = None) -> None:
+    """Run nodes of one context in one executor until it is shut down or a future is done.
+
+    Parameters
+    ----------
+    nodes : Node or sequence of Node
+        Several nodes make up a composed process.
+    kind : str
+        As for :func:`make_executor`.
+    until : Future, optional
+        Ends the run.
+    """
+    nodes = [nodes] if isinstance(nodes, Node) else list(nodes)
+    context, until = nodes[0].context, until or Future()
+    executor = make_executor(kind, context)
+    # What start-up made stays; without this the collector would look through it in mid-tick. Ticks
+    # leave no cycles behind, so it need not look often at what they make.
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(YOUNG_OBJECTS)
+    try:
+        for node in nodes:
+            executor.add_node(node)
+        while context.ok() and not until.done():
+            begin = time.monotonic()
+            executor.spin_until_future_complete(until, timeout_sec=FOREVER_S)
+            if context.ok() and not until.done() and time.monotonic() - begin < 1.0:
+                raise RuntimeError("the executor returned at once; try parameter 'executor'")
+    except ExternalShutdownException:
+        pass
+    finally:
+        for node in nodes:
+            executor.remove_node(node)
+
+
+def run_node(node_class: type[SuiteNode], arguments: Sequence[str] | None = None) -> int:
+    """Body of the executable of a node.
+
+    Parameters
+    ----------
+    node_class : type of SuiteNode
+        Kind of node.
+    arguments : sequence of str, optional
+        Command line without the program's name; default that of the process.
+
+    Returns
+    -------
+    int
+        Exit status: 0 after Ctrl-C or SIGTERM, 2 when a parameter or argument is bad, 1 when
+        something else failed.
+    """
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if {'-h', '--help'} & set(_before_ros_args(arguments)):
+        print(help_text(node_class))
+        return OK
+    return run_nodes(node_class.KIND, arguments,
+                     lambda: [node_class(node_class.default_name(arguments))])
+
+
+def run_nodes(program: str, arguments: Sequence[str],
+              make: Callable[[], Iterable[SuiteNode]]) -> int:
+    """Run nodes in one process and one executor, from ``rclpy.init`` to the exit status.
+
+    Parameters
+    ----------
+    program : str
+        Name for messages.
+    arguments : sequence of str
+        Command line without the program's name; all of it for ROS.
+    make : callable () → iterable of SuiteNode
+        Makes the nodes; called after ``rclpy.init``. The first node's parameters ``executor`` and
+        ``scheduling`` decide for all.
+
+    Returns
+    -------
+    int
+        As for :func:`run_node`.
+    """
+    nodes: list[SuiteNode] = []
+    until = _first_signal()
+    status = _status(program, lambda: _run(program, arguments, make, nodes, until))
+    for node in nodes:
+        status = max(status, _status(program, node.close), _status(program, node.destroy_node))
+    rclpy.try_shutdown()
+    return status
+
+
+def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[SuiteNode]],
+         nodes: list[SuiteNode], until: Future) -> None:
+    unknown = remove_ros_args([program, *arguments])[1:]
+    if unknown:
+        raise ParameterError(
+            f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
+    prepare_middleware()
+    rclpy.init(args=[program, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+    nodes.extend(make())
+    claims = [claim_node(node) for node in nodes]
+    for node in nodes:
+        node.start()
+    parameters = nodes[0].parameters_of(NodeParameters)
+    schedule(parameters.scheduling)
+    spin(nodes, parameters.executor, until)
+    del claims
+
+
+def _status(program: str, body: Callable[[], object]) -> int:
+    """Run a body; what it raises becomes a message and an exit status."""
+    try:
+        body()
+    except _BAD_ARGUMENTS as error:
+        return _said(program, str(error), BAD_INPUT)
+    except DmpCpgError as error:
+        return _said(program, str(error), FAILED)
+    except Exception:  # noqa: BLE001 - the last resort of a process
+        return _said(program, traceback.format_exc(), FAILED)
+    return OK
+
+
+def _said(program: str, message: str, status: int) -> int:
+    print(f'{program}: {message}', file=sys.stderr, flush=True)
+    return status
+
+
+def _before_ros_args(arguments: list[str]) -> list[str]:
+    return arguments[:arguments.index('--ros-args')] if '--ros-args' in arguments else arguments
+
+
+def _first_signal() -> Future:
+    """Return a future that SIGINT or SIGTERM completes; nothing else comes of them.
+
+    rclpy's handler would end the context under callbacks that still run, and Python's would raise
+    in one of them; a second Ctrl-C must not break into what is being completed: a recording.
+    """
+    until = Future()
+    readable, writable = os.pipe()
+    os.set_blocking(writable, False)
+    # Python runs handlers between two of its own instructions, of which a waiting executor
+    # executes none; the byte is written at once.
+    signal.set_wakeup_fd(writable, warn_on_full_buffer=False)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _ignore)
+
+    def wait() -> None:
+        os.read(readable, 1)
+        until.set_result(None)
+
+    threading.Thread(target=wait, daemon=True).start()
+    return until
+
+
+def _ignore(signum: int, frame: FrameType | None) -> None:
+    """Do nothing: the signal has written its byte."""

@@ -1,0 +1,320 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a node says about itself: counts and problems, timing, connections.
+
+Discovery is not symmetric in time: a reader may know a writer before the writer knows the reader,
+and a reliable volatile writer sends nothing to readers that it does not know yet. So each node
+answers for its own ends only: its expected partners are in the graph, and as many ends as the
+graph shows are matched here.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import zlib
+from array import array
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.nodes.messages.interfaces import Interface, partners
+from dmp_cpg_ros.nodes.messages.values import set_stamp, text
+from dmp_cpg_ros.suite_table import KINDS
+
+PERIOD_NS = 1_000_000_000
+"""Time between reports on the robot's clock [ns]."""
+
+LOG_EVERY_S = 5.0
+"""Time after which a topic's next dropped message is logged again [s]."""
+
+
+class NodeHealth:
+    """Ticks, rejected messages and problems of one node.
+
+    Parameters
+    ----------
+    name : str
+        Name of the node.
+    clock : callable () → float
+        Steady time [s]: what is dropped may come while the robot's clock stands still.
+
+    Attributes
+    ----------
+    ticks : int
+        Ticks since the node was made.
+    stamp_ns : int
+        Stamp of the last tick [ns].
+    rejected : dict of str to int
+        Messages that were dropped, per topic; requests, per service.
+    """
+
+    def __init__(self, name: str, clock: Callable[[], float] = time.monotonic) -> None:
+        """Start healthy; nodes report at different moments, so that no tick bears all reports."""
+        self.name, self._clock = name, clock
+        self.ticks = 0
+        self.stamp_ns = 0
+        self.rejected: dict[str, int] = {}
+        self._recent: dict[str, tuple[bytes, str]] = {}
+        self._logged: dict[str, float] = {}
+        self._problems: dict[str, tuple[bytes, str]] = {}
+        self._offset_ns = zlib.crc32(name.encode()) % PERIOD_NS
+        self._period = -1
+
+    def due(self) -> bool:
+        """Whether a second of the robot's clock has begun since the last time this was true."""
+        period = (self.stamp_ns + self._offset_ns) // PERIOD_NS
+        if period == self._period:
+            return False
+        self._period = period
+        return True
+
+    def reject(self, topic: str, problem: str, *, error: bool = False) -> bool:
+        """Count a dropped message; returns whether to log it: not again within ``LOG_EVERY_S``."""
+        self.rejected[topic] = self.rejected.get(topic, 0) + 1
+        self._recent[topic] = (_level(error), f'{topic}: {problem}')
+        now, logged = self._clock(), self._logged.get(topic)
+        if logged is not None and now < logged + LOG_EVERY_S:
+            return False
+        self._logged[topic] = now
+        return True
+
+    def set_problem(self, key: str, message: str, *, error: bool = False) -> bool:
+        """Raise a warning (or error) that stays until it is cleared; returns whether it is new."""
+        problem = (_level(error), message)
+        new = self._problems.get(key) != problem
+        self._problems[key] = problem
+        return new
+
+    def has_problem(self, key: str) -> bool:
+        """Whether a warning is raised."""
+        return key in self._problems
+
+    def clear_problem(self, key: str) -> bool:
+        """Withdraw a warning; returns whether there was one."""
+        return self._problems.pop(key, None) is not None
+
+    def status(self, state: str, values: Mapping[str, Any], *, periodic: bool) -> DiagnosticArray:
+        """Build the report.
+
+        Parameters
+        ----------
+        state : str
+            Lifecycle state.
+        values : mapping of str to value
+            What the node adds.
+        periodic : bool
+            Whether this report closes the second in which messages were rejected; later reports
+            are healthy again.
+        """
+        problems = dict(self._problems)
+        for topic, problem in self._recent.items():
+            problems.setdefault(topic, problem)
+        if periodic:
+            self._recent = {}
+        entries: dict[str, Any] = {
+            'state': state, 'ticks': self.ticks, 'last_stamp_ns': self.stamp_ns}
+        entries.update((f'rejected.{topic}', count) for topic, count in self.rejected.items())
+        entries.update(values)
+        status = DiagnosticStatus(
+            name=self.name, hardware_id='dmp_cpg_ros',
+            level=max((level for level, _ in problems.values()), default=DiagnosticStatus.OK),
+            message='; '.join(message for _, message in problems.values()) or state,
+            values=[KeyValue(key=key, value=text(value)) for key, value in entries.items()])
+        message = DiagnosticArray(status=[status])
+        set_stamp(message.header.stamp, self.stamp_ns)
+        return message
+
+
+def _level(error: bool) -> bytes:
+    return bytes(DiagnosticStatus.ERROR if error else DiagnosticStatus.WARN)
+
+
+class RobotTiming:
+    """Measures on the machine's monotonic clock; nothing of it enters the gait."""
+
+    def __init__(self) -> None:
+        """Start without any tick."""
+        self._published: dict[int, list[float]] = {}
+        self._latency = array('d')
+        self._first: tuple[float, int] | None = None
+        self._last: tuple[float, int] | None = None
+        self.ticks = 0
+        self.misses = 0
+        self.waits = 0
+
+    def published(self, stamp_ns: int) -> None:
+        """Note that the state of a tick has been published."""
+        now = time.monotonic()
+        self._first = self._first or (now, stamp_ns)
+        self._last = (now, stamp_ns)
+        self.ticks += 1
+        self._published[stamp_ns] = [now, 0.0]
+        if len(self._published) > 64:
+            del self._published[min(self._published)]
+
+    def arrived(self, stamp_ns: int) -> None:
+        """Note that a leg's targets of a tick have arrived."""
+        entry = self._published.get(stamp_ns)
+        if entry is None:
+            return
+        entry[1] += 1.0
+        if entry[1] == len(LEGS):
+            self._latency.append(1e3 * (time.monotonic() - entry[0]))
+
+    def deadline(self, stamp_ns: int) -> None:
+        """Note that the tick after ``stamp_ns`` begins: its targets should have arrived."""
+        entry = self._published.get(stamp_ns)
+        if entry is not None and entry[1] < len(LEGS):
+            self.misses += 1
+
+    def waited(self) -> None:
+        """Note that the simulation let a period of wall time pass."""
+        self.waits += 1
+
+    def values(self) -> dict[str, float | int]:
+        """Rate [Hz], real-time factor, latency [ms] and misses since the start; NaN without
+        ticks.
+        """
+        values: dict[str, float | int] = {
+            'deadline_misses': self.misses,
+            'waits': self.waits,
+            'timed_ticks': self.ticks,
+        }
+        wall = robot = float('nan')
+        if self._first is not None and self._last is not None and self._last[0] > self._first[0]:
+            wall, robot = self._last[0] - self._first[0], (self._last[1] - self._first[1]) * 1e-9
+        latency = np.frombuffer(self._latency) if self._latency else np.array([np.nan])
+        values.update(
+            rate_hz=(self.ticks - 1) / wall,
+            real_time_factor=robot / wall,
+            latency_ms_p50=float(np.percentile(latency, 50)),
+            latency_ms_p99=float(np.percentile(latency, 99)),
+        )
+        return values
+
+
+ASK_AGAIN_S = 2.0
+"""Time after which a request without an answer is repeated [s]."""
+
+
+class Intervals:
+    """Growing intervals of wall time at which someone who waits says what for.
+
+    Parameters
+    ----------
+    first_s : float
+        The first of them [s]; each is twice as long as the one before.
+    """
+
+    def __init__(self, first_s: float = 1.0) -> None:
+        """Begin the first."""
+        self._length_s, self._end = first_s, time.monotonic() + first_s
+
+    def due(self) -> bool:
+        """Whether an interval has ended since the last time this was true."""
+        now = time.monotonic()
+        if now < self._end:
+            return False
+        self._length_s *= 2.0
+        self._end = now + self._length_s
+        return True
+
+
+class ReadinessOfOthers:
+    """Asks nodes whether they are ready, again and again until each has said so.
+
+    Parameters
+    ----------
+    node : Node
+        Who asks.
+    names : iterable of str
+        Names of nodes in its namespace.
+    """
+
+    def __init__(self, node: Node, names: Iterable[str]) -> None:
+        """Create the clients."""
+        self._node = node
+        self._clients = {name: node.create_client(Trigger, f'{name}/ready') for name in names}
+        self._asked: dict[str, tuple[float, Future]] = {}
+        self._said: dict[str, str] = {}
+
+    def missing(self) -> list[str]:
+        """Take answers and ask again, without waiting; returns who has not said yes, and why."""
+        for name, client in list(self._clients.items()):
+            asked_s, future = self._asked.get(name, (-math.inf, Future()))
+            answer = future.result() if future.done() else None
+            if answer is not None and answer.success:
+                self._node.destroy_client(self._clients.pop(name))
+                continue
+            if answer is not None:
+                self._said[name] = answer.message
+            # A response is lost where the server does not know the client yet.
+            lost = time.monotonic() > asked_s + ASK_AGAIN_S
+            if (answer is not None or lost) and client.service_is_ready():
+                client.remove_pending_request(future)
+                self._asked[name] = time.monotonic(), client.call_async(Trigger.Request())
+        return [f'{name}: {self._said.get(name, "it does not answer")}' for name in self._clients]
+
+
+def missing_connections(node: Node, kind: str,
+                        outputs: Sequence[tuple[Interface, Sequence[str], Publisher]],
+                        inputs: Sequence[tuple[Interface, Subscription]],
+                        expected: Collection[str]) -> list[str]:
+    """List what is missing.
+
+    Parameters
+    ----------
+    node : Node
+        The node.
+    kind : str
+        Its kind.
+    outputs : sequence of (Interface, sequence of str, Publisher)
+        Its publishers and the kinds of nodes that read them.
+    inputs : sequence of (Interface, Subscription)
+        Its subscriptions.
+    expected : collection of str
+        Kinds of nodes that take part; others are not waited for.
+
+    Returns
+    -------
+    list of str
+        One text per missing connection.
+    """
+    missing: list[str] = []
+    for topic, readers, publisher in outputs:
+        ends = node.get_subscriptions_info_by_topic(publisher.topic_name)
+        absent = _absent(node, ends, readers, kind, expected)
+        missing += [f'{topic.name} is not read by {name}' for name in absent]
+        known = sum(_compatible(publisher.qos_profile, end.qos_profile) for end in ends)
+        if not absent and publisher.get_subscription_count() < known:
+            missing.append(f'{topic.name} is not matched with all of its {known} readers')
+    for topic, subscription in inputs:
+        ends = node.get_publishers_info_by_topic(subscription.topic_name)
+        absent = _absent(node, ends, partners(topic, readers=False), kind, expected)
+        missing += [f'{topic.name} is not published by {name}' for name in absent]
+        known = sum(_compatible(end.qos_profile, subscription.qos_profile) for end in ends)
+        if not absent and subscription.get_publisher_count() < known:
+            missing.append(f'{topic.name} is not matched with all of its {known} publishers')
+    return missing
+
+
+def _absent(node: Node, ends: Sequence[Any], partners: Sequence[str],
+            kind: str, expected: Collection[str]) -> list[str]:
+    """Names of expected partners that are not among the ends of a topic."""
+    found = {end.node_name for end in ends if end.node_namespace == node.get_namespace()}
+    return [name for partner in partners if partner in expected and partner != kind
+            for name in KINDS[partner].instances if name not in found]
+
+
+def _compatible(offered: QoSProfile, requested: QoSProfile) -> bool:
+    return bool(qos_check_compatible(offered, requested)[0] != QoSCompatibility.ERROR)

@@ -1,0 +1,161 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot's state as ``posture_control`` knows it: estimated, or the simulator's truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.core.estimation.estimate import BodyEstimate, estimated_state
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
+from dmp_cpg_ros.core.estimation.parameters import (
+    ESTIMATE,
+    EstimationParameters,
+    StateSourceParameters,
+)
+from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
+from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
+from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS
+from dmp_cpg_ros.nodes.messages.robot_state import (
+    EstimatedOdometryWriter,
+    FootContactsReader,
+    JointsReader,
+    read_imu,
+    read_odom,
+    robot_state,
+)
+from dmp_cpg_ros.nodes.messages.values import stamped
+
+WELL_AGAIN_NS = 1_000_000_000
+"""Time without a problem after which sensors count as well again [ns]."""
+
+
+class BodyState:
+    """Topics and estimator behind the state of the body.
+
+    Parameters
+    ----------
+    node : SuiteNode
+        The node that needs the state; its parameters choose where it comes from.
+    description : RobotDescription
+        The robot.
+    legs : RobotLegs, optional
+        Its legs, where others ask them too.
+
+    Attributes
+    ----------
+    inputs : tuple of str
+        Topics, for :meth:`~dmp_cpg_ros.nodes.framework.suite_node.SuiteNode.match`.
+    optional : tuple of str
+        Of these: those whose silence the estimator bears.
+    readers : mapping of str to callable
+        How to read each.
+    estimate : BodyEstimate or None
+        The last one.
+    """
+
+    def __init__(
+        self, node: SuiteNode, description: RobotDescription, legs: RobotLegs | None = None
+    ) -> None:
+        """Build the estimator, where there is one, and its publisher."""
+        self._node = node
+        source = node.parameters_of(StateSourceParameters).state_source
+        self.inputs = ('joint_states', *BODY_TOPICS[source])
+        self.estimate: BodyEstimate | None = None
+        self._memory: EstimatorState | None = None
+        self._estimator: BodyEstimator | None = None
+        self.readers: dict[str, Callable[[Any], Any]] = {'joint_states': JointsReader().read}
+        if source != ESTIMATE:
+            self.optional: tuple[str, ...] = ()
+            self.readers['odom'] = read_odom
+            return
+        self.optional = BODY_TOPICS[ESTIMATE]
+        contacts = FootContactsReader(strict=False)
+        self.readers |= {'imu': stamped(read_imu), 'foot_contacts': stamped(contacts.read)}
+        self._estimator = BodyEstimator(
+            description, node.parameters_of(EstimationParameters), legs)
+        self._writer, self._publisher = (
+            EstimatedOdometryWriter(),
+            node.publisher('estimated_odom'),
+        )
+        self._published, self._problem_ns = -1, 0
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """Take over the estimator's parameters."""
+        if self._estimator is None:
+            return
+        parameters = self._node.parameters_of(EstimationParameters)
+        self._estimator.parameters = parameters
+        rate = parameters.estimate_rate
+        self._period_ns = round(1e9 / rate) if rate > 0.0 else 0
+
+    def state(self, stamp_ns: int, values: Mapping[str, Any]) -> RobotState:
+        """State at a stamp from what the topics said.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Stamp of the tick [ns].
+        values : mapping
+            By topic, what its reader returned.
+        """
+        if self._estimator is None:
+            return robot_state(
+                stamp_ns, values['joint_states'], values['odom'], np.zeros(len(LEGS))
+            )
+        readings = sensor_readings(stamp_ns, values)
+        self._memory, estimate = self._estimator.step(self._memory, readings)
+        self.estimate = estimate
+        self._tell_problems(stamp_ns, estimate)
+        if self._period_ns and stamp_ns // self._period_ns != self._published:
+            self._published = stamp_ns // self._period_ns
+            self._publisher.publish(self._writer.fill(estimate))
+        return estimated_state(readings, estimate)
+
+    def diagnostic_values(self) -> Mapping[str, Any]:
+        """Values for ``/diagnostics``: what no other topic tells of the estimate."""
+        memory, estimate = self._memory, self.estimate
+        if memory is None or estimate is None:
+            return {}
+        roll, pitch, _ = roll_pitch_yaw(estimate.quaternion)
+        slope_x, slope_y = memory.terrain.slope
+        return {
+            'estimated_roll_rad': roll,
+            'estimated_pitch_rad': pitch,
+            'estimated_height_m': estimate.height,
+            'terrain_slope_x': slope_x,
+            'terrain_slope_y': slope_y,
+            'gyro_bias_rad_s': ' '.join(f'{bias:.5f}' for bias in memory.filter.gyro_bias),
+        }
+
+    def _tell_problems(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+        if estimate.problems:
+            self._problem_ns = stamp_ns
+            self._node.warn(
+                'sensors',
+                f'the estimator does without {", ".join(estimate.problems)}: silent, not finite, '
+                'or impossible',
+            )
+        elif stamp_ns > self._problem_ns + WELL_AGAIN_NS:
+            self._node.clear('sensors')
+
+
+def sensor_readings(stamp_ns: int, values: Mapping[str, Any]) -> SensorReadings:
+    """Readings of one tick; what bears another stamp is missing (NaN)."""
+    position, velocity, effort = values['joint_states']
+    rate = force = np.full(3, np.nan)
+    contacts = np.full(len(LEGS), np.nan)
+    imu, feet = values['imu'], values['foot_contacts']
+    if imu is not None and imu[0] == stamp_ns:
+        rate, force = imu[1]
+    if feet is not None and feet[0] == stamp_ns:
+        contacts = feet[1]
+    return SensorReadings(stamp_ns, position, velocity, effort, rate, force, contacts)

@@ -1,0 +1,3 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The suite's messages: their table, their bytes, and the arrays that they carry."""

@@ -1,0 +1,339 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the suite needs of the messages of every tick, read from their serialized bytes.
+
+rclpy builds a Python object for every part of a message: 30 objects for a ``JointState`` of
+twelve joints, of which a node needs the stamp and three arrays. The readers of this module take
+these from the bytes: CDR in little-endian order as of OMG DDSI-RTPS 2.5, section 10, with every
+primitive aligned to its size, counted from behind the four bytes that name the encoding. What is
+encoded otherwise is left to rclpy.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import Imu, JointState
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.nodes.messages.values import NS, Array, checked, stamp_in_ns
+
+CDR_LITTLE_ENDIAN = b'\x00\x01'
+"""First two bytes of a message that this module reads itself."""
+
+LONGEST = 100_000
+"""Bytes of a message that are read at most; the suite's own are a few thousand long."""
+
+BODY = 4
+"""Where a message begins: behind the bytes that say how it is encoded."""
+
+
+class Serialized:
+    """A message known by its bytes.
+
+    Attributes
+    ----------
+    serialized : bytes
+        The message.
+    stamp_ns : int
+        Stamp of its header [ns].
+    """
+
+    __slots__ = ('serialized', 'stamp_ns')
+    KIND: ClassVar[type]
+
+    serialized: bytes
+    stamp_ns: int
+
+
+_HEADER, _COUNT = struct.Struct('<iII'), struct.Struct('<I')
+_TWIST, _IMU = struct.Struct('<6d'), struct.Struct('<104x3d72x3d')
+
+
+class SerializedJointState(Serialized):
+    """Stamp, names and arrays of a serialized ``JointState``.
+
+    Attributes
+    ----------
+    frame_id : str
+        Frame of the header.
+    name : list of str
+        Names; the same list object for the same names.
+    """
+
+    __slots__ = ('_arrays', '_places', '_sound', 'frame_id', 'name')
+    KIND = JointState
+
+    def __init__(self, data: bytes) -> None:
+        """Read the bytes; raises struct.error or ValueError when they are cut short."""
+        self.stamp_ns, self.frame_id, at = _header(data)
+        self.name, at = _names(data, at)
+        first = _doubles(data, at)
+        second = _doubles(data, first[1])
+        self.serialized, self._places = data, (first, second, _doubles(data, second[1]))
+        self._arrays: list[Array | None] = [None, None, None]
+        self._sound: set[str] = set()
+
+    def refilled(self, data: bytes, stamp_ns: int) -> SerializedJointState:
+        """Return a message of the same layout, without reading that again."""
+        message = SerializedJointState.__new__(SerializedJointState)
+        message.serialized, message.stamp_ns = data, stamp_ns
+        message.frame_id, message.name, message._places = self.frame_id, self.name, self._places
+        message._arrays, message._sound = [None, None, None], set()
+        return message
+
+    @property
+    def position(self) -> Array:
+        """Positions."""
+        return self._array(0)
+
+    @property
+    def velocity(self) -> Array:
+        """Velocities."""
+        return self._array(1)
+
+    @property
+    def effort(self) -> Array:
+        """Efforts."""
+        return self._array(2)
+
+    def checked(self, field: str) -> Array:
+        """An array whose numbers are finite, checked once for all readers; raises DataError."""
+        array: Array = getattr(self, field)
+        if field not in self._sound:
+            checked(array, field)
+            self._sound.add(field)
+        return array
+
+    def _array(self, which: int) -> Array:
+        array = self._arrays[which]
+        if array is None:
+            begin, end = self._places[which]
+            array = self._arrays[which] = np.frombuffer(self.serialized[begin:end])
+        return array
+
+
+class SerializedTwist(Serialized):
+    """Stamp and numbers of a serialized ``TwistStamped``.
+
+    Attributes
+    ----------
+    numbers : tuple of float
+        Linear x, y, z [m/s], angular x, y, z [rad/s].
+    """
+
+    __slots__ = ('numbers',)
+    KIND = TwistStamped
+
+    def __init__(self, data: bytes) -> None:
+        """Read the bytes; raises struct.error when they are cut short."""
+        self.serialized = data
+        self.stamp_ns, _, at = _header(data)
+        self.numbers: tuple[float, ...] = _TWIST.unpack_from(data, aligned(at, 8))
+
+
+class SerializedImu(Serialized):
+    """Stamp and measurements of a serialized ``Imu``.
+
+    Attributes
+    ----------
+    rate : tuple of float
+        Angular velocity [rad/s].
+    force : tuple of float
+        Linear acceleration [m/s^2].
+    """
+
+    __slots__ = ('force', 'rate')
+    KIND = Imu
+
+    def __init__(self, data: bytes) -> None:
+        """Read the bytes; raises struct.error when they are cut short."""
+        self.serialized = data
+        self.stamp_ns, _, at = _header(data)
+        numbers = _IMU.unpack_from(data, aligned(at, 8))
+        self.rate, self.force = numbers[:3], numbers[3:]
+
+
+class SerializedOdometry(Serialized):
+    """A serialized ``Odometry``, which the suite only writes."""
+
+    __slots__ = ()
+    KIND = Odometry
+
+    def __init__(self, data: bytes) -> None:
+        """Read the stamp; raises struct.error when the bytes are cut short."""
+        self.serialized = data
+        self.stamp_ns = _header(data)[0]
+
+
+_READERS: dict[type, Callable[[bytes], Any]] = {
+    kind.KIND: kind for kind in (SerializedJointState, SerializedTwist, SerializedImu)
+}
+
+
+def serialized_reader(kind: type, *, as_message: bool = False) -> Callable[[bytes], Any]:
+    """How to read the bytes of a kind of message.
+
+    Parameters
+    ----------
+    kind : type
+        Message class.
+    as_message : bool
+        Whether to return the message class itself whatever it is.
+
+    Returns
+    -------
+    callable (bytes) → message
+        Returns one of this module's classes, or the message itself where this module does not read
+        its kind or its encoding; raises DataError for a stamp that is no time, for bytes that are
+        no such message, and for more than ``LONGEST`` of them.
+    """
+    own = None if as_message else _READERS.get(kind)
+
+    def reader(data: bytes) -> Any:
+        if len(data) > LONGEST:
+            raise DataError(f'{len(data)} bytes of {kind.__name__}; at most {LONGEST} are read')
+        try:
+            if own is None or data[:2] != CDR_LITTLE_ENDIAN:
+                return deserialize_message(data, kind)
+            return own(data)
+        except (struct.error, ValueError, MemoryError, rclpy_implementation.RMWError) as error:
+            raise DataError(f'{len(data)} bytes are no {kind.__name__}: {error}') from None
+
+    return reader
+
+
+def aligned(at: int, size: int) -> int:
+    """Place of the next primitive of a size of 4 or 8 bytes, at or behind a place."""
+    return at + (BODY - at) % size
+
+
+def _header(data: bytes) -> tuple[int, str, int]:
+    """Stamp [ns] and frame of the header, and where what follows it begins."""
+    seconds, rest, length = _HEADER.unpack_from(data, BODY)
+    begin = BODY + _HEADER.size
+    end = begin + length
+    return stamp_in_ns(seconds, rest), data[begin:end - 1].decode() if length else '', end
+
+
+_KEY = 16
+"""Bytes by which names are looked up: their number and the begin of the first one."""
+
+_MOST_NAMES, _LONGEST_NAMES = 256, 4096
+"""Sequences of names that are known at a time, and bytes of the longest of them."""
+
+_known_names: dict[bytes, tuple[bytes, list[str]]] = {}
+"""Bytes of what was read, and what they say, by the first bytes."""
+
+
+def _names(data: bytes, at: int) -> tuple[list[str], int]:
+    """Sequence of texts and where what follows it begins.
+
+    Senders repeat their names in every message, so these are compared with known ones. The bytes
+    that align texts are arbitrary: where they differ, the names are read again.
+    """
+    at = aligned(at, 4)
+    key = data[at:at + _KEY]
+    raw, names = _known_names.get(key, (b'', []))
+    end = at + len(raw)
+    if raw and data[at:end] == raw:
+        return names, end
+    (count,) = _COUNT.unpack_from(data, at)
+    end, names = at + 4, []
+    for _ in range(count):
+        begin = aligned(end, 4) + 4
+        end = begin + _COUNT.unpack_from(data, begin - 4)[0]
+        if not begin < end <= len(data):
+            raise ValueError('a name is cut short')
+        names.append(data[begin:end - 1].decode())
+    if end - at <= _LONGEST_NAMES:
+        if len(_known_names) >= _MOST_NAMES:
+            _known_names.clear()
+        _known_names[key] = data[at:end], names
+    return names, end
+
+
+def _doubles(data: bytes, at: int) -> tuple[int, int]:
+    """Begin and end of a sequence of doubles."""
+    at = aligned(at, 4)
+    (count,) = _COUNT.unpack_from(data, at)
+    at += 4
+    if not count:
+        return at, at
+    at = aligned(at, 8)
+    end = at + 8 * count
+    if end > len(data):
+        raise ValueError('an array is cut short')
+    return at, end
+
+
+_STAMP, _COUNT = struct.Struct('<iI'), struct.Struct('<I')
+
+
+class SerializedDraft:
+    """Bytes of a message under construction, in the order of its definition."""
+
+    def __init__(self) -> None:
+        """Begin with the encoding and a stamp of zero."""
+        self.data = bytearray(CDR_LITTLE_ENDIAN + bytes(BODY - 2 + _STAMP.size))
+
+    def text(self, value: str) -> None:
+        """Append a text."""
+        raw = value.encode() + b'\0'
+        self.count(len(raw))
+        self.data += raw
+
+    def count(self, number: int) -> None:
+        """Append the length of a sequence."""
+        self._align(4)
+        self.data += _COUNT.pack(number)
+
+    def doubles(self, number: int) -> slice:
+        """Append zeros; returns where they are."""
+        self._align(8)
+        begin = len(self.data)
+        self.data += bytes(8 * number)
+        return slice(begin, begin + 8 * number)
+
+    def _align(self, size: int) -> None:
+        self.data += bytes(aligned(len(self.data), size) - len(self.data))
+
+
+class RefilledMessage:
+    """Bytes of a message of which the stamp and some runs of numbers are refilled.
+
+    Parameters
+    ----------
+    draft : SerializedDraft
+        The whole message.
+    places : sequence of slice
+        Where the runs of numbers are.
+    """
+
+    def __init__(self, draft: SerializedDraft, places: Sequence[slice]) -> None:
+        """Keep the bytes."""
+        self._data, self._places = draft.data, tuple(places)
+
+    def filled(self, time_ns: int, runs: Iterable[bytes]) -> bytes:
+        """Return the message with a stamp [ns] and the bytes of its runs of doubles.
+
+        Raises
+        ------
+        ValueError
+            If a run has another length than its place, or there are more or fewer runs.
+        """
+        data = self._data
+        _STAMP.pack_into(data, BODY, *divmod(time_ns, NS))
+        for place, run in zip(self._places, runs, strict=True):
+            if len(run) != place.stop - place.start:
+                raise ValueError(f'{len(run) // 8} numbers for '
+                                 f'{(place.stop - place.start) // 8} places')
+            data[place] = run
+        return bytes(data)

@@ -1,0 +1,261 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every topic and service of the suite: name, type, quality of service, writers and readers.
+
+Quality of service. What is sent at every tick is reliable: in lock-step a single lost message
+would stop the run, and in a recording it would be a hole. REP-2003 asks *consumers* of sensor data
+to be best effort; a reliable publisher matches such consumers too, so users' tools lose nothing by
+this choice. Our own consumers are reliable. Nothing can block: keep-last publishers overwrite
+their oldest message when a reader hangs.
+
+Depths. A publisher keeps ``PUBLISHER_DEPTH`` messages, because that is what can still be sent
+again to a reader that was not scheduled for a while (the recorder is on no tick's path and may
+lag). The suite's nodes are never more than two ticks apart in lock-step; their depth bounds how
+far a late node works through old ticks in real time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.estimation.parameters import ESTIMATE, GROUND_TRUTH
+from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION, REFERENCE
+from dmp_cpg_ros.suite_table import (
+    CLOCK_TOPIC,
+    DIAGNOSTICS_TOPIC,
+    KINDS,
+    LEG,
+    POSTURE,
+    RECORDER,
+    ROBOT,
+)
+
+PUBLISHER_DEPTH = 2000
+"""Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the
+period of 3 s at which Fast DDS tells readers what they have missed."""
+
+READER_DEPTH = 10
+"""Messages of one publisher that a node of the suite queues."""
+
+RECORDER_DEPTH = 8000
+"""Messages per topic that the recorder queues."""
+
+GATE_OWNER = ROBOT
+"""The node that holds the gate; its private topics bear its name."""
+
+
+def _qos(depth: int, *, latched: bool = False) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST, depth=depth, reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE)
+
+
+@dataclass(frozen=True)
+class Interface:
+    """One topic or service.
+
+    Attributes
+    ----------
+    name : str
+        Relative name, absolute where it starts with ``/``, private where it starts with ``~/``.
+    type : type
+        Message or service class.
+    meaning : str
+        What it carries, in a few words.
+    publishers, subscribers : tuple of str
+        Kinds of nodes that write and read it; of a service: that serve and call it. The recorder
+        reads what is ``recorded`` and is named nowhere; ``user`` stands for whoever is outside the
+        suite.
+    other_type : str
+        What to do about publishers of the other type, for the end of a sentence.
+    sometimes : tuple of str
+        Of both: those that write or read it with some parameters only.
+    latched : bool
+        Whether a late reader gets the last message (transient local, depth 1).
+    service : bool
+        Whether it is a service.
+    recorded : bool
+        Whether the recorder takes it: not what only keeps the pace of a run.
+    """
+
+    name: str
+    type: type[Any]
+    meaning: str
+    publishers: tuple[str, ...]
+    subscribers: tuple[str, ...]
+    latched: bool = False
+    service: bool = False
+    sometimes: tuple[str, ...] = ()
+    recorded: bool = True
+    other_type: str = ''
+
+    @property
+    def publisher_qos(self) -> QoSProfile:
+        """Profile that publishers offer."""
+        return _qos(1, latched=True) if self.latched else _qos(PUBLISHER_DEPTH)
+
+    @property
+    def reader_qos(self) -> QoSProfile:
+        """Profile with which the suite's nodes read; deep enough for all of its publishers."""
+        if self.latched:
+            return _qos(1, latched=True)
+        return _qos(READER_DEPTH * max(1, expected_count(self.publishers)))
+
+    @property
+    def recorder_qos(self) -> QoSProfile:
+        """Profile with which the recorder reads: compatible with what is offered, and deep."""
+        return _qos(RECORDER_DEPTH, latched=self.latched)
+
+    @property
+    def type_name(self) -> str:
+        """ROS name of the type, such as ``sensor_msgs/msg/JointState``."""
+        package, kind = self.type.__module__.split('.')[:2]
+        return f'{package}/{kind}/{self.type.__name__}'
+
+
+def expected_count(kinds: tuple[str, ...] | list[str]) -> int:
+    """Number of nodes that some kinds of nodes stand for."""
+    return sum(len(KINDS[kind].instances) for kind in kinds if kind in KINDS)
+
+
+TOPICS: tuple[Interface, ...] = (
+    Interface('cmd_vel', Twist,
+              'commanded speed and turn rate (TwistStamped with stamped_cmd_vel)',
+              ('user',), (REFERENCE, INHIBITION),
+              other_type='; with stamped_cmd_vel:=true it reads TwistStamped'),
+    Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z',
+              (REFERENCE,), (CANONICAL, LEG, INHIBITION, POSTURE)),
+    Interface('canonical_state', JointState,
+              'oscillators, shares of gaits, cadence: position = state, velocity = its rate',
+              (CANONICAL,), (LEG, INHIBITION, POSTURE)),
+    Interface('posture_feedback', JointState,
+              'balance: torques, measured angles, shift, drift and forces of the feet; '
+              "the body's mode and the phase of its movement",
+              (POSTURE,), (LEG, INHIBITION)),
+    Interface('joint_targets', JointState, 'targets of the three joints of one leg',
+              (LEG,), (ROBOT,)),
+    Interface('joint_states', JointState, 'measured joints; the tick of the suite',
+              (ROBOT,), (REFERENCE, LEG, POSTURE), sometimes=(LEG,)),
+    Interface('votes', JointState,
+              'votes for a stop: names = voter/leg, effort = weights',
+              ('user',), (INHIBITION,), sometimes=(INHIBITION,)),
+    Interface('push', WrenchStamped,
+              'force on the base from its stamp on, for 0.1 s unless the next one comes before; '
+              'frame base_footprint (along the heading) or odom',
+              ('user',), (ROBOT,)),
+    Interface('imu', Imu, 'turn rate and specific force in base_link; no orientation',
+              (ROBOT,), (POSTURE, INHIBITION), sometimes=(POSTURE, INHIBITION)),
+    Interface('odom', Odometry, "true pose and twist of base_link in odom, the simulator's",
+              (ROBOT,), (POSTURE,), sometimes=(POSTURE,)),
+    Interface('foot_contacts', JointState, 'effort = normal force of each foot',
+              (ROBOT,), (CANONICAL, LEG, INHIBITION, POSTURE),
+              sometimes=(CANONICAL, LEG, INHIBITION, POSTURE)),
+    Interface('joint_work', JointState,
+              'position = positive work of each joint since time 0 [J], effort = largest torque '
+              'since the last message [N m], over every physics step; at every tenth tick',
+              (ROBOT,), (), sometimes=(ROBOT,)),
+    Interface('estimated_odom', Odometry,
+              "estimated pose and twist of base_link, at the parameter's rate",
+              (POSTURE,), (), sometimes=(POSTURE,)),
+    Interface(CLOCK_TOPIC, Clock, 'the clock of the robot', (ROBOT,), ()),
+    Interface('inhibition_state', DiagnosticArray,
+              'stop and start for people: state word, gains, times, when they change',
+              (INHIBITION,), ('user',), latched=True),
+    Interface('inhibition_gains', JointState,
+              'position = gain of each leg [1/s], region_radius, requested, at_rest',
+              (INHIBITION,), (REFERENCE, CANONICAL), latched=True),
+    Interface('body_mode', String,
+              'standing, lying, moving between the two, or fallen, when it changes',
+              (POSTURE,), (ROBOT,), latched=True),
+    Interface(DIAGNOSTICS_TOPIC, DiagnosticArray, 'health of every node', tuple(KINDS), ()),
+    Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds',
+              (ROBOT,), ('user',), latched=True, sometimes=(ROBOT,), recorded=False),
+    Interface(f'{GATE_OWNER}/advance_until', Clock,
+              'stamp up to which the gate lets ticks pass', ('user',), (ROBOT,),
+              sometimes=(ROBOT,), recorded=False),
+)
+"""Topics of the suite."""
+
+RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
+"""Topics that a bag can have."""
+
+SERVICES: tuple[Interface, ...] = (
+    Interface('inhibit', SetBool, 'true stops the gait, false resumes it',
+              (INHIBITION,), ('user',), service=True),
+    Interface('stand_up', Trigger, 'stand up from wherever it lies or sinks',
+              (POSTURE,), ('user',), service=True),
+    Interface('lie_down', Trigger, 'stop the gait and lie down on the belly',
+              (POSTURE,), ('user',), service=True),
+    Interface('recover', Trigger, 'after a fall: roll over and stand up',
+              (POSTURE,), ('user',), service=True),
+    Interface('~/ready', Trigger,
+              'whether the node is active and connected with its neighbours',
+              tuple(KINDS), ('user',), service=True),
+    Interface('~/commands_taken', Trigger,
+              'how many messages on cmd_vel, push and votes the node has taken',
+              (REFERENCE, INHIBITION, ROBOT), ('user',), service=True),
+    Interface('~/recorded', Trigger, 'how many messages of each topic are in the bag, as JSON',
+              (RECORDER,), ('user',), service=True),
+)
+"""Services of the suite."""
+
+BODY_TOPICS = {ESTIMATE: ('imu', 'foot_contacts'), GROUND_TRUTH: ('odom',)}
+"""What the posture controller reads besides joints, by the parameter ``state_source``."""
+
+INTERFACES: dict[str, Interface] = {interface.name: interface for interface in TOPICS + SERVICES}
+
+
+def interface(name: str) -> Interface:
+    """Look an interface up.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of that name; the valid names are listed.
+    """
+    try:
+        return INTERFACES[name]
+    except KeyError:
+        raise ParameterError(
+            f"there is no interface '{name}'; valid are {', '.join(INTERFACES)}") from None
+
+
+def published_by(kind: str) -> tuple[Interface, ...]:
+    """Topics that a kind of node writes."""
+    return tuple(topic for topic in TOPICS if kind in topic.publishers)
+
+
+def read_by(kind: str) -> tuple[Interface, ...]:
+    """Topics that a kind of node reads."""
+    if kind == RECORDER:
+        return RECORDED
+    return tuple(topic for topic in TOPICS if kind in topic.subscribers)
+
+
+def served_by(kind: str) -> tuple[Interface, ...]:
+    """Services that a kind of node offers."""
+    return tuple(service for service in SERVICES if kind in service.publishers)
+
+
+def partners(topic: Interface, *, readers: bool) -> tuple[str, ...]:
+    """Kinds of nodes that always read (the recorder included) or always write a topic."""
+    recorder = (RECORDER,) if topic.recorded else ()
+    kinds = (*topic.subscribers, *recorder) if readers else topic.publishers
+    return tuple(kind for kind in kinds if kind in KINDS and kind not in topic.sometimes)
+
+
+STAMPED_CMD_VEL = replace(
+    INTERFACES['cmd_vel'], type=TwistStamped,
+    other_type='; with stamped_cmd_vel:=false it reads Twist')
+"""``cmd_vel`` with parameter ``stamped_cmd_vel:=true``."""

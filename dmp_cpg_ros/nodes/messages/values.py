@@ -1,0 +1,101 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Stamps, numbers and texts of messages, checked where they enter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.errors import DataError
+
+Array = NDArray[np.float64]
+
+NS = 1_000_000_000
+"""Nanoseconds of a second."""
+
+LARGEST = 1e6
+"""Numbers beyond this are a fault of the sender; nothing about a walking robot is as large."""
+
+_LARGEST_SQUARED = LARGEST * LARGEST
+
+
+def stamp_ns(stamp: Time) -> int:
+    """Read a stamp as nanoseconds; raises DataError when it is not a valid time."""
+    return stamp_in_ns(stamp.sec, stamp.nanosec)
+
+
+def stamp_in_ns(seconds: int, rest: int) -> int:
+    """Join the two parts of a stamp to nanoseconds; raises DataError as :func:`stamp_ns`."""
+    if seconds < 0 or rest >= NS:
+        raise DataError(f'stamp {seconds} s + {rest} ns must have sec >= 0 and nanosec < 1e9')
+    return seconds * NS + rest
+
+
+def header_ns(message: Any) -> int:
+    """Stamp of a message's header [ns]; raises DataError when it is not valid."""
+    known: int | None = getattr(message, 'stamp_ns', None)  # of what was read from bytes
+    return stamp_ns(message.header.stamp) if known is None else known
+
+
+def stamped(read: Callable[[Any], Any]) -> Callable[[Any], tuple[int, Any]]:
+    """Return a reader that keeps the stamp too, so that old readings are told from new ones."""
+    return lambda message: (header_ns(message), read(message))
+
+
+def frame_of(message: Any) -> str:
+    """Frame of a message's header."""
+    known: str | None = getattr(message, 'frame_id', None)
+    return str(message.header.frame_id) if known is None else known
+
+
+def set_stamp(stamp: Time, time_ns: int) -> None:
+    """Write nanoseconds into a stamp."""
+    stamp.sec, stamp.nanosec = divmod(time_ns, NS)
+
+
+def text(value: Any) -> str:
+    """Value as text that reads back to it: floats in full, booleans as true and false."""
+    if isinstance(value, (bool, np.bool_)):
+        return 'true' if value else 'false'
+    if isinstance(value, (float, np.floating)):
+        return repr(float(value))
+    return str(value)
+
+
+def checked(values: Array, what: str) -> Array:
+    """Return an array, or raise DataError when a number is not finite or beyond ``LARGEST``.
+
+    Parameters
+    ----------
+    values : ndarray (n,)
+        Numbers.
+    what : str
+        What they are, for the message.
+    """
+    if not values.dot(values) <= _LARGEST_SQUARED:
+        bad = ~(np.abs(values) <= LARGEST)
+        if bad.any():
+            where = int(np.argmax(bad))
+            raise DataError(
+                f'{what}[{where}] = {values[where]} must be finite and at most {LARGEST:g}')
+    return values
+
+
+def sensed(values: Array) -> Array:
+    """Return a sensor's numbers, NaN in place of those that :func:`checked` would refuse."""
+    if values.dot(values) <= _LARGEST_SQUARED:
+        return values
+    return np.where(np.abs(values) <= LARGEST, values, np.nan)
+
+
+def checked_numbers(values: tuple[float, ...], what: str) -> tuple[float, ...]:
+    """Return numbers, or raise DataError when one is not finite or beyond ``LARGEST``."""
+    for value in values:
+        if not -LARGEST <= value <= LARGEST:
+            raise DataError(f'{what} = {values} must be finite and at most {LARGEST:g}')
+    return values
