@@ -96,7 +96,8 @@ def _odometry(message: Any) -> tuple[float, ...]:
             *_xyz(twist.linear), *_xyz(twist.angular))
 
 
-NAMED = ('joint_states', 'joint_targets', 'canonical_state', 'foot_contacts', 'joint_work')
+NAMED = ('joint_states', 'joint_targets', 'canonical_state', 'foot_contacts', 'posture_feedback',
+         'joint_work')
 """Topics of ``JointState``."""
 
 ROWS: dict[tuple[str, str], Callable[[Any], tuple[float, ...]]] = {
