@@ -180,6 +180,7 @@ class WalkingLoop:
             self.r,
             command,
             self._dt,
+            running=self._running,
         )
 
     def change(self, values: Mapping[str, Any]) -> str:

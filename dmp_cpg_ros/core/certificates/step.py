@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 
 from dmp_cpg_ros.core.certificates.inequality import Inequality
-from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE
+from dmp_cpg_ros.core.contraction.capture import radius_tolerance
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
 
 STEP_ERROR = 0.025
@@ -122,7 +122,7 @@ def step_inequalities(rho: float, radius: float, omega: float, rate: float, regi
         Inequality('time_step', tick_s, limit, 's', 'tick', 'longest stable step', SAMPLED,
                    'what decays in the equations decays in their numerical integration'),
         Inequality('cycle_radius', cycle_radius_error(rho, radius, omega, tick_s),
-                   RADIUS_TOLERANCE, '', '|R/r - 1| as integrated', 'what capture allows', PROVED,
+                   radius_tolerance(radius, region_radius) / radius, '', '|R/r - 1| as integrated', 'what capture allows', PROVED,
                    'the integration keeps the radius of the limit cycle'),
         Inequality('region_per_tick', omega * tick_s, arc, 'rad', 'omega_max tick', 'arc of C',
                    PROVED, 'an oscillator cannot step over the region C between two ticks')]

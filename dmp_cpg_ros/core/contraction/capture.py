@@ -124,6 +124,29 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     return CaptureSet(u, inner, needed, gains, tolerance, rate)
 
 
+def place_tolerance(omega: float, degree: float, radius: float) -> float:
+    """Distance from each other at which nodes that enter C are certain to be in the box.
+
+    u_f − r0 ≥ ω r/Σ_j k_fj in every row of the fixed point, because no u_j is below r0.
+
+    Parameters
+    ----------
+    omega : float
+        Angular frequency, not above that of the box [rad/s].
+    degree : float
+        Largest Σ_j k_ij of a node [1/s].
+    radius : float
+        r = |x_d|.
+    """
+    lag = abs(omega) / degree if degree > 0.0 else np.inf
+    return radius * min(PLACE_TOLERANCE, lag)
+
+
+def radius_tolerance(radius: float, region_radius: float) -> float:
+    """Deviation from r at which nodes are certain to meet C, on an arc not shorter than r's."""
+    return min(RADIUS_TOLERANCE * radius, region_radius**2 / radius)
+
+
 def outward_growth(system: CanonicalSystem, omega: Array, D: float, u: Array) -> Array:
     """g_i(u_i): fastest that an uncoupled oscillator moves away from x_d at the distance u_i.
 

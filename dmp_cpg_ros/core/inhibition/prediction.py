@@ -10,11 +10,13 @@ answer is kept to the tick.
 from __future__ import annotations
 
 import math
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.gait.running_network import RunningNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 
@@ -32,6 +34,7 @@ def predict(
     dt: float,
     horizon: float = 10.0,
     body_mode: str = 'standing',
+    running: RunningNetwork | None = None,
 ) -> float:
     """Time from now to rest (of a requested stop) or to phase lock (of a start).
 
@@ -55,6 +58,9 @@ def predict(
         Longest time that is looked ahead [s].
     body_mode : str
         What the body does, assumed to stay; in every mode but ``standing`` no command starts it.
+    running : RunningNetwork, optional
+        What runs, its gait and cadence perhaps on their way to others; the network of the
+        supervisor without.
 
     Returns
     -------
@@ -62,11 +68,16 @@ def predict(
         [s]; infinite when it does not happen within the horizon.
     """
     tick_ns = round(dt * 1e9)
-    start_ns, inhibition = state.time_ns, published
+    start_ns, inhibition, ahead = state.time_ns, published, copy(running)
     for k in range(1, math.ceil(horizon / dt) + 1):
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
         r = reference.step(r, r_ext, dt)
-        network, x = supervisor.network.advance(x, r, inhibition, dt)
+        if ahead is None:
+            network, x = supervisor.network.advance(x, r, inhibition, dt)
+        else:
+            x = ahead.begin_tick(x, r, inhibition, dt)
+            x = ahead.advance(x, r, inhibition, dt)
+            network = ahead.network
         supervisor = supervisor.on(network)
         state = supervisor.step(
             state, start_ns + k * tick_ns, x, network.rate(x, r, inhibition), r, command,

@@ -4,7 +4,8 @@
 
 - ``free``, ``walking``: uninhibited, or slowed by votes that do not stop it; walking once the legs
   are in their places and the reference moves.
-- ``waiting``: a stop is requested; the reference slows, then inhibition is armed until x enters C.
+- ``waiting``: a stop is requested; the reference slows and the legs come to their places, then
+  inhibition is armed until x enters C. Capture is certified for legs that enter C in their places.
 - ``captured``: inhibition holds an oscillator and the others follow.
 - ``at_rest``: oscillators, reference and swings have come to rest.
 - ``releasing``: a start is requested; the oscillators run up until they are phase-locked.
@@ -13,14 +14,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.canonical.graph import topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.canonical.voting_parameters import SUM
+from dmp_cpg_ros.core.contraction.capture import place_tolerance, radius_tolerance
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.ballot import NO_VOTES, Ballot
 from dmp_cpg_ros.core.maths.updated import updated
@@ -49,6 +53,25 @@ LOCKED_PHASE_ERROR = 0.05
 
 LOCKED_ACTIVITY = 0.95
 """Swing activity above which a leg swings at its height."""
+
+
+def entry_tolerances(network: GaitNetwork, region_radius: float) -> tuple[float, float]:
+    """Distance of legs from each other's places, and of radii from r, at which C may be entered.
+
+    With :func:`~dmp_cpg_ros.core.contraction.capture.place_tolerance` at the cadence of rest, which
+    is not above the one that capture is certified for.
+    """
+    p = network.parameters
+    degree = p.coupling_gain * largest_degree(p.coupling_graph)
+    return (place_tolerance(network.omega(np.zeros(3)), degree, p.radius),
+            radius_tolerance(p.radius, region_radius))
+
+
+@lru_cache
+def largest_degree(graph: str) -> int:
+    """Largest number of legs that act on one."""
+    edges = topology(graph, len(LEGS))
+    return max(sum(i == node for i, _ in edges) for node in range(len(LEGS)))
 
 
 @dataclass(frozen=True)
@@ -282,9 +305,9 @@ class GaitSupervisor:
     def _stopping(
         self, state: SupervisorState, x: Array, rates: list[float], speed: float
     ) -> SupervisorState:
-        armed = state.armed or speed <= self.parameters.capture_speed
-        inhibition = Inhibition(True, self._gains(state, armed), self.parameters.region_radius)
-        if not any(inhibition.acting_gains(x, self.network.target).tolist()):
+        armed = state.armed and self._acts(state, x)
+        armed = armed or (speed <= self.parameters.capture_speed and self.in_places(x))
+        if not armed or not self._acts(state, x):
             return updated(state, armed=armed, word='waiting')
         if (
             max(map(abs, rates)) > REST_PHASE_RATE
@@ -293,6 +316,20 @@ class GaitSupervisor:
         ):
             return updated(state, armed=armed, word='captured')
         return updated(state, armed=armed, word='at_rest', measured_s=self._measured(state))
+
+    def _acts(self, state: SupervisorState, x: Array) -> bool:
+        """Whether inhibition acts at a state once it is armed."""
+        gains = self._gains(state, True)
+        inhibition = Inhibition(True, gains, self.parameters.region_radius)
+        return bool(inhibition.acting_gains(x, self.network.target).any())
+
+    def in_places(self, x: Array) -> bool:
+        """Whether legs and radii are as close to their places as capture takes for granted."""
+        p = self.network.parameters
+        places, radii = entry_tolerances(self.network, self.parameters.region_radius)
+        z = np.exp(1j * self.network.gait.phases) * (x[:, 0] + 1j * x[:, 1])
+        return bool(np.abs(np.abs(z) - p.radius).max() <= radii
+                    and np.abs(z[:, None] - z).max() <= places)
 
     def _running(self, state: SupervisorState, x: Array, speed: float) -> SupervisorState:
         errors = self.network.phase_errors(x).tolist()
