@@ -211,6 +211,9 @@ class WalkingLoop:
         )
         if reason:
             return reason
+        waits = proposed.refused_now(present, self.inhibition, self.x)
+        if waits:
+            return waits
         verdict = CertificateGate().judge(present, present.certificate(), proposed)
         if verdict.accepted:
             self.parameters = p = proposed.parameters
@@ -230,7 +233,13 @@ class WalkingLoop:
         choice, named = parameters.gait_choice, self._running.networks.reader.named
         others = [named(name) for name in choice.auto_gaits if choice.auto_gait]
         return Running(parameters, gait, self.network.scale, self._dt,
-                       tuple(other for other in others if other is not gait))
+                       tuple(other for other in others if other is not gait),
+                       self._running.cadence_scale)
+
+    def time_to_rest(self) -> float:
+        """Bound on the time to rest of a stop that is requested now [s]."""
+        running = self._described(self.parameters, self._running.leading_to)
+        return running.time_to_rest(self.network, self.x, self.r)
 
     def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
         """Vote for a stop, as the topic ``votes`` does; counts from the next tick on.
