@@ -104,6 +104,14 @@ class CanonicalOscillators(CertifiedNode):
             running, self.parameters_of(GaitParameters), self.parameters_of(GaitChoiceParameters)
         )
 
+    def acting_cadence(self) -> float | None:
+        """Factor on the cadence, on its way to the accepted one."""
+        return self._running_network.cadence_scale
+
+    def stop_in_force(self) -> tuple[Inhibition, Any] | None:
+        """Inhibition and states of the last tick."""
+        return self._inhibition, self._x
+
     def check_parameters(self, sets: Sets) -> None:
         """Refuse a gait that there is not, and a change of gait that is not certified."""
         if self.configured:

@@ -13,6 +13,8 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import Certificate
+from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
+from dmp_cpg_ros.core.gait.running_network import RunningNetwork
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
@@ -27,7 +29,7 @@ from dmp_cpg_ros.nodes.body_mode_messages import read_body_mode
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
 from dmp_cpg_ros.nodes.conversions import CanonicalStateReader, read_reference
 from dmp_cpg_ros.nodes.executors import run_node
-from dmp_cpg_ros.nodes.gait_setup import certificate_words
+from dmp_cpg_ros.nodes.gait_setup import certificate_words, gait_name
 from dmp_cpg_ros.nodes.inhibition_messages import InhibitionStateWriter
 from dmp_cpg_ros.nodes.inhibition_votes import NodeVotes
 from dmp_cpg_ros.nodes.message_values import frame_of, header_ns
@@ -139,6 +141,14 @@ class InhibitionNode(CertifiedNode):
         if self._lock_step or self._news() != self._told:
             self._publish()
 
+    def acting_cadence(self) -> float | None:
+        """Factor on the cadence of the states of the last tick."""
+        return None if self._x is None else self._supervisor.network.gait.cadence_scale
+
+    def stop_in_force(self) -> tuple[Inhibition, Any] | None:
+        """Inhibition and states of the last tick."""
+        return None if self._x is None else (self._acting, self._x)
+
     def _certificate_in_force(self) -> Certificate:
         return self.certificate_in(self._supervisor.network.gait)
 
@@ -213,13 +223,26 @@ class InhibitionNode(CertifiedNode):
             self._gate.at(self._state.time_ns),
             tick_s,
             body_mode=self._body_mode,
+            running=self._running_network(),
         )
-        certificate = self._certificate_in_force()
+        network = self._supervisor.network
         self._bound = (
-            certificate.time_to_rest if self._state.requested else certificate.time_to_walking
+            self.running_in(network.gait).time_to_rest(network, self._x, self._r)
+            if self._state.requested
+            else self._certificate_in_force().time_to_walking
         )
         if self._state.voted:
             self._bound = self._votes.bound(self._supervisor, self._state)
+
+    def _running_network(self) -> RunningNetwork:
+        """What ``canonical_oscillators`` runs, by its last states and its parameters."""
+        choice = self.parameters_of(GaitChoiceParameters)
+        network = self._supervisor.network
+        running = RunningNetwork(
+            self._networks, self.gaits.named(gait_name(self)), choice
+        )
+        running.network, running.cadence_scale = network, network.gait.cadence_scale
+        return running
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.running_network import approached
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import NODE_PARAMETERS
 from dmp_cpg_ros.nodes.certified_node import CertifiedNode
@@ -34,6 +36,7 @@ class ReferenceFilter(CertifiedNode):
         self._gate = self.new_gate()
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
         self._r, self._last_ns, self._requested = np.zeros(3), -1, False
+        self._cadence = self.parameters_of(CanonicalParameters).cadence_scale
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
         self._ticks = self.match(
             ('joint_states',),
@@ -60,10 +63,17 @@ class ReferenceFilter(CertifiedNode):
         self.limit(self._gate)
         self._system.parameters = self.parameters_of(ReferenceParameters)
 
+    def acting_cadence(self) -> float | None:
+        """Factor on the cadence as the oscillators let it approach the accepted one."""
+        return self._cadence
+
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
         dt = (stamp_ns - self._last_ns) * 1e-9 if 0 <= self._last_ns < stamp_ns else 0.0
         self._last_ns = stamp_ns
+        self._cadence = approached(
+            self._cadence, self.parameters_of(CanonicalParameters).cadence_scale, dt
+        )
         command, self._requested = self._gate.at(stamp_ns), bool(values['inhibition_state'])
         r_ext = np.zeros(3) if self._requested else np.array(command)
         self._r = self._system.step(self._r, r_ext, dt)

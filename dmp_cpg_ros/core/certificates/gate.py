@@ -78,14 +78,15 @@ class Running:
     def certificate(self) -> Certificate:
         """Compute the certificate."""
         p = self.parameters
-        if self.others or self._moving:
+        if self.others or self.moving:
             return certify_changes(p, (self.gait, *self.others), self.scale, self.tick_s,
-                                   self.acting_cadence if self._moving else None)
+                                   self.acting_cadence if self.moving else None)
         network = GaitNetwork(p.canonical, self.gait, self.scale)
         return certify(network, p.inhibition, p.reference, p.leg, p.posture, self.tick_s)
 
     @property
-    def _moving(self) -> bool:
+    def moving(self) -> bool:
+        """Whether the cadence that acts is not that of the parameters."""
         return self.acting_cadence not in (None, self.parameters.canonical.cadence_scale)
 
     def time_to_rest(self, network: GaitNetwork, x: Array, r: Array) -> float:

@@ -122,7 +122,8 @@ def step_inequalities(rho: float, radius: float, omega: float, rate: float, regi
         Inequality('time_step', tick_s, limit, 's', 'tick', 'longest stable step', SAMPLED,
                    'what decays in the equations decays in their numerical integration'),
         Inequality('cycle_radius', cycle_radius_error(rho, radius, omega, tick_s),
-                   radius_tolerance(radius, region_radius) / radius, '', '|R/r - 1| as integrated', 'what capture allows', PROVED,
+                   radius_tolerance(radius, region_radius) / radius, '',
+                   '|R/r - 1| as integrated', 'what capture allows', PROVED,
                    'the integration keeps the radius of the limit cycle'),
         Inequality('region_per_tick', omega * tick_s, arc, 'rad', 'omega_max tick', 'arc of C',
                    PROVED, 'an oscillator cannot step over the region C between two ticks')]

@@ -9,8 +9,8 @@ forward invariant. In locked coordinates let u_i = |x_i − x_d|. Because the co
     u̇_i ≤ g_i(u_i) + Σ_j k_ij (u_j − u_i) − α_i u_i,
     g_i(u) = sup over |n| = 1 of n·f_i(x_d + u n) ≤ ω_i |x_d| + ρ_i max_c (r_i² − |x|²)(c + u)
 
-with c = n·x_d, and the box {u ≤ ū} is invariant when the right side is not positive on its faces. With ū = r0 at
-the inhibited nodes the others take ū_f = r0 + (what their rotation is worth), and what remains is
+with c = n·x_d, and the box {u ≤ ū} is invariant when the right side is not positive on its faces.
+With ū = r0 at the inhibited nodes the others take ū_f = r0 + (what their rotation is worth), and what remains is
 one inequality for each inhibited node: *the* condition, N ω r / k_inh < r0 made exact. Every state
 that enters C with its nodes in their places lies in the box.
 

@@ -24,6 +24,14 @@ the cadence would be a jump of the feet.
 """
 
 
+def approached(cadence_scale: float, wanted: float, dt: float) -> float:
+    """Factor on the cadence a time dt [s] later, on its way to the one that is wanted."""
+    most = CADENCE_RATE * dt
+    if abs(wanted - cadence_scale) <= most:
+        return wanted
+    return cadence_scale + (most if wanted > cadence_scale else -most)
+
+
 class RunningNetwork:
     """The network that acts, and its way to the gait and parameters that were asked for last.
 
@@ -129,9 +137,6 @@ class RunningNetwork:
     def _approach_cadence(self, dt: float) -> None:
         wanted = self.networks.parameters.cadence_scale
         if self.cadence_scale != wanted:
-            most = CADENCE_RATE * dt
-            change = min(max(wanted - self.cadence_scale, -most), most)
-            arrived = abs(wanted - self.cadence_scale) <= most
-            self.cadence_scale = wanted if arrived else self.cadence_scale + change
+            self.cadence_scale = approached(self.cadence_scale, wanted, dt)
             gait = self.networks.reader.at_cadence(self.network.gait, self.cadence_scale)
             self.network = self.network.with_cadence_of(gait)

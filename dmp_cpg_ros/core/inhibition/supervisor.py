@@ -58,8 +58,8 @@ LOCKED_ACTIVITY = 0.95
 def entry_tolerances(network: GaitNetwork, region_radius: float) -> tuple[float, float]:
     """Distance of legs from each other's places, and of radii from r, at which C may be entered.
 
-    With :func:`~dmp_cpg_ros.core.contraction.capture.place_tolerance` at the cadence of rest, which
-    is not above the one that capture is certified for.
+    With :func:`~dmp_cpg_ros.core.contraction.capture.place_tolerance` at the cadence of rest, not
+    above the one that capture is certified for.
     """
     p = network.parameters
     degree = p.coupling_gain * largest_degree(p.coupling_graph)
