@@ -8,7 +8,7 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
 from dmp_cpg_ros.core.gait.gait_reader import GaitReader
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running_network import RunningNetwork
+from dmp_cpg_ros.core.gait.transition import BlendedGait
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.vote_counter import VoteCounter
@@ -205,13 +206,13 @@ class WalkingLoop:
         wanted = running.networks.reader.named(name)
         present = self._described(self.parameters, running.wanted)
         proposed = self._described(present.changed(values).parameters, wanted)
+        leading_to = running.networks.reader.named(running.leading_to.name)
         reason = refused_change(
-            proposed.parameters, (running.leading_to, running.wanted, wanted), present.scale,
-            self._dt,
+            proposed.parameters, (leading_to, running.wanted, wanted), present.scale, self._dt,
         )
         if reason:
             return reason
-        waits = proposed.refused_now(present, self.inhibition, self.x)
+        waits = proposed.refused_now(present, self.network, self.inhibition, self.x)
         if waits:
             return waits
         verdict = CertificateGate().judge(present, present.certificate(), proposed)
@@ -238,8 +239,15 @@ class WalkingLoop:
 
     def time_to_rest(self) -> float:
         """Bound on the time to rest of a stop that is requested now [s]."""
-        running = self._described(self.parameters, self._running.leading_to)
-        return running.time_to_rest(self.network, self.x, self.r)
+        return self.in_force().time_to_rest(self.network, self.x, self.r)
+
+    def in_force(self) -> Running:
+        """What runs, in the gait in force or in the change between two."""
+        gait, named = self.network.gait, self._running.networks.reader.named
+        ends = (gait.transition.before, gait.transition.after) if isinstance(
+            gait, BlendedGait) else (gait,)
+        first, *others = (named(end.name) for end in ends)
+        return replace(self._described(self.parameters, first), others=tuple(others))
 
     def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
         """Vote for a stop, as the topic ``votes`` does; counts from the next tick on.

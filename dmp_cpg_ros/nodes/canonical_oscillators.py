@@ -108,9 +108,9 @@ class CanonicalOscillators(CertifiedNode):
         """Factor on the cadence, on its way to the accepted one."""
         return self._running_network.cadence_scale
 
-    def stop_in_force(self) -> tuple[Inhibition, Any] | None:
-        """Inhibition and states of the last tick."""
-        return self._inhibition, self._x
+    def stop_in_force(self) -> tuple[GaitNetwork, Inhibition, Any] | None:
+        """Network, inhibition and states of the last tick."""
+        return self._running_network.network, self._inhibition, self._x
 
     def check_parameters(self, sets: Sets) -> None:
         """Refuse a gait that there is not, and a change of gait that is not certified."""

@@ -28,7 +28,7 @@ from dmp_cpg_ros.core.certificates.gate import (
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
 from dmp_cpg_ros.core.gait.gait_networks import GaitNetworks
-from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
 from dmp_cpg_ros.core.suite_parameters import (
@@ -110,8 +110,8 @@ class CertifiedNode(ManagedNode):
         """Factor on the cadence that acts, for a node that knows it."""
         return None
 
-    def stop_in_force(self) -> tuple[Inhibition, Any] | None:
-        """Inhibition that acts and the states that it acts on, for a node that knows them."""
+    def stop_in_force(self) -> tuple[GaitNetwork, Inhibition, Any] | None:
+        """Network, inhibition and states that act, for a node that knows them."""
         return None
 
     def prepare_certificate(self) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import Certificate
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
+from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running_network import RunningNetwork
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
@@ -145,9 +146,10 @@ class InhibitionNode(CertifiedNode):
         """Factor on the cadence of the states of the last tick."""
         return None if self._x is None else self._supervisor.network.gait.cadence_scale
 
-    def stop_in_force(self) -> tuple[Inhibition, Any] | None:
-        """Inhibition and states of the last tick."""
-        return None if self._x is None else (self._acting, self._x)
+    def stop_in_force(self) -> tuple[GaitNetwork, Inhibition, Any] | None:
+        """Network, inhibition and states of the last tick."""
+        network = self._supervisor.network
+        return None if self._x is None else (network, self._acting, self._x)
 
     def _certificate_in_force(self) -> Certificate:
         return self.certificate_in(self._supervisor.network.gait)
@@ -205,9 +207,11 @@ class InhibitionNode(CertifiedNode):
             return response
         self._predict(self._acting)
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
-        response.message = (
-            f'{verb} {when}, at most {self._bound:.3f} s; {self._words()}'
+        most = (
+            f'at most {self._bound:.3f} s' if isfinite(self._bound)
+            else 'without a bound from this state'
         )
+        response.message = f'{verb} {when}, {most}; {self._words()}'
         return response
 
     def _predict(self, published: Inhibition) -> None:

@@ -26,8 +26,10 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.suite import load_gaits
 
-CONDITIONS = ('places', 'together', 'arming', 'acting', 'holding')
-"""Conditions that can be left out, to see whether the search notices."""
+CONDITIONS = ('places', 'arming', 'acting', 'holding')
+"""Conditions that can be left out, to see whether the search notices: without ``places`` inhibition
+is armed at once and switches each leg by its own region.
+"""
 
 LONGEST = 12.0
 """Time after which a stop counts as one that never ends [s]."""
@@ -66,13 +68,12 @@ class Oscillators(WalkingLoop):
 
     def certified(self) -> bool:
         """Whether the present parameters have a certificate."""
-        return self._described(self.parameters, self._running.leading_to).certificate().holds
+        return self.in_force().certificate().holds
 
     def time_to_rest(self) -> float:
         """Bound that is stated for a stop now [s]."""
         if self._weaken == 'arming':
-            return self._described(
-                self.parameters, self._running.leading_to).certificate().time_to_rest
+            return self.in_force().certificate().time_to_rest
         return super().time_to_rest()
 
     def advance(self) -> None:
@@ -82,7 +83,7 @@ class Oscillators(WalkingLoop):
         command = self.gate.at(self.now_ns)
         self.r = self.reference.step(
             self.r, np.zeros(3) if inhibition.requested else np.array(command), dt)
-        if self._weaken == 'together':
+        if self._weaken == 'places':
             inhibition = _Separate(*(getattr(inhibition, name) for name in (
                 'requested', 'gains', 'region_radius', 'at_rest')))
         self.x = self._running.begin_tick(self.x, self.r, inhibition, dt)
@@ -153,6 +154,8 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
             if np.abs(turned).max() > STRIDE:
                 return 'a leg takes a stride while the stop is in force', closest
             if expected is None:
+                if kind == 'end' and loop.stop.word == 'at_rest':
+                    break
                 continue
             since = (loop.now_ns - expected[0]) * 1e-9
             if loop.stop.word == 'at_rest':
@@ -166,6 +169,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
                     break
             elif since > expected[1] + case['tick_s'] * 1.5:
                 return f'not at rest after {since:.3f} s, at most {expected[1]:.3f}', closest
+        resting = resting and kind != 'start'
         counts[kind] += kind != 'end'
         if kind != 'end':
             expected = _do(loop, kind, value, expected, counts)
@@ -232,6 +236,8 @@ def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
     """Random events; the first two start the gait."""
     events: list[list[Any]] = [[0.1, 'start', None],
                                [0.0, 'command', [float(rng.uniform(0.0, 3.0)), 0.0, 0.0]]]
+    if rng.random() < 0.6:
+        return events + _telling(rng)
     for _ in range(rng.integers(3, 14)):
         kind = str(rng.choice(['stop', 'start', 'set', 'gait', 'command', 'vote'],
                               p=(0.33, 0.25, 0.25, 0.05, 0.09, 0.03)))
@@ -251,6 +257,33 @@ def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
         wait = float(np.exp(rng.uniform(np.log(0.004), np.log(3.0))))
         events.append([wait, kind, value])
     return events
+
+
+def _telling(rng: np.random.Generator) -> list[list[Any]]:
+    """Sequences that once told that something was missing, at other times and values."""
+    def change(*names: str) -> Any:
+        name = str(rng.choice(names))
+        return {name: _legs(rng) if name == 'inhibited_legs' else _value(rng, name)}
+
+    def soon() -> float:
+        return float(np.exp(rng.uniform(np.log(0.004), np.log(0.6))))
+
+    kind = rng.integers(4)
+    if kind == 0:                                            # stops within starts
+        return [entry for _ in range(3) for entry in (
+            [2.0, 'stop', None], [2.0, 'start', None], [soon(), 'stop', None],
+            [soon(), 'start', None], [soon(), 'stop', None])]
+    if kind == 1:                                            # what acts is not what was accepted
+        return [[1.5, 'set', change('cadence_scale')],
+                [soon(), 'set', change('inhibition_gain', 'region_radius', 'cadence_scale')],
+                [soon(), 'stop', None], [3.0, 'start', None],
+                [1.0, 'set', change('cadence_scale')], [soon(), 'stop', None]]
+    if kind == 2:                                            # changes at rest
+        return [[1.0, 'stop', None], *([2.0, 'set', change(
+            'inhibited_legs', 'coupling_gain', 'inhibition_gain', 'region_radius', 'rho')]
+            for _ in range(3)), [2.0, 'start', None]]
+    return [[0.0, 'command', [3.0, 0.0, 0.0]], [1.5, 'set', change('max_speed', 'alpha_r')],
+            [soon(), 'stop', None]]
 
 
 def varied(rng: np.random.Generator, case: Case) -> Case:

@@ -104,7 +104,8 @@ class Running:
             network, p.inhibition, operating_range(network, p.inhibition, p.reference),
             p.reference.alpha_r, x, r)
 
-    def refused_now(self, before: Running, inhibition: Inhibition, x: Array) -> str:
+    def refused_now(self, before: Running, network: GaitNetwork, inhibition: Inhibition,
+                    x: Array) -> str:
         """Why a change of what captures the legs has to wait; empty when it may be made.
 
         While the gait runs every certified change may: inhibition sets in when the legs are in
@@ -115,26 +116,27 @@ class Running:
         ----------
         before : Running
             What runs.
+        network : GaitNetwork
+            That acts, perhaps in another gait than the one that is wanted.
         inhibition : Inhibition
             That acts.
         x : ndarray (4, 2)
             States.
         """
         names = sorted(_CAPTURING.intersection(before.differences(self)))
-        network = GaitNetwork(before.parameters.canonical, self.gait, self.scale)
         if not (names and inhibition.requested
                 and inhibition.acting_gains(x, network.target).any()):
             return ''
         if not inhibition.at_rest:
             return (f'{", ".join(names)} cannot change while the legs are being captured; ask '
                     'again when they are at rest')
-        outside = self._outside(x)
+        outside = self._outside(x, np.linalg.norm(x - network.target, axis=1))
         if not outside:
             return ''
         return (f'{", ".join(names)} cannot change in this rest: {outside}; ask again while the '
                 'gait runs')
 
-    def _outside(self, x: Array) -> str:
+    def _outside(self, x: Array, distance: Array) -> str:
         """What lies outside of the invariant set of these parameters; empty when nothing does."""
         p = self.parameters
         networks = all_networks(p, (self.gait, *self.others), self.scale, self.acting_cadence)
@@ -142,7 +144,6 @@ class Running:
                       for network in networks)
         system, r0 = networks[0].system, p.inhibition.region_radius
         capture = capture_set(system, fastest, p.inhibition.armed_gains, r0)
-        distance = np.linalg.norm(x - system.target, axis=1)
         for leg, far, most in zip(LEGS, distance, capture.distance, strict=True):
             if far > most:
                 return (f'{leg} rests {far:.4g} from its place, and the new parameters hold it '

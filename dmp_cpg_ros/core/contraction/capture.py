@@ -10,9 +10,9 @@ forward invariant. In locked coordinates let u_i = |x_i − x_d|. Because the co
     g_i(u) = sup over |n| = 1 of n·f_i(x_d + u n) ≤ ω_i |x_d| + ρ_i max_c (r_i² − |x|²)(c + u)
 
 with c = n·x_d, and the box {u ≤ ū} is invariant when the right side is not positive on its faces.
-With ū = r0 at the inhibited nodes the others take ū_f = r0 + (what their rotation is worth), and what remains is
-one inequality for each inhibited node: *the* condition, N ω r / k_inh < r0 made exact. Every state
-that enters C with its nodes in their places lies in the box.
+With ū = r0 at the inhibited nodes the others take ū_f = r0 + (what their rotation is worth), and
+what remains is one inequality for each inhibited node: *the* condition, N ω r / k_inh < r0 made
+exact. Every state that enters C with its nodes in their places lies in the box.
 
 Inside the box a half-plane n·x_i ≥ c_i is invariant too (same argument for −n·x_i); it keeps the
 nodes away from the origin, where oscillators diverge, and gives contraction on the region.

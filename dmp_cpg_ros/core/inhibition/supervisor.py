@@ -305,9 +305,10 @@ class GaitSupervisor:
     def _stopping(
         self, state: SupervisorState, x: Array, rates: list[float], speed: float
     ) -> SupervisorState:
-        armed = state.armed and self._acts(state, x)
-        armed = armed or (speed <= self.parameters.capture_speed and self.in_places(x))
-        if not armed or not self._acts(state, x):
+        inside = self._acts(state, x)
+        armed = (state.armed and inside) or (
+            speed <= self.parameters.capture_speed and self.in_places(x))
+        if not (armed and inside):
             return updated(state, armed=armed, word='waiting')
         if (
             max(map(abs, rates)) > REST_PHASE_RATE

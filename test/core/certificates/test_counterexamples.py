@@ -78,7 +78,7 @@ def accepted(walk: Walk, **values: Any) -> bool:
 def test_several_inhibited_legs_stop_within_a_start(gain: float, delay: float) -> None:
     walk = Walk(inhibition={'inhibited_legs': ('fl', 'rr')}, coupling_graph='star',
                 coupling_gain=gain)
-    certificate = walk.loop._described(walk.loop.parameters, GAITS['amble']).certificate()
+    certificate = walk.loop.in_force().certificate()
     assert certificate.holds, certificate.explained()
     walk.run(1.0)
     walk.walk(0.5, delay)
@@ -177,8 +177,7 @@ def test_stops_within_starts_keep_the_bound_that_is_stated(seed: int) -> None:
                      'inhibition_gain': np.exp(rng.uniform(np.log(200.0), np.log(3000.0)))},
                     {'max_speed': 1.0}, coupling_graph=str(graph), rho=rng.uniform(1.0, 12.0),
                     coupling_gain=np.exp(rng.uniform(np.log(10.0), np.log(200.0))))
-        if walk.loop._described(walk.loop.parameters,
-                                walk.loop._running.wanted).certificate().holds:
+        if walk.loop.in_force().certificate().holds:
             break
     walk.run(0.5)
     for _ in range(4):

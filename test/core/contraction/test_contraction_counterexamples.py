@@ -16,6 +16,7 @@ from dmp_cpg_ros.core.contraction.capture import (
     capture_set,
     outward_growth,
     outward_growth_within,
+    place_tolerance,
 )
 from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
@@ -158,3 +159,39 @@ def test_the_smallest_pair_that_exceeded_its_bound_does_so_no_more() -> None:
     graph = CouplingGraph(2, PAIR, gains, np.array([0.0, np.pi / 2.0]))
     bound = mismatch_bound(synchronisation(graph, 1.0), 1.0, 1.0, 3.0)
     assert bound.distance > 0.157
+
+
+def random_network(rng: np.random.Generator) -> CanonicalSystem:
+    """A named graph of four, in its places."""
+    name = str(rng.choice(['all_to_all', 'ring', 'path', 'star', 'directed_ring']))
+    graph = graph_from_edges(4, topology(name, 4), float(np.exp(rng.uniform(2.0, 8.0))),
+                             rng.uniform(-np.pi, np.pi, 4))
+    radius = rng.uniform(0.5, 2.0)
+    return CanonicalSystem(graph, AndronovHopf(rng.uniform(0.5, 20.0), radius),
+                           state_at(graph.phases, radius))
+
+
+def test_the_gate_is_never_wider_than_the_box() -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(200):
+        system, omega = random_network(rng), rng.uniform(0.5, 25.0)
+        region = rng.uniform(0.02, 0.8) * system.radius[0]
+        held = (rng.permutation(4) < rng.integers(1, 4)).astype(float)
+        capture = capture_set(system, omega, held, region)
+        degree = float(np.diag(comparison_laplacian(system.graph)).max())
+        for share in (1.0, 0.3):                             # a lower cadence is no danger
+            gate = place_tolerance(share * omega, degree, float(system.radius[0]))
+            assert np.all(region + gate <= capture.distance[held == 0.0] + 1e-12)
+
+
+def test_a_union_of_certified_sets_is_certified() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        system, omega = random_network(rng), rng.uniform(0.5, 25.0)
+        region = rng.uniform(0.05, 0.6) * system.radius[0]
+        gains = []
+        for _ in range(2):
+            held = (rng.permutation(4) < rng.integers(1, 4)).astype(float)
+            needed = np.nanmax(capture_set(system, omega, held, region).needed_gain)
+            gains.append(held * 1.000001 * max(needed, 1e-9))
+        assert capture_set(system, omega, np.maximum(*gains), region).holds
