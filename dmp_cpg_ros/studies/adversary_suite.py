@@ -27,8 +27,8 @@ from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.suite import load_gaits
 
 CONDITIONS = ('places', 'arming', 'acting', 'holding')
-"""Conditions that can be left out, to see whether the search notices: without ``places`` inhibition
-is armed at once and switches each leg by its own region.
+"""Conditions that can be left out, to see whether the search notices: without ``places``
+inhibition is armed at once and switches each leg by its own region.
 """
 
 LONGEST = 12.0

@@ -12,6 +12,7 @@ from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, entry_tolerances
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 
 
@@ -45,11 +46,7 @@ def contact_margin(found: Synchronisation, rho: float, radius: float,
         return (bound.phase_spread <= LOCKED_PHASE_ERROR and bound.distance <= places
                 and bound.smallest_radius >= radius - radii)
 
-    low, high = 0.0, max(found.rate, 0.0)
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if within(middle) else (low, middle)
-    return low
+    return last_that_holds(within, 0.0, max(found.rate, 0.0), 30)
 
 
 def contact_limits(network: GaitNetwork, analysis: NetworkAnalysis, span: OperatingRange,

@@ -9,6 +9,7 @@ import math
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.contraction.capture import radius_tolerance
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 
 STEP_ERROR = 0.025
 """c: with s = tick · ℓ, a mode that decays by more than c s⁴ per tick decays in the step too."""
@@ -91,10 +92,8 @@ def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -
     low, high = 0.5 * radius, 1.5 * radius
     if not change(low) > 0.0 > change(high):
         return math.inf
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if change(middle) > 0.0 else (low, middle)
-    return abs(low / radius - 1.0)
+    cycle = last_that_holds(lambda R: change(R) > 0.0, low, high, 50)
+    return abs(cycle / radius - 1.0)
 
 
 def step_inequalities(rho: float, radius: float, omega: float, rate: float, region_radius: float,

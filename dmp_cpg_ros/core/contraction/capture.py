@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import phase_rotation
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian, slowest_rate
+from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian, overshoot, slowest_rate
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.errors import ParameterError
 
@@ -111,7 +111,8 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     inhibited = gains > 0.0
     D = _target_radius(system, inhibited)
     L = comparison_laplacian(system.graph)
-    largest = max(float(system.radius.max()), D)
+    largest = float(np.sqrt(max(float(system.radius.max()), D)**2
+                            + overshoot(L) / float(system.rho.min())))
     u = _distances(system, L, omega, inhibited, D, region_radius, largest + D)
     pull = outward_growth(system, omega, D, u) - L @ u
     needed = np.where(inhibited, pull / region_radius, np.nan)

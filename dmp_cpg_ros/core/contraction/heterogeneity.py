@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 
 Array = NDArray[np.float64]
 
@@ -145,14 +146,9 @@ def mismatch_margin(found: Synchronisation, rho: float, radius: float,
     float
         δ with |ω_i − ω| ≤ δ [rad/s]; 0 when nothing is certified.
     """
-    low, high = 0.0, max(found.rate, 0.0)
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        if mismatch_bound(found, rho, radius, middle).phase_spread <= phase_spread:
-            low = middle
-        else:
-            high = middle
-    return low
+    return last_that_holds(
+        lambda delta: mismatch_bound(found, rho, radius, delta).phase_spread <= phase_spread,
+        0.0, max(found.rate, 0.0), 30)
 
 
 def _mean_radius(rho: float, radius: float, mismatch: float, epsilon: float,

@@ -22,6 +22,7 @@ from dmp_cpg_ros.core.contraction.connectivity import (
     components,
     connectivity,
     left_null_weights,
+    overshoot,
     slowest_rate,
 )
 
@@ -90,9 +91,7 @@ def synchronisation(graph: CouplingGraph, growth: float) -> Synchronisation:
     tiny = 1e-9 * (1.0 + float(np.abs(L).max()))
     felt = 0.0 if found.weights is None else float(
         np.abs(np.kron(found.weights, np.eye(2)) @ L).max())
-    overshoot = float(np.maximum(-scalar.sum(axis=1), 0.0).max())
-    return replace(found, free_mean=felt <= tiny,
-                   overshoot=overshoot if overshoot > tiny else 0.0)
+    return replace(found, free_mean=felt <= tiny, overshoot=overshoot(scalar))
 
 
 def _best_bound(graph: CouplingGraph, L: Array, scalar: Array, growth: float) -> Synchronisation:

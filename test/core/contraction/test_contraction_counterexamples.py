@@ -195,3 +195,20 @@ def test_a_union_of_certified_sets_is_certified() -> None:
             needed = np.nanmax(capture_set(system, omega, held, region).needed_gain)
             gains.append(held * 1.000001 * max(needed, 1e-9))
         assert capture_set(system, omega, np.maximum(*gains), region).holds
+
+
+def test_couplings_that_turn_drive_states_out_of_the_disc_but_not_out_of_the_box() -> None:
+    # Found by the search: a ring of gains a I + b S, of which one node is held.
+    edges = topology('directed_ring', 7)
+    gains = np.broadcast_to(np.array([[9.0, 1.8], [-1.8, 9.0]]), (7, 2, 2)).copy()
+    system = CanonicalSystem(CouplingGraph(7, edges, gains, np.zeros(7)), AndronovHopf(2.0),
+                             state_at(np.zeros(7), 1.0))
+    held = np.array([237.0] + 6 * [0.0])
+    capture = capture_set(system, 25.0, held, 0.16)
+    x = system.target.copy()
+    farthest = 0.0
+    for _ in range(800):
+        x = system.step(x, 25.0, held, 0.003)
+        assert np.all(np.linalg.norm(x - system.target, axis=1)[1:] <= capture.distance[1:])
+        farthest = max(farthest, float(np.linalg.norm(x, axis=1).max()))
+    assert farthest > 1.0
