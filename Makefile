@@ -63,7 +63,7 @@ STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
 FIGURE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery benchmark-walking doc-images paper-figures bench lint install clean
+.PHONY: help demo test study-stops study-recovery study-adversary benchmark-walking doc-images paper-figures bench lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -82,6 +82,9 @@ study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, wal
 
 study-recovery: $(INSTALLED) ## stand up, lie down, recover from 50 falls (STUDY_ARGS=...)
 	$(ACTIVATED) study_recovery $(STUDY_ARGS)
+
+study-adversary: $(INSTALLED) ## search for a certificate that is wrong (STUDY_ARGS='--seconds 600')
+	$(BIN)/python -m dmp_cpg_ros.studies.adversary $(STUDY_ARGS)
 
 benchmark-walking: $(INSTALLED) ## measure speeds, pushes, rough ground, gait changes (BENCHMARK_ARGS=...)
 	$(ACTIVATED) benchmark_walking $(BENCHMARK_ARGS)

@@ -8,7 +8,7 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -30,7 +30,7 @@ from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
-from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.voters import vote_sensors
@@ -221,8 +221,8 @@ class WalkingLoop:
             raise DataError(f'the gait cannot start: the robot is {self._barring}')
         self.stop = self.supervisor.request(self.stop, stop)
         return predict(
-            self.supervisor, self.reference, self.stop, self.inhibition, self.network, self.x,
-            self.r, self.gate.at(self.stop.time_ns), self._dt,
+            self.supervisor, self.reference, self.canonical, self.stop, self.inhibition,
+            self.canon, self.r, self.gate.at(self.stop.time_ns), self._dt,
         )
 
     def change(self, values: Mapping[str, Any]) -> str:
@@ -247,10 +247,14 @@ class WalkingLoop:
         wanted = named(values.get('gait', canon.wanted.name))
         present = self._described(self.parameters, canon.wanted)
         proposed = self._described(present.changed(values).parameters, wanted)
+        leading_to = named(canon.leading_to.name)
         reason = refused_change(
-            proposed.parameters, (canon.leading_to, canon.wanted, wanted), present.scale, self._dt)
+            proposed.parameters, (leading_to, canon.wanted, wanted), present.scale, self._dt)
         if reason:
             return reason
+        waits = proposed.refused_now(present, self.network, self.inhibition, self.x)
+        if waits:
+            return waits
         verdict = CertificateGate().judge(present, present.certificate(), proposed)
         if verdict.accepted:
             self.parameters = p = proposed.parameters
@@ -269,7 +273,20 @@ class WalkingLoop:
         choice = parameters.gait_choice
         others = [self._reader.named(name) for name in choice.auto_gaits if choice.auto_gait]
         return Running(parameters, gait, self.canonical.scale, self._dt,
-                       tuple(other for other in others if other is not gait))
+                       tuple(other for other in others if other is not gait),
+                       self.canon.cadence_scale)
+
+    def time_to_rest(self) -> float:
+        """Bound on the time to rest of a stop that is requested now [s]."""
+        return self.in_force().time_to_rest(self.network, self.x, self.r)
+
+    def in_force(self) -> Running:
+        """What runs, in the gait in force or in the change between two."""
+        gait = self.canon.gait
+        ends = (gait.transition.before, gait.transition.after) if isinstance(
+            gait, BlendedGait) else (gait,)
+        first, *others = (self._reader.named(end.name) for end in ends)
+        return replace(self._described(self.parameters, first), others=tuple(others))
 
     def _contact_limits(self, dt: float) -> ContactLimits | None:
         """What contact feedback may do, computed at the second tick, which has a time step."""

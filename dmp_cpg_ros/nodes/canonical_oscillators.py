@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import (
+    Inhibition,
     InhibitionParameters,
     initial_inhibition,
 )
@@ -91,6 +92,14 @@ class CanonicalOscillators(CertifiedNode):
         if not choice.auto_gait:
             self._state = self._canonical.want(
                 self._state, self.parameters_of(GaitParameters).gait)
+
+    def acting_cadence(self) -> float | None:
+        """Factor on the cadence, on its way to the accepted one."""
+        return self._state.cadence_scale
+
+    def stop_in_force(self) -> tuple[GaitNetwork, Inhibition, Any] | None:
+        """Network, inhibition and states of the last tick."""
+        return self._canonical.network(self._state.gait), self._inhibition, self._state.x
 
     def check_parameters(self, sets: Sets) -> None:
         """Refuse a gait that there is not, and a change of gait that is not certified."""

@@ -13,6 +13,9 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import Certificate
+from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
@@ -60,6 +63,7 @@ class InhibitionNode(CertifiedNode):
         self._state = self._supervisor.initial_state()
         self._acting = self._supervisor.inhibition(self._state)
         self._x: Any = None
+        self._x_dot: Any = None
         self._r = np.zeros(3)
         self._predicted = self._bound = float('nan')
         self._told: tuple[Any, ...] = ()
@@ -109,7 +113,7 @@ class InhibitionNode(CertifiedNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the state of the stop to the stamp of the canonical state."""
-        self._x, x_dot, gait = values['canonical_state']
+        self._x, self._x_dot, gait = values['canonical_state']
         self._r = values['reference']
         self._network = network = self._running_gait.network(gait)
         before = self._state
@@ -120,7 +124,7 @@ class InhibitionNode(CertifiedNode):
             stamp_ns,
             network,
             self._x,
-            x_dot,
+            self._x_dot,
             self._r,
             self._gate.at(stamp_ns),
             tally,
@@ -134,6 +138,14 @@ class InhibitionNode(CertifiedNode):
             self._publish()
         if news or self._lock_step:
             self._publish_gains()
+
+    def acting_cadence(self) -> float | None:
+        """Factor on the cadence of the states of the last tick."""
+        return None if self._x is None else self._network.gait.cadence_scale
+
+    def stop_in_force(self) -> tuple[GaitNetwork, Inhibition, Any] | None:
+        """Network, inhibition and states of the last tick."""
+        return None if self._x is None else (self._network, self._acting, self._x)
 
     def _certificate_in_force(self) -> Certificate:
         return self.certificate_in(self._network.gait)
@@ -191,29 +203,37 @@ class InhibitionNode(CertifiedNode):
             return response
         self._predict(self._acting)
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
-        response.message = (
-            f'{verb} {when}, at most {self._bound:.3f} s; {self._words()}'
+        most = (
+            f'at most {self._bound:.3f} s' if isfinite(self._bound)
+            else 'without a bound from this state'
         )
+        response.message = f'{verb} {when}, {most}; {self._words()}'
         return response
 
     def _predict(self, published: Inhibition) -> None:
         """Look ahead to the rest or the walk that was just requested."""
         tick_s = self.parameters_of(TickParameters).tick_ns * 1e-9
+        gait = self._network.gait
+        canon = CanonicalState(
+            gait, self.gaits.named(gait_name(self)), gait.cadence_scale, self._x, self._x_dot,
+            initial_contact_state(),
+        )
         self._predicted = predict(
             self._supervisor,
             self._reference,
+            self._running_gait,
             self._state,
             published,
-            self._network,
-            self._x,
+            canon,
             self._r,
             self._gate.at(self._state.time_ns),
             tick_s,
             body_mode=self._body_mode,
         )
-        certificate = self._certificate_in_force()
         self._bound = (
-            certificate.time_to_rest if self._state.requested else certificate.time_to_walking
+            self.running_in(gait).time_to_rest(self._network, self._x, self._r)
+            if self._state.requested
+            else self._certificate_in_force().time_to_walking
         )
         if self._state.voted:
             self._bound = self._votes.bound(self._supervisor, self._network, self._state)

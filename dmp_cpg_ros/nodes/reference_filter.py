@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.running import approached
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.nodes.framework.certified import CertifiedNode
@@ -33,6 +35,7 @@ class ReferenceFilter(CertifiedNode):
         self._gate = self.new_gate()
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
         self._r, self._requested = np.zeros(3), False
+        self._cadence = self.parameters_of(CanonicalParameters).cadence_scale
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
         self.match(
             ('joint_states',),
@@ -50,9 +53,14 @@ class ReferenceFilter(CertifiedNode):
         self.limit(self._gate)
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
 
+    def acting_cadence(self) -> float | None:
+        """Factor on the cadence as the oscillators let it approach the accepted one."""
+        return self._cadence
+
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
-        dt = self.elapsed
+        dt, wanted = self.elapsed, self.parameters_of(CanonicalParameters).cadence_scale
+        self._cadence = approached(self._cadence, wanted, dt)
         command, self._requested = self._gate.at(stamp_ns), bool(values['inhibition_gains'])
         r_ext = np.zeros(3) if self._requested else np.array(command)
         self._r = self._system.step(self._r, r_ext, dt)

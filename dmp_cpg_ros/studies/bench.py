@@ -159,8 +159,8 @@ def parts_of_a_tick() -> list[Row]:
         ('one leg', lambda: leg.step(
             loop.leg_states[0].leg, gait, x[0], x_dot[0], r, asked, dt)),
         ('prediction of a stop', lambda: predict(
-            loop.supervisor, loop.reference, stopping, loop.inhibition, network, x, r, command,
-            dt)),
+            loop.supervisor, loop.reference, loop.canonical, stopping, loop.inhibition, loop.canon,
+            r, command, dt)),
     ])
 
 

@@ -19,7 +19,9 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.contraction.connectivity import synchronisation_complement
 from dmp_cpg_ros.core.gait.gait import BodyScale
-from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
@@ -133,18 +135,21 @@ def stop_times(graph: str, phases: int = 12) -> tuple[float, float]:
         [s]
     """
     p, tick = SuiteParameters(), 0.004
-    gait = GaitNetwork(CanonicalParameters(coupling_graph=graph), load_gait('amble'),
-                       BodyScale(0.28, 0.22))
-    bound = certify(gait, p.inhibition, p.reference, p.leg, p.posture, tick).time_to_rest
+    gait, coupled = load_gait('amble'), CanonicalParameters(coupling_graph=graph)
+    canonical = RunningGait(coupled, BodyScale(0.28, 0.22), KnownGaits({gait.name: gait}))
+    network = canonical.network(gait)
+    bound = certify(network, p.inhibition, p.reference, p.leg, p.posture, tick).time_to_rest
     supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
     fastest = np.array([p.reference.max_speed, p.reference.max_lateral_speed,
                         p.reference.max_turn_rate])
     walking = replace(supervisor.initial_state(), word='walking', requested=False, armed=False,
                       automatic=False, activity=np.ones(SIZE))
     published = supervisor.inhibition(walking)
+    start = canonical.initial_state(gait, replace(p.inhibition, start_inhibited=False))
     slowest = max(
-        predict(supervisor, ReferenceSystem(p.reference), supervisor.request(walking, True),
-                published, gait, gait.locked_state(float(phi)), fastest, (0.0, 0.0, 0.0), tick)
+        predict(supervisor, ReferenceSystem(p.reference), canonical,
+                supervisor.request(walking, True), published,
+                replace(start, x=network.locked_state(float(phi))), fastest, (0.0, 0.0, 0.0), tick)
         for phi in np.linspace(0.0, 2.0 * np.pi, phases, endpoint=False))
     return bound, slowest
 

@@ -97,6 +97,10 @@ class Inhibition:
     def acting_gains(self, x: Array, target: Array) -> Array:
         """Gains that act at a state: α_i inside C_i and zero outside.
 
+        In a stop the nodes of the largest gain act together or not at all: one of several that is
+        caught alone need not be able to hold the others. (In the paper each is switched by its own
+        region; for one node that is the same.)
+
         Parameters
         ----------
         x, target : ndarray (N, 2)
@@ -110,6 +114,10 @@ class Inhibition:
             return self.gains
         error = x - target
         inside = error[:, 0] * error[:, 0] + error[:, 1] * error[:, 1] <= self.region_radius**2
+        if self.requested:
+            strongest = self.gains == self.gains.max()
+            if not inside[strongest].all():
+                inside = inside & ~strongest
         return np.where(inside, self.gains, 0.0)
 
 

@@ -172,7 +172,8 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     start = time_to_walking(network, found, analysis.rest, span, leg.activity_rate, tick_s)
     contact = None
     if p.contact_feedback:
-        contact, contact_row = contact_limits(p, analysis, span, start)
+        contact, contact_row = contact_limits(network, analysis, span,
+                                              inhibition.region_radius, start)
         stop += later_stop(span, tick_s)
     network_rows = network_inequalities(network, inhibition, span, analysis)
     rows = [entry for entry in network_rows if entry.name != 'frequency_mismatch']

@@ -1,11 +1,12 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The certificate of a change of gait: of both gaits and of every blend between them.
+"""The certificate of a change: of gaits with every blend between them, and of cadences.
 
 Offsets do not enter the spectrum (:mod:`~dmp_cpg_ros.core.gait.transition`), so that a blend
 differs from a gait only by its cadence. The inequalities are therefore computed for all cadences
 of both gaits, widened by what the moving offsets add to a leg's frequency, and hold for every
-blend. A stop that is requested in a transition waits until the offsets stand still.
+blend. A stop that is requested in a transition waits until the offsets stand still. The same holds
+for a cadence that is on its way to the one that was accepted.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction.finding import PROVED
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.running import CADENCE_RATE
 from dmp_cpg_ros.core.gait.transition import SETTLING_RATE, STANDING, GaitTransition
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
@@ -29,7 +31,7 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 
 def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
-                    tick_s: float) -> Certificate:
+                    tick_s: float, acting_cadence: float | None = None) -> Certificate:
     """Compute the certificate of some gaits and of every change between them.
 
     Parameters
@@ -42,6 +44,8 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
         The robot's lengths.
     tick_s : float
         Control tick [s].
+    acting_cadence : float, optional
+        Factor on the cadence that still acts, on its way to that of the parameters.
 
     Returns
     -------
@@ -54,15 +58,21 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
         If the tick is not positive and finite.
     """
     p, rate = parameters, parameters.gait_change.gait_change_rate
-    networks = [GaitNetwork(p.canonical, gait, scale) for gait in gaits]
+    networks, arriving = all_networks(p, gaits, scale, acting_cadence), 0.0
+    if acting_cadence is not None:
+        arriving = abs(acting_cadence - p.canonical.cadence_scale) / CADENCE_RATE
     ways = [GaitTransition(one, other) for one, other in combinations(gaits, 2)]
     share = max((way.fastest(rate) for way in ways), default=0.0)
-    span = _widened([operating_range(one, p.inhibition, p.reference) for one in networks], share)
+    span = _widened(p, networks, share)
     whole = certify(networks[0], p.inhibition, p.reference, p.leg, p.posture, tick_s, span)
-    pause = math.log(span.omega[1] / (STANDING * span.omega[0])) / SETTLING_RATE + tick_s
-    bound = whole.time_to_rest + pause
-    rows = [_changed(row, bound, p.leg) for row in whole.inequalities]
+    pause = 0.0 if not ways else (
+        math.log(span.omega[1] / (STANDING * span.omega[0])) / SETTLING_RATE + tick_s)
+    bound = whole.time_to_rest + pause + arriving
+    rows = [_changed(row, bound, p.leg, 'gait' if ways else 'cadence')
+            for row in whole.inequalities]
     rows += _votes(p, networks, tick_s)
+    if not ways:
+        return replace(whole, inequalities=tuple(rows), time_to_rest=bound)
     rows.append(Inequality(
         'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
         'fastest offset', 'tolerated mismatch', PROVED,
@@ -109,11 +119,11 @@ def _votes(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: float
     return list(worst.values())
 
 
-def _changed(row: Inequality, bound: float, leg: LegParameters) -> Inequality:
+def _changed(row: Inequality, bound: float, leg: LegParameters, what: str) -> Inequality:
     """Rows that are different in a transition: the time to rest, and the feet at rest."""
     if row.name == 'time_to_rest':
         return replace(row, left=bound,
-                       sentence=f'{row.sentence}, the pause of a change of gait included')
+                       sentence=f'{row.sentence}, the pause of a change of {what} included')
     if row.name == 'rest_posture' and math.isfinite(row.left):
         return replace(row, left=leg.clearance * REST_ACTIVITY, sentence=(
             'as a fraction of the standing height, when rest is declared, wherever in its cycle '
@@ -121,8 +131,19 @@ def _changed(row: Inequality, bound: float, leg: LegParameters) -> Inequality:
     return row
 
 
-def _widened(spans: Sequence[OperatingRange], share: float) -> OperatingRange:
+def all_networks(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
+                 acting_cadence: float | None) -> list[GaitNetwork]:
+    """Networks of all gaits, at the cadence of the parameters and at the one that acts."""
+    networks = [GaitNetwork(p.canonical, gait, scale) for gait in gaits]
+    if acting_cadence is None:
+        return networks
+    acting = replace(p.canonical, cadence_scale=acting_cadence)
+    return networks + [GaitNetwork(acting, gait, scale) for gait in gaits]
+
+
+def _widened(p: SuiteParameters, networks: Sequence[GaitNetwork], share: float) -> OperatingRange:
     """Range of all blends, with frequencies that differ by a share."""
+    spans = [operating_range(network, p.inhibition, p.reference) for network in networks]
     slower, faster = 1.0 - share, 1.0 + share
     return OperatingRange(
         spans[0].foot_speed, spans[0].armed_speed,

@@ -6,18 +6,18 @@ from __future__ import annotations
 
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.certificates.network import NetworkAnalysis
-from dmp_cpg_ros.core.contraction.capture import PLACE_TOLERANCE, RADIUS_TOLERANCE, CaptureSet
 from dmp_cpg_ros.core.contraction.finding import PROVED
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
-from dmp_cpg_ros.core.gait.network import CanonicalParameters
-from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, entry_tolerances
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 
 
-def contact_margin(found: Synchronisation, capture: CaptureSet, rho: float,
-                   radius: float) -> float:
+def contact_margin(found: Synchronisation, rho: float, radius: float,
+                   tolerances: tuple[float, float]) -> float:
     """Largest δ for which frequencies in [ω − δ, ω + δ] leave walking and stopping as certified.
 
     For all times after the legs were in their places, their phases stay within the error that
@@ -28,42 +28,41 @@ def contact_margin(found: Synchronisation, capture: CaptureSet, rho: float,
     ----------
     found : Synchronisation
         Of the free network.
-    capture : CaptureSet
-        Of the inhibited network.
     rho, radius : float
         Parameters of the oscillators.
+    tolerances : tuple of float
+        Of places and radii, at which inhibition may set in
+        (:func:`~dmp_cpg_ros.core.inhibition.supervisor.entry_tolerances`).
 
     Returns
     -------
     float
         [rad/s]; 0 when nothing is certified.
     """
-    places = min(PLACE_TOLERANCE * radius, capture.tolerance)
+    places, radii = tolerances
 
     def within(delta: float) -> bool:
         bound = mismatch_bound(found, rho, radius, delta)
         return (bound.phase_spread <= LOCKED_PHASE_ERROR and bound.distance <= places
-                and bound.smallest_radius >= (1.0 - RADIUS_TOLERANCE) * radius)
+                and bound.smallest_radius >= radius - radii)
 
-    low, high = 0.0, max(found.rate, 0.0)
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if within(middle) else (low, middle)
-    return low
+    return last_that_holds(within, 0.0, max(found.rate, 0.0), 30)
 
 
-def contact_limits(parameters: CanonicalParameters, analysis: NetworkAnalysis,
-                   span: OperatingRange, start: float) -> tuple[ContactLimits, Inequality]:
+def contact_limits(network: GaitNetwork, analysis: NetworkAnalysis, span: OperatingRange,
+                   region_radius: float, start: float) -> tuple[ContactLimits, Inequality]:
     """Limits of the feedback, and the inequality that they keep.
 
     Parameters
     ----------
-    parameters : CanonicalParameters
-        Share of the margin, and the oscillators.
+    network : GaitNetwork
+        Oscillators, with the share of the margin.
     analysis : NetworkAnalysis
         Of the network.
     span : OperatingRange
         Cadences.
+    region_radius : float
+        r0 of C.
     start : float
         Bound on the time from a release to phase lock [s].
 
@@ -72,8 +71,9 @@ def contact_limits(parameters: CanonicalParameters, analysis: NetworkAnalysis,
     limits : ContactLimits
     inequality : Inequality
     """
-    p = parameters
-    margin = contact_margin(analysis.found, analysis.capture, p.rho, p.radius)
+    p = network.parameters
+    margin = contact_margin(analysis.found, p.rho, p.radius,
+                            entry_tolerances(network, region_radius))
     own = p.margin_share * margin
     return ContactLimits(own, span.omega[1], start), Inequality(
         'contact_feedback', own, margin, 'rad/s', f'{p.margin_share:.0%} of it',

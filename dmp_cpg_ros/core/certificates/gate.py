@@ -16,18 +16,33 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
-from dmp_cpg_ros.core.certificates.changes import certify_changes
+from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes
 from dmp_cpg_ros.core.certificates.suggest import nearest_value
+from dmp_cpg_ros.core.certificates.timing import later_arming
+from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE, capture_set
+from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, inhibited_contraction
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.reference.operating_range import operating_range
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
+
+Array = NDArray[np.float64]
 
 UNCERTIFIED = frozenset(
     ('auto_inhibit', 'auto_delay', 'start_inhibited', 'cmd_vel_timeout', 'allow_uncertified',
      'auto_speeds', 'auto_hysteresis', *UNCERTIFIED_VOTES, *VOTE_SOURCES))
 """Parameters of certified nodes that no inequality depends on."""
+
+_CAPTURING = frozenset(('rho', 'coupling_gain', 'coupling_graph', 'inhibition_gain',
+                        'region_radius', 'inhibited_legs'))
+"""Parameters that decide which set inhibition holds the legs in."""
 
 _DIGITS = 4
 
@@ -48,6 +63,9 @@ class Running:
         Control tick [s].
     others : tuple of Gait
         Gaits that it may change to and back, before ``cadence_scale``.
+    acting_cadence : float, optional
+        Factor on the cadence that acts, while it is on its way to that of the parameters; the
+        certificate then holds for all between the two.
     """
 
     parameters: SuiteParameters
@@ -55,15 +73,86 @@ class Running:
     scale: BodyScale
     tick_s: float
     others: tuple[Gait, ...] = ()
+    acting_cadence: float | None = None
 
     def certificate(self) -> Certificate:
         """Compute the certificate."""
         p = self.parameters
-        if self.others:
-            return certify_changes(p, (self.gait, *self.others), self.scale, self.tick_s)
+        if self.others or self.moving:
+            return certify_changes(p, (self.gait, *self.others), self.scale, self.tick_s,
+                                   self.acting_cadence if self.moving else None)
         network = GaitNetwork(p.canonical, self.gait, self.scale)
         return certify(network, p.inhibition, p.reference, p.leg, p.posture, self.tick_s,
                        voting=p.voting)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the cadence that acts is not that of the parameters."""
+        return self.acting_cadence not in (None, self.parameters.canonical.cadence_scale)
+
+    def time_to_rest(self, network: GaitNetwork, x: Array, r: Array) -> float:
+        """Bound on the time to rest of a stop that is requested in a known state [s].
+
+        Parameters
+        ----------
+        network : GaitNetwork
+            That acts.
+        x, r : ndarray (4, 2), (3,)
+            States and reference.
+        """
+        p = self.parameters
+        return self.certificate().time_to_rest + later_arming(
+            network, p.inhibition, operating_range(network, p.inhibition, p.reference),
+            p.reference.alpha_r, x, r)
+
+    def refused_now(self, before: Running, network: GaitNetwork, inhibition: Inhibition,
+                    x: Array) -> str:
+        """Why a change of what captures the legs has to wait; empty when it may be made.
+
+        While the gait runs every certified change may: inhibition sets in when the legs are in
+        their places. In a stop that holds them, the state must be in the invariant set of the new
+        parameters, or the legs would break free and take a stride.
+
+        Parameters
+        ----------
+        before : Running
+            What runs.
+        network : GaitNetwork
+            That acts, perhaps in another gait than the one that is wanted.
+        inhibition : Inhibition
+            That acts.
+        x : ndarray (4, 2)
+            States.
+        """
+        names = sorted(_CAPTURING.intersection(before.differences(self)))
+        if not (names and inhibition.requested
+                and inhibition.acting_gains(x, network.target).any()):
+            return ''
+        if not inhibition.at_rest:
+            return (f'{", ".join(names)} cannot change while the legs are being captured; ask '
+                    'again when they are at rest')
+        outside = self._outside(x, np.linalg.norm(x - network.target, axis=1))
+        if not outside:
+            return ''
+        return (f'{", ".join(names)} cannot change in this rest: {outside}; ask again while the '
+                'gait runs')
+
+    def _outside(self, x: Array, distance: Array) -> str:
+        """What lies outside of the invariant set of these parameters; empty when nothing does."""
+        p = self.parameters
+        networks = all_networks(p, (self.gait, *self.others), self.scale, self.acting_cadence)
+        fastest = max(operating_range(network, p.inhibition, p.reference).omega[1]
+                      for network in networks)
+        system, r0 = networks[0].system, p.inhibition.region_radius
+        capture = capture_set(system, fastest, p.inhibition.armed_gains, r0)
+        for leg, far, most in zip(LEGS, distance, capture.distance, strict=True):
+            if far > most:
+                return (f'{leg} rests {far:.4g} from its place, and the new parameters hold it '
+                        f'within {most:.4g}')
+        regional = inhibited_contraction(system, capture).reach != GLOBAL
+        if regional and np.hypot(*x.T).min() < p.canonical.radius * (1.0 - RADIUS_TOLERANCE):
+            return 'the new parameters contract only for legs near their cycle'
+        return ''
 
     def differences(self, other: Running) -> dict[str, tuple[Any, Any]]:
         """Names of parameters that differ, with this value and the other one."""

@@ -11,9 +11,10 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.certificates.inequality import Inequality
-from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE
+from dmp_cpg_ros.core.contraction.capture import radius_tolerance
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 
 STEP_ERROR = 0.025
 """c: with s = tick · ℓ, a mode that decays by more than c s⁴ per tick decays in the step too."""
@@ -94,10 +95,8 @@ def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -
     low, high = 0.5 * radius, 1.5 * radius
     if not change(low) > 0.0 > change(high):
         return math.inf
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if change(middle) > 0.0 else (low, middle)
-    return abs(low / radius - 1.0)
+    cycle = last_that_holds(lambda R: change(R) > 0.0, low, high, 50)
+    return abs(cycle / radius - 1.0)
 
 
 def step_inequalities(rho: float, radius: float, omega: float, rate: float, region_radius: float,
@@ -125,7 +124,8 @@ def step_inequalities(rho: float, radius: float, omega: float, rate: float, regi
         Inequality('time_step', tick_s, limit, 's', 'tick', 'longest stable step', SAMPLED,
                    'what decays in the equations decays in their numerical integration'),
         Inequality('cycle_radius', cycle_radius_error(rho, radius, omega, tick_s),
-                   RADIUS_TOLERANCE, '', '|R/r - 1| as integrated', 'what capture allows', PROVED,
+                   radius_tolerance(radius, region_radius) / radius, '',
+                   '|R/r - 1| as integrated', 'what capture allows', PROVED,
                    'the integration keeps the radius of the limit cycle'),
         Inequality('region_per_tick', omega * tick_s, arc, 'rad', 'omega_max tick', 'arc of C',
                    PROVED, 'an oscillator cannot step over the region C between two ticks')]

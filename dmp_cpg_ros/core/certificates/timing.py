@@ -19,11 +19,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
 from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
-from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
+from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import (
     LOCKED_ACTIVITY,
@@ -31,6 +32,7 @@ from dmp_cpg_ros.core.inhibition.supervisor import (
     REST_ACTIVITY,
     REST_PHASE_RATE,
     REST_SPEED,
+    entry_tolerances,
 )
 from dmp_cpg_ros.core.maths.exponential import phi_functions
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
@@ -132,6 +134,82 @@ def time_to_walking(network: GaitNetwork, found: Synchronisation,
         wanted = max(0.0, 1.0 - coupling * distance / (inner * span.omega[0]))
         activity = wanted + (activity - wanted) * math.exp(-activity_rate * _STEP)
     return math.inf
+
+
+def time_to_places(network: GaitNetwork, found: Synchronisation, x: Array,
+                   tolerances: tuple[float, float]) -> float:
+    """Bound on the time in which free legs come to their places, from a state that is known.
+
+    Disagreement shrinks at Theorem 4's rate, and the mean of the locked coordinates obeys
+    Ṙ ≥ ρ(r²R − R³ − 3ε²R − ε² max|e|) (:mod:`~dmp_cpg_ros.core.contraction.heterogeneity`).
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        Oscillators and gait.
+    found : Synchronisation
+        Of the free network.
+    x : ndarray (4, 2)
+        States.
+    tolerances : tuple of float
+        Of places and radii (:func:`~dmp_cpg_ros.core.inhibition.supervisor.entry_tolerances`).
+
+    Returns
+    -------
+    float
+        [s]; 0 for legs in their places, infinite when the bound does not come down.
+    """
+    p, (places, radii) = network.parameters, tolerances
+    if not found.synchronises or found.weights is None or not found.free_mean:
+        return math.inf
+    z = np.exp(1j * network.gait.phases) * (x[:, 0] + 1j * x[:, 1])
+    if (np.abs(z[:, None] - z).max() <= places
+            and np.abs(np.abs(z) - p.radius).max() <= radii):
+        return 0.0
+    mean = complex(found.weights @ z)
+    R, epsilon = abs(mean), math.sqrt(float(found.weights @ np.abs(z - mean) ** 2))
+    smallest, second = np.sort(found.weights)[:2].tolist()
+    pair, single = math.sqrt(1.0 / smallest + 1.0 / second), math.sqrt(1.0 / smallest - 1.0)
+    step = min(_STEP, 0.1 / (p.rho * p.radius**2))
+    for k in range(round(_HORIZON / _STEP)):
+        if epsilon * pair <= places and R - epsilon * single >= p.radius - radii:
+            return k * step
+        R += step * p.rho * ((p.radius**2 - R**2 - 3.0 * epsilon**2) * R - epsilon**3 * single)
+        epsilon *= math.exp(-found.rate * step)
+        if not R > 0.0:
+            break
+    return math.inf
+
+
+def later_arming(network: GaitNetwork, inhibition: InhibitionParameters, span: OperatingRange,
+                 alpha_r: float, x: Array, r: Array) -> float:
+    """What a state that is faster than the limits, or whose legs are not in their places, adds to
+    :func:`time_to_rest` [s].
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        Oscillators and gait.
+    inhibition : InhibitionParameters
+        For the region.
+    span : OperatingRange
+        Speeds and cadences of the bound.
+    alpha_r : float
+        Rate of the reference [1/s].
+    x, r : ndarray (4, 2), (3,)
+        States and reference at the request.
+    """
+    tolerances = entry_tolerances(network, inhibition.region_radius)
+    p = network.parameters
+    everywhere = float(growth(p.rho, p.radius))
+    locking = time_to_places(network, synchronisation(network.system.graph, everywhere), x,
+                             tolerances)
+    if locking > 0.0:
+        locking += tolerances[0] / (p.radius * span.omega_armed[0])
+    speed, limit = network.scale.foot_speed(*r.tolist()), max(span.foot_speed, span.armed_speed)
+    slowing = math.log(speed / limit) / alpha_r if speed > limit > 0.0 else (
+        math.inf if speed > limit else 0.0)
+    return max(locking, slowing)
 
 
 def _settling(network: GaitNetwork, capture: CaptureSet, rest: InhibitedEquilibrium,

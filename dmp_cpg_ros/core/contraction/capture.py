@@ -9,10 +9,10 @@ forward invariant. In locked coordinates let u_i = |x_i − x_d|. Because the co
     u̇_i ≤ g_i(u_i) + Σ_j k_ij (u_j − u_i) − α_i u_i,
     g_i(u) = sup over |n| = 1 of n·f_i(x_d + u n) ≤ ω_i |x_d| + ρ_i max_c (r_i² − |x|²)(c + u)
 
-and the box {u ≤ ū} is invariant when the right side is not positive on its faces. With ū = r0 at
-the inhibited nodes the others take ū_f = r0 + (what their rotation is worth), and what remains is
-one inequality for each inhibited node: *the* condition, N ω r / k_inh < r0 made exact. Every state
-that enters C with its nodes in their places lies in the box.
+with c = n·x_d, and the box {u ≤ ū} is invariant when the right side is not positive on its faces.
+With ū = r0 at the inhibited nodes the others take ū_f = r0 + (what their rotation is worth), and
+what remains is one inequality for each inhibited node: *the* condition, N ω r / k_inh < r0 made
+exact. Every state that enters C with its nodes in their places lies in the box.
 
 Inside the box a half-plane n·x_i ≥ c_i is invariant too (same argument for −n·x_i); it keeps the
 nodes away from the origin, where oscillators diverge, and gives contraction on the region.
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import phase_rotation
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian, slowest_rate
+from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian, overshoot, slowest_rate
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.errors import ParameterError
 
@@ -97,13 +97,22 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     Raises
     ------
     ParameterError
-        If no node is inhibited or the targets of inhibited nodes are not in their places.
+        If a number cannot be used, no node is inhibited, or the targets of inhibited nodes are not
+        in their places.
     """
-    size, inhibited = system.graph.size, np.asarray(gains) > 0.0
+    size = system.graph.size
     omega = np.broadcast_to(np.abs(omega), (size,)).astype(float)
+    gains = np.asarray(gains, dtype=float)
+    if not (np.isfinite(region_radius) and region_radius > 0.0):
+        raise ParameterError(f'region_radius = {region_radius!r} must be positive and finite')
+    if not (np.all(np.isfinite(omega)) and np.all(np.isfinite(gains)) and np.all(gains >= 0.0)):
+        raise ParameterError(f'frequencies {omega.tolist()} must be finite, and gains '
+                             f'{gains.tolist()} finite and not negative')
+    inhibited = gains > 0.0
     D = _target_radius(system, inhibited)
     L = comparison_laplacian(system.graph)
-    largest = max(float(system.radius.max()), D)
+    largest = float(np.sqrt(max(float(system.radius.max()), D)**2
+                            + overshoot(L) / float(system.rho.min())))
     u = _distances(system, L, omega, inhibited, D, region_radius, largest + D)
     pull = outward_growth(system, omega, D, u) - L @ u
     needed = np.where(inhibited, pull / region_radius, np.nan)
@@ -113,7 +122,30 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     M = L + np.diag(gains)
     inner = _smallest_radii(system, M, omega, u, D, region_radius, largest, tolerance)
     rate = slowest_rate(M - np.diag(growth(system.rho, system.radius, inner)))
-    return CaptureSet(u, inner, needed, np.asarray(gains, float), tolerance, rate)
+    return CaptureSet(u, inner, needed, gains, tolerance, rate)
+
+
+def place_tolerance(omega: float, degree: float, radius: float) -> float:
+    """Distance from each other at which nodes that enter C are certain to be in the box.
+
+    u_f − r0 ≥ ω r/Σ_j k_fj in every row of the fixed point, because no u_j is below r0.
+
+    Parameters
+    ----------
+    omega : float
+        Angular frequency, not above that of the box [rad/s].
+    degree : float
+        Largest Σ_j k_ij of a node [1/s].
+    radius : float
+        r = |x_d|.
+    """
+    lag = abs(omega) / degree if degree > 0.0 else np.inf
+    return radius * min(PLACE_TOLERANCE, lag)
+
+
+def radius_tolerance(radius: float, region_radius: float) -> float:
+    """Deviation from r at which nodes are certain to meet C, on an arc not shorter than r's."""
+    return min(RADIUS_TOLERANCE * radius, region_radius**2 / radius)
 
 
 def outward_growth(system: CanonicalSystem, omega: Array, D: float, u: Array) -> Array:
@@ -127,11 +159,31 @@ def outward_growth(system: CanonicalSystem, omega: Array, D: float, u: Array) ->
     ndarray (N,)
         Upper bound [1/s].
     """
+    return np.abs(omega) * D + np.maximum(_radial_growth(system, D, u), 0.0)
+
+
+def outward_growth_within(system: CanonicalSystem, omega: Array, D: float, u: Array) -> Array:
+    """Largest g_i(v) over v ≤ u_i, which rises with u as the iteration for the box needs [1/s].
+
+    For r = |x_d| it is g_i itself. Else the radial part has its other maxima where c leaves or
+    reaches ±|x_d|, or where |x| = r/√3 with x along x_d.
+    """
+    r = system.radius
+    reach = r / np.sqrt(3.0)
+    root = np.sqrt(np.maximum(4.0 * D**2 + 3.0 * (r**2 - D**2), 0.0))
+    places = (0.0 * r, reach - D, reach + D, (root - 2.0 * D) / 3.0, (root + 2.0 * D) / 3.0,
+              (2.0 * D - root) / 3.0)
+    radial = np.maximum.reduce([_radial_growth(system, D, np.clip(v, 0.0, u))
+                                for v in (u, *places)])
+    return np.abs(omega) * D + np.maximum(radial, 0.0)
+
+
+def _radial_growth(system: CanonicalSystem, D: float, u: Array) -> Array:
+    """Largest n·ρ(r² − |x|²)x over x = x_d + u n, ndarray (N,) [1/s]."""
     u = np.maximum(u, 1e-300)
     offset = system.radius**2 - D**2 - u**2
     c = np.clip((offset - 2.0 * u**2) / (4.0 * u), -D, D)
-    radial = system.rho * (offset - 2.0 * u * c) * (c + u)
-    return np.abs(omega) * D + np.maximum(radial, 0.0)
+    return np.asarray(system.rho * (offset - 2.0 * u * c) * (c + u))
 
 
 def _target_radius(system: CanonicalSystem, inhibited: Mask) -> float:
@@ -150,13 +202,14 @@ def _distances(system: CanonicalSystem, L: Array, omega: Array, inhibited: Mask,
                region_radius: float, largest: float) -> Array:
     """Least fixed point of u_f = L_ff⁻¹(g_f − L_fi r0), and r0 at the inhibited nodes.
 
-    Every iterate from above is a valid box. A node that the inhibited ones do not reach, or
+    Every iterate from above is a valid box, since the growth that it is solved with does not fall
+    where the box shrinks. A node that the inhibited ones do not reach, or
     not firmly, may be anywhere in the invariant disc.
     """
     u = np.where(inhibited, region_radius, largest)
     free = ~inhibited
     for _ in range(12):
-        solved = _grounded_solution(L, outward_growth(system, omega, D, u), u, free)
+        solved = _grounded_solution(L, outward_growth_within(system, omega, D, u), u, free)
         beyond = free & (solved >= largest)
         if np.any(beyond):                                  # fixed at the edge of the disc
             free = free & ~beyond
@@ -192,7 +245,8 @@ def _smallest_radii(system: CanonicalSystem, M: Array, omega: Array, u: Array, D
 
     On the face of a half-plane the rotation takes away ω t, t the largest extent along the flow,
     the coupling averages the c_j and inhibition pulls towards n_β·x_d; so c = n_β·x_d − s with
-    M s ≥ ω t suffices, as long as every state at capture is inside.
+    M s ≥ ω t suffices, as long as every state at capture is inside and no c is negative: there
+    the radial part would push outwards.
     """
     inner = np.maximum(0.0, D - u)
     tiny = 1e-9 * float(np.abs(M).max())
@@ -202,14 +256,16 @@ def _smallest_radii(system: CanonicalSystem, M: Array, omega: Array, u: Array, D
     extent = np.clip(u - D * np.sin(beta), 0.0, largest)                 # (13, N)
     loss = omega * extent + system.rho * np.maximum(largest**2 - system.radius**2, 0.0) * largest
     s = np.linalg.solve(M, loss.T).T
-    entry = _entry_height(beta, D, region_radius) - tolerance
+    entry = _entry_height(beta, D, region_radius, float(system.radius.min())) - tolerance
     s = s + np.maximum(0.0, (D * np.cos(beta) - entry - s).max(axis=1, keepdims=True))
-    return np.maximum(inner, (D * np.cos(beta) - s).max(axis=0))
+    heights = D * np.cos(beta) - s                                       # (13, N)
+    sound = np.all(heights >= 0.0, axis=1, keepdims=True)
+    return np.maximum(inner, np.where(sound, heights, 0.0).max(axis=0))
 
 
-def _entry_height(beta: Array, D: float, region_radius: float) -> Array:
-    """Smallest n_β·x over the states of C on which |x| ≥ (1 − RADIUS_TOLERANCE)|x_d|."""
-    inner = (1.0 - RADIUS_TOLERANCE) * D
+def _entry_height(beta: Array, D: float, region_radius: float, r: float) -> Array:
+    """Smallest n_β·x over the states of C with |x| ≥ (1 − RADIUS_TOLERANCE) min(|x_d|, r)."""
+    inner = (1.0 - RADIUS_TOLERANCE) * min(D, r)
     cosine = (inner**2 + D**2 - region_radius**2) / (2.0 * inner * D)
     corner = inner * np.cos(np.minimum(np.arccos(np.clip(cosine, -1.0, 1.0)) + beta, np.pi))
     lowest = D * np.cos(beta) - region_radius                            # of all of C

@@ -95,6 +95,15 @@ def comparison_laplacian(graph: CouplingGraph) -> Array:
     return L
 
 
+def overshoot(laplacian: Array) -> float:
+    """Largest Σ_j (‖K_ij‖ − λ_min(K_ij)) of a node [1/s], from the comparison Laplacian.
+
+    The disc |x| ≤ R cannot be left when ρ(R² − r²) is not below it; it is 0 for K_ij = k_ij I.
+    """
+    most = -float(laplacian.sum(axis=1).min(initial=0.0))
+    return most if most > 1e-9 * (1.0 + float(np.abs(laplacian).max(initial=0.0))) else 0.0
+
+
 def slowest_rate(M: Array) -> float:
     """Smallest decay rate of u̇ = −M u for a matrix with no positive entry off its diagonal.
 

@@ -7,6 +7,10 @@ With ω_i = ω + δ_i the mismatch d_i = δ_i S x_i is a disturbance of the homo
 norm of Theorem 4, (Σ ξ_i |x_i − x̄|²)^½ =: ε with Σ ξ_i = 1, disagreement obeys ε̇ ≤ −λε + d̄, so
 that ε ≤ d̄/λ in the end. Once ε is small the oscillators are near their cycle, where they grow
 apart less than at the origin; the bound is applied again with that growth until it settles.
+
+For K_ij = k_ij I the disc |x| ≤ r cannot be left and x̄ feels no coupling. Other gains may drive
+states out of the disc, to R with ρ(R² − r²) = Σ_j (‖K_ij‖ − λ_min(K_ij)); and where ξ does not
+balance the couplings nothing is known of x̄, so that only ε is bounded.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 
 Array = NDArray[np.float64]
 
@@ -82,7 +87,7 @@ def mismatch_bound(found: Synchronisation, rho: float, radius: float,
     found : Synchronisation
         Of the homogeneous network, with weights.
     rho, radius : float
-        ρ [1/s] and r of the oscillators; the disc |x| ≤ r is forward invariant.
+        ρ [1/s] and r of the oscillators.
     mismatch : float
         δ ≥ |ω_i − ω| [rad/s].
 
@@ -91,14 +96,25 @@ def mismatch_bound(found: Synchronisation, rho: float, radius: float,
     MismatchBound
         With an infinite disagreement when the network is not certified to synchronise or its
         components only follow one another.
+
+    Raises
+    ------
+    ParameterError
+        If the mismatch is negative or not finite.
     """
+    if not (np.isfinite(mismatch) and mismatch >= 0.0):
+        raise ParameterError(f'mismatch = {mismatch!r} rad/s must be finite and not negative')
     if not found.synchronises or found.weights is None:
         return MismatchBound(float('inf'), float('inf'), 0.0, float(np.pi))
     bound = MismatchBound(float('inf'), float('inf'), 0.0, float(np.pi))
+    largest = radius if found.overshoot == 0.0 else float(
+        np.sqrt(radius**2 + found.overshoot / rho))
     for _ in range(20):
         growth = min(found.growth, rho * (radius**2 - bound.smallest_radius**2))
-        epsilon, distance = disagreement_bound(found.connectivity - growth, mismatch * radius,
+        epsilon, distance = disagreement_bound(found.connectivity - growth, mismatch * largest,
                                                found.weights)
+        if not found.free_mean:
+            return MismatchBound(epsilon, distance, 0.0, float(np.pi))
         smallest = float(found.weights.min())
         farthest = epsilon * ((1.0 - smallest) / smallest) ** 0.5            # bounds |x_i − x̄|
         mean = _mean_radius(rho, radius, mismatch, epsilon, farthest)
@@ -130,14 +146,9 @@ def mismatch_margin(found: Synchronisation, rho: float, radius: float,
     float
         δ with |ω_i − ω| ≤ δ [rad/s]; 0 when nothing is certified.
     """
-    low, high = 0.0, max(found.rate, 0.0)
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        if mismatch_bound(found, rho, radius, middle).phase_spread <= phase_spread:
-            low = middle
-        else:
-            high = middle
-    return low
+    return last_that_holds(
+        lambda delta: mismatch_bound(found, rho, radius, delta).phase_spread <= phase_spread,
+        0.0, max(found.rate, 0.0), 30)
 
 
 def _mean_radius(rho: float, radius: float, mismatch: float, epsilon: float,

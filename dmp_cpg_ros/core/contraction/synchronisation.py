@@ -11,7 +11,7 @@ weights ξ (ξᵀL = 0), or a hierarchy of components that follow a root (Propos
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from dmp_cpg_ros.core.contraction.connectivity import (
     components,
     connectivity,
     left_null_weights,
+    overshoot,
     slowest_rate,
 )
 
@@ -44,12 +45,19 @@ class Synchronisation:
     method : str
         How the connectivity was bounded: ``symmetric``, ``projected``, ``weighted``,
         ``hierarchical`` or ``not connected``.
+    free_mean : bool
+        Whether Σ ξ_i x_i feels no coupling, (ξ ⊗ I)ᵀ L_K = 0.
+    overshoot : float
+        Largest Σ_j (‖K_ij‖ − λ_min(K_ij)) of a node [1/s]: how fast the couplings may drive states
+        out of a disc; 0 for K_ij = k_ij I.
     """
 
     connectivity: float
     growth: float
     weights: Array | None
     method: str
+    free_mean: bool = True
+    overshoot: float = 0.0
 
     @property
     def rate(self) -> float:
@@ -79,6 +87,15 @@ def synchronisation(graph: CouplingGraph, growth: float) -> Synchronisation:
     """
     L = graph.block_laplacian()
     scalar = comparison_laplacian(graph)
+    found = _best_bound(graph, L, scalar, growth)
+    tiny = 1e-9 * (1.0 + float(np.abs(L).max()))
+    felt = 0.0 if found.weights is None else float(
+        np.abs(np.kron(found.weights, np.eye(2)) @ L).max())
+    return replace(found, free_mean=felt <= tiny, overshoot=overshoot(scalar))
+
+
+def _best_bound(graph: CouplingGraph, L: Array, scalar: Array, growth: float) -> Synchronisation:
+    """Largest connectivity of those that are proved for the graph."""
     even = np.full(graph.size, 1.0 / graph.size)
     symmetric = np.allclose(L, L.T, rtol=0.0, atol=1e-12 * (1.0 + np.abs(L).max()))
     best = Synchronisation(connectivity(L, graph.size), growth, even,

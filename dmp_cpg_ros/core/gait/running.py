@@ -60,6 +60,14 @@ what is left.
 """
 
 
+def approached(cadence_scale: float, wanted: float, dt: float) -> float:
+    """Factor on the cadence a time dt [s] later, on its way to the one that is wanted."""
+    most = CADENCE_RATE * dt
+    if abs(wanted - cadence_scale) <= most:
+        return wanted
+    return cadence_scale + (most if wanted > cadence_scale else -most)
+
+
 @dataclass(frozen=True)
 class CanonicalState:
     """State of the canonical block after a tick.
@@ -203,9 +211,7 @@ class RunningGait:
         wanted, factor = self.parameters.cadence_scale, state.cadence_scale
         if factor == wanted:
             return state.gait, factor
-        most = CADENCE_RATE * dt
-        factor = wanted if abs(wanted - factor) <= most else factor + min(
-            max(wanted - factor, -most), most)
+        factor = approached(factor, wanted, dt)
         return self.gaits.at_cadence(state.gait, factor), factor
 
     def _begin_change(self, network: GaitNetwork, x: Array, r: Array, wanted: Gait,

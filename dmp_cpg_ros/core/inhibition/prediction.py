@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
-from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.running import CanonicalState, RunningGait
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 
@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 
 
 def predict(
-    supervisor: GaitSupervisor, reference: ReferenceSystem, state: SupervisorState,
-    published: Inhibition, network: GaitNetwork, x: Array, r: Array,
+    supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
+    state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
     command: tuple[float, float, float], dt: float, horizon: float = 10.0,
     body_mode: str = 'standing',
 ) -> float:
@@ -32,16 +32,14 @@ def predict(
 
     Parameters
     ----------
-    supervisor, reference : GaitSupervisor, ReferenceSystem
-        The systems as they run.
+    supervisor, reference, canonical : GaitSupervisor, ReferenceSystem, RunningGait
+        The blocks as they run.
     state : SupervisorState
         Present state, the request included.
     published : Inhibition
         The inhibition that was published before the request; it still acts at the next tick.
-    network : GaitNetwork
-        The oscillators that act, with their gait.
-    x : ndarray (4, 2)
-        Present canonical state.
+    canon : CanonicalState
+        Present state of the oscillators, gait and cadence perhaps on their way to others.
     r : ndarray (3,)
         Present reference.
     command : tuple of float
@@ -63,10 +61,10 @@ def predict(
     for k in range(1, math.ceil(horizon / dt) + 1):
         r_ext = np.zeros(3) if inhibition.requested else np.array(command)
         r = reference.step(r, r_ext, dt)
-        network, x = network.advance(x, r, inhibition, dt)
+        canon = canonical.step(canon, r, inhibition, dt)
         state = supervisor.step(
-            state, start_ns + k * tick_ns, network, x, network.rate(x, r, inhibition), r,
-            command, body_mode=body_mode,
+            state, start_ns + k * tick_ns, canonical.network(canon.gait), canon.x, canon.x_dot,
+            r, command, body_mode=body_mode,
         )
         inhibition = supervisor.inhibition(state)
         if state.word in ('at_rest', 'walking', 'free'):

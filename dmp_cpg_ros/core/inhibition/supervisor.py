@@ -4,7 +4,8 @@
 
 - ``free``, ``walking``: uninhibited, or slowed by votes that do not stop it; walking once the legs
   are in their places and the reference moves.
-- ``waiting``: a stop is requested; the reference slows, then inhibition is armed until x enters C.
+- ``waiting``: a stop is requested; the reference slows and the legs come to their places, then
+  inhibition is armed until x enters C. Capture is certified for legs that enter C in their places.
 - ``captured``: inhibition holds an oscillator and the others follow.
 - ``at_rest``: oscillators, reference and swings have come to rest.
 - ``releasing``: a start is requested; the oscillators run up until they are phase-locked.
@@ -13,13 +14,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.canonical.graph import topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
+from dmp_cpg_ros.core.contraction.capture import place_tolerance, radius_tolerance
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
 from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
@@ -49,6 +53,25 @@ LOCKED_PHASE_ERROR = 0.05
 
 LOCKED_ACTIVITY = 0.95
 """Swing activity above which a leg swings at its height."""
+
+
+def entry_tolerances(network: GaitNetwork, region_radius: float) -> tuple[float, float]:
+    """Distance of legs from each other's places, and of radii from r, at which C may be entered.
+
+    With :func:`~dmp_cpg_ros.core.contraction.capture.place_tolerance` at the cadence of rest, not
+    above the one that capture is certified for.
+    """
+    p = network.parameters
+    degree = p.coupling_gain * largest_degree(p.coupling_graph)
+    return (place_tolerance(network.omega(np.zeros(3)), degree, p.radius),
+            radius_tolerance(p.radius, region_radius))
+
+
+@lru_cache
+def largest_degree(graph: str) -> int:
+    """Largest number of legs that act on one."""
+    edges = topology(graph, len(LEGS))
+    return max(sum(i == node for i, _ in edges) for node in range(len(LEGS)))
 
 
 @dataclass(frozen=True)
@@ -210,7 +233,7 @@ class GaitSupervisor:
             state = self._barred(state, body_mode)
         state = self._voted(state, tally or state.tally)
         if state.requested:
-            return self._stopping(state, network.target, x, rates, speed)
+            return self._stopping(state, network, x, rates, speed)
         return self._running(state, network.phase_errors(x), speed)
 
     def _automatic(
@@ -270,11 +293,13 @@ class GaitSupervisor:
         return updated(state, automatic=state.automatic and automatic, idle_ns=-1)
 
     def _stopping(
-        self, state: SupervisorState, target: Array, x: Array, rates: list[float], speed: float,
+        self, state: SupervisorState, network: GaitNetwork, x: Array, rates: list[float],
+        speed: float,
     ) -> SupervisorState:
-        armed = state.armed or speed <= self.parameters.capture_speed
-        inhibition = Inhibition(True, self._gains(state, armed), self.parameters.region_radius)
-        if not any(inhibition.acting_gains(x, target).tolist()):
+        inside = self._acts(state, network.target, x)
+        armed = (state.armed and inside) or (
+            speed <= self.parameters.capture_speed and self.in_places(network, x))
+        if not (armed and inside):
             return updated(state, armed=armed, word='waiting')
         if (
             max(map(abs, rates)) > REST_PHASE_RATE
@@ -283,6 +308,19 @@ class GaitSupervisor:
         ):
             return updated(state, armed=armed, word='captured')
         return updated(state, armed=armed, word='at_rest', measured_s=self._measured(state))
+
+    def _acts(self, state: SupervisorState, target: Array, x: Array) -> bool:
+        """Whether inhibition acts at a state once it is armed."""
+        gains = self._gains(state, True)
+        inhibition = Inhibition(True, gains, self.parameters.region_radius)
+        return bool(inhibition.acting_gains(x, target).any())
+
+    def in_places(self, network: GaitNetwork, x: Array) -> bool:
+        """Whether legs and radii are as close to their places as capture takes for granted."""
+        places, radii = entry_tolerances(network, self.parameters.region_radius)
+        z = np.exp(1j * network.gait.phases) * (x[:, 0] + 1j * x[:, 1])
+        return bool(np.abs(np.abs(z) - network.parameters.radius).max() <= radii
+                    and np.abs(z[:, None] - z).max() <= places)
 
     def _running(self, state: SupervisorState, errors: Array, speed: float) -> SupervisorState:
         locked = max(map(abs, errors.tolist())) <= LOCKED_PHASE_ERROR

@@ -10,10 +10,12 @@ refuses a change that would lose it; the others follow what the owner has accept
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, cast
 
 from rclpy.parameter import Parameter
 
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates.certify import Certificate
 from dmp_cpg_ros.core.certificates.gate import (
     UNCERTIFIED,
@@ -24,7 +26,7 @@ from dmp_cpg_ros.core.certificates.gate import (
 )
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
-from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
@@ -74,22 +76,39 @@ class CertifiedNode(SuiteNode):
     def certificate(self) -> Certificate:
         """Certificate of the parameters that were accepted last."""
         if self._held is None:
-            self._held = self._running(self._accepted).certificate()
+            accepted = self._running(self._accepted)
+            self._held = replace(accepted, acting_cadence=None).certificate()
         return self._held
 
     def certificate_in(self, gait: GaitInForce) -> Certificate:
         """Certificate of a gait in force, or of a change between two, with the same parameters."""
-        if gait.name == self._accepted_of(GaitParameters).gait:
+        running = self.running_in(gait)
+        if running.gait.name == self._accepted_of(GaitParameters).gait and not running.moving:
             return self.certificate
+        if running.moving:
+            return running.certificate()
         if self._held_for is not self._accepted:
             self._held_for, self._held_in = self._accepted, {}
         found = self._held_in.get(gait.name)
         if found is None:
-            ends = (gait.transition.before, gait.transition.after) if isinstance(
-                gait, BlendedGait) else (gait,)
-            names = [end.name for end in ends]
-            found = self._held_in[gait.name] = self._running(self._accepted, names).certificate()
+            found = self._held_in[gait.name] = running.certificate()
         return found
+
+    def running_in(self, gait: GaitInForce) -> Running:
+        """What runs in a gait in force, or in a change between two."""
+        if gait.name == self._accepted_of(GaitParameters).gait:
+            return self._running(self._accepted)
+        ends = (gait.transition.before, gait.transition.after) if isinstance(
+            gait, BlendedGait) else (gait,)
+        return self._running(self._accepted, [end.name for end in ends])
+
+    def acting_cadence(self) -> float | None:
+        """Factor on the cadence that acts, for a node that knows it."""
+        return None
+
+    def stop_in_force(self) -> tuple[GaitNetwork, Inhibition, Any] | None:
+        """Network, inhibition and states that act, for a node that knows them."""
+        return None
 
     def prepare_certificate(self) -> None:
         """Read what certificates are computed from, and follow the others; in ``configure``."""
@@ -155,7 +174,8 @@ class CertifiedNode(SuiteNode):
         names = names or (of(GaitParameters).gait, *chosen)
         gait, *others = [self.gaits.named(name) for name in dict.fromkeys(names)]
         return Running(SuiteParameters.of(sets), gait, self._scale,
-                       of(TickParameters).tick_ns * 1e-9, tuple(others))
+                       of(TickParameters).tick_ns * 1e-9, tuple(others),
+                       self.acting_cadence() if self.configured else None)
 
     # Own changes -------------------------------------------------------------------------------
 
@@ -169,8 +189,11 @@ class CertifiedNode(SuiteNode):
         running = self._running(sets)
         if self._following:
             return
-        verdict = self._changes.judge(
-            self._running(self._accepted), self.certificate, running)
+        present, stop = self._running(self._accepted), self.stop_in_force()
+        waits = '' if stop is None else running.refused_now(present, *stop)
+        if waits:
+            raise ParameterError(waits)
+        verdict = self._changes.judge(present, self.certificate, running)
         if not verdict.accepted and not _allowed(sets):
             asked = ', '.join(f'{name} = {shown(value)}' for name, value in changed.items())
             raise ParameterError(
@@ -183,7 +206,8 @@ class CertifiedNode(SuiteNode):
         if not self.configured:
             return
         if self._judged is not None:
-            self._held = self._judged.certificate
+            moving = self._running(self._accepted).moving
+            self._held = None if moving else self._judged.certificate
             self.certificate_changed()
         elif self._following:
             self._held = None

@@ -142,8 +142,9 @@ def test_the_prediction_of_a_stop_by_votes_is_kept_to_the_tick() -> None:
     run.go(TICK)
     loop = run.loop
     assert loop.stop.voted
-    predicted = predict(loop.supervisor, loop.reference, loop.stop, loop.inhibition, loop.network,
-                        loop.x, loop.r, loop.gate.at(run.time_ns - TICK_NS), TICK)
+    predicted = predict(loop.supervisor, loop.reference, loop.canonical, loop.stop,
+                        loop.inhibition, loop.canon, loop.r,
+                        loop.gate.at(run.time_ns - TICK_NS), TICK)
     run.until('at_rest')
     assert loop.stop.measured_s == pytest.approx(predicted, abs=1e-9)
 

@@ -1,0 +1,162 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Search for a certificate that is wrong, as long as one lets it.
+
+Two attacks: on the theory, many barely certified networks at once
+(:mod:`~dmp_cpg_ros.studies.adversary_networks`), and on the suite, its loop without legs in random
+settings under random sequences of requests, commands, accepted changes and votes, of which those
+that came closest to a bound are varied. What is found is made smaller and written down.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.studies import adversary_networks
+from dmp_cpg_ros.studies.adversary_suite import (
+    CONDITIONS,
+    Case,
+    Oscillators,
+    play,
+    random_events,
+    setting,
+    smaller,
+    varied,
+)
+from dmp_cpg_ros.suite import load_suite
+
+WEAKENED = (*adversary_networks.WEAKENED, *CONDITIONS)
+"""Inequalities and conditions that can be left out, to see whether the search notices."""
+
+
+def search(seed: int, seconds: float, weaken: str = '', robot: str = '') -> Iterator[
+        tuple[Counter[str], list[Case]]]:
+    """Attack until the time is over; counts and failures of each round.
+
+    Parameters
+    ----------
+    seed : int
+        Of the random numbers.
+    seconds : float
+        How long.
+    weaken : str
+        What is left out; empty for an honest search.
+    robot : str
+        Robot file; that of the suite without.
+    """
+    from dmp_cpg_ros.robot.model_reader import load_description
+
+    rng, end = np.random.default_rng(seed), time.monotonic() + seconds
+    description = load_description(robot or load_suite().robot_file)
+    guided: list[tuple[float, Case]] = []
+    while time.monotonic() < end:
+        counts: Counter[str] = Counter()
+        failures: list[Case] = []
+        if weaken in ('', *adversary_networks.WEAKENED):
+            run, failures = adversary_networks.attack(rng, int(rng.integers(2, 13)), 40, weaken)
+            counts.update(networks=run, network_runs=run * adversary_networks.STARTS)
+        for _ in range(0 if weaken in adversary_networks.WEAKENED else 4):
+            if time.monotonic() > end:
+                break
+            case = varied(rng, guided[rng.integers(len(guided))][1]) if (
+                guided and rng.random() < 0.5) else setting(rng)
+            if not case['events']:
+                if not _is_certified(description, case):
+                    continue
+                counts['suites'] += 1
+                case['events'] = random_events(rng, 'voting' in case['parameters'])
+            what, closest = play(description, case, weaken, counts)
+            guided = sorted([*guided, (closest, case)], key=lambda one: -one[0])[:16]
+            if what:
+                failures.append(_written(description, case, what, weaken))
+        yield counts, failures
+
+
+def _is_certified(description: RobotDescription, case: Case) -> bool:
+    try:
+        return Oscillators(description, case).certified()
+    except DmpCpgError:
+        return False
+
+
+def _written(description: RobotDescription, case: Case, what: str, weaken: str) -> Case:
+    """The smallest case that fails in the same way."""
+    def fails(one: Case) -> bool:
+        return (_is_certified(description, one)
+                and play(description, one, weaken)[0][:9] == what[:9])
+
+    case = smaller(case, fails)
+    plain = {name: list(value) if isinstance(value, tuple) else value
+             for name, value in case['parameters'].items()}
+    return {'attack': 'suite', 'happened': play(description, case, weaken)[0], **case,
+            'parameters': plain, 'events': [
+                [wait, kind, {name: list(entry) if isinstance(entry, tuple) else entry
+                              for name, entry in value.items()} if isinstance(value, dict)
+                 else value] for wait, kind, value in case['events']]}
+
+
+def _work(arguments: tuple[int, float, str, int]) -> tuple[Counter[str], list[Case]]:
+    seed, seconds, weaken, most = arguments
+    total: Counter[str] = Counter()
+    failures: list[Case] = []
+    for counts, found in search(seed, seconds, weaken):
+        total += counts
+        failures += found
+        if len(failures) >= most:
+            break
+    return total, failures
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the search; returns 1 when it found something."""
+    parser = argparse.ArgumentParser(description='Search for a certificate that is wrong.')
+    parser.add_argument('--seconds', type=float, default=60.0)
+    parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--workers', type=int, default=1)
+    parser.add_argument('--weaken', choices=WEAKENED, default='', help='leave this out')
+    parser.add_argument('--failures', type=int, default=3, help='stop after this many')
+    parser.add_argument('--record', type=Path, help='Markdown file to add the counts to')
+    options = parser.parse_args(arguments)
+    jobs = [(1000 * options.seed + k, options.seconds, options.weaken, options.failures)
+            for k in range(options.workers)]
+    if options.workers == 1:
+        results = [_work(jobs[0])]
+    else:
+        with multiprocessing.get_context('spawn').Pool(options.workers) as pool:
+            results = pool.map(_work, jobs)
+    total = sum((counts for counts, _ in results), Counter())
+    failures = [case for _, found in results for case in found]
+    row = _row(total, options, len(failures))
+    print(row)
+    if failures:
+        plain = json.loads(json.dumps(failures, default=float))
+        print(yaml.safe_dump(plain, sort_keys=False, allow_unicode=True))
+    if options.record is not None:
+        text = options.record.read_text(encoding='utf-8').rstrip('\n')
+        options.record.write_text(f'{text}\n{row}\n', encoding='utf-8')
+    return 1 if failures else 0
+
+
+def _row(total: Counter[str], options: argparse.Namespace, failures: int) -> str:
+    """Row of the table in ``doc/certificate.md``."""
+    changes = total['set'] + total['gait']
+    return (f'| {options.seed} | {options.workers} x {options.seconds:g} s '
+            f'| {options.weaken or "nothing"} | {total["networks"]} | {total["network_runs"]} '
+            f'| {total["suites"]} | {total["stop"] + total["start"]} '
+            f'| {changes} ({total["accepted"]}) | {failures} |')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

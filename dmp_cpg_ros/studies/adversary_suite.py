@@ -1,0 +1,337 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Attack on the suite: its loop without legs, in random settings under random sequences of
+requests, commands, accepted changes and votes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.certificates.gate import Running
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
+from dmp_cpg_ros.core.inhibition.voters import VoteSensors
+from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.suite import load_gaits
+
+CONDITIONS = ('places', 'arming', 'acting', 'holding')
+"""Conditions that can be left out, to see whether the search notices: without ``places``
+inhibition is armed at once and switches each leg by its own region.
+"""
+
+LONGEST = 12.0
+"""Time after which a stop counts as one that never ends [s]."""
+
+STRIDE = np.radians(200.0)
+"""Turn of a leg at rest that counts as a stride [rad]: more than it may rest ahead."""
+
+Array = NDArray[np.float64]
+GAITS = load_gaits()
+Case = dict[str, Any]
+
+
+class Oscillators(WalkingLoop):
+    """The loop's reference, oscillators, votes and state of the stop, without robot and legs."""
+
+    def __init__(self, description: RobotDescription, case: Case, weaken: str = '') -> None:
+        """Build the loop of a case."""
+        self.tick_ns = round(case['tick_s'] * 1e9)
+        start = Running(SuiteParameters(reference=ReferenceParameters(cmd_vel_timeout=0.0)),
+                        GAITS[case['gait']], None, case['tick_s'])  # type: ignore[arg-type]
+        super().__init__(description, GAITS[case['gait']],
+                         start.changed(case['parameters']).parameters, GAITS)
+        self._dt, self._weaken, self.now_ns = case['tick_s'], weaken, 0
+        nothing = np.full(3, np.nan)
+        self._sensors = VoteSensors(0, 0, np.full(4, 0.25), nothing, nothing)
+        self._leave_out_places()
+
+    def _described(self, parameters: SuiteParameters, gait: Any) -> Running:
+        running = super()._described(parameters, gait)
+        if self._weaken == 'acting':
+            running = replace(running, acting_cadence=None)
+        return _Unheld(**vars(running)) if self._weaken == 'holding' else running
+
+    def change(self, values: Mapping[str, Any]) -> str:
+        """Change parameters; the condition that is left out stays left out."""
+        told = super().change(values)
+        self._leave_out_places()
+        return told
+
+    def _leave_out_places(self) -> None:
+        if self._weaken == 'places':
+            of = self.supervisor
+            self.supervisor = _Hasty(of.parameters, of.voting, of.activity_rate)
+
+    def certified(self) -> bool:
+        """Whether the present parameters have a certificate."""
+        return self.in_force().certificate().holds
+
+    def time_to_rest(self) -> float:
+        """Bound that is stated for a stop now [s]."""
+        if self._weaken == 'arming':
+            return self.in_force().certificate().time_to_rest
+        return super().time_to_rest()
+
+    def advance(self) -> None:
+        """Run one tick of what the certificate speaks of."""
+        self.now_ns += self.tick_ns
+        dt, inhibition = self._dt, self.inhibition
+        command = self.gate.at(self.now_ns)
+        self.r = self.reference.step(
+            self.r, np.zeros(3) if inhibition.requested else np.array(command), dt)
+        if self._weaken == 'places':
+            inhibition = _Separate(**vars(inhibition))
+        self.canon = canon = self.canonical.step(self.canon, self.r, inhibition, dt)
+        self.votes = self.voting.step(
+            self.votes, self.now_ns, self.network, self._sensors, canon.x, self.r,
+            self.stop.word in ('walking', 'free'), self.inbox.take())
+        self.stop = self.supervisor.step(
+            self.stop, self.now_ns, self.network, canon.x, canon.x_dot, self.r, command,
+            self.votes.tally)
+        self.inhibition = self.supervisor.inhibition(self.stop)
+
+    @property
+    def held(self) -> bool:
+        """Whether a stop is in force and inhibition acts."""
+        now = self.inhibition
+        return bool(now.requested and now.acting_gains(self.x, self.network.target).any())
+
+
+class _Unheld(Running):
+    """Parameters of which any may change in a stop."""
+
+    def refused_now(self, *_: object) -> str:
+        """Nothing has to wait."""
+        return ''
+
+
+class _Hasty(GaitSupervisor):
+    """A state machine that does not wait until the legs are in their places."""
+
+    def in_places(self, network: GaitNetwork, x: Array) -> bool:
+        """Taken for granted."""
+        return True
+
+
+@dataclass(frozen=True)
+class _Separate(Inhibition):
+    """Inhibition that each node switches by its own region, as in the paper."""
+
+    def acting_gains(self, x: Array, target: Array) -> Array:
+        """Gains of the nodes that are inside."""
+        return replace(self, requested=False).gains * (
+            np.linalg.norm(x - target, axis=1) <= self.region_radius)
+
+
+def play(description: RobotDescription, case: Case, weaken: str = '', counts: Counter[str] | None
+         = None) -> tuple[str, float]:
+    """Run a case to its end.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        The robot.
+    case : dict
+        ``gait``, ``tick_s``, ``parameters`` by name, and ``events``: lists of a wait [s], a kind
+        (``stop``, ``start``, ``command``, ``set``, ``gait``, ``vote``) and a value.
+    weaken : str
+        What is left out, one of ``CONDITIONS``.
+    counts : Counter, optional
+        Where stops, starts and changes are counted.
+
+    Returns
+    -------
+    what : str
+        What is wrong; empty when nothing is.
+    closest : float
+        Largest share of a bound that was needed.
+    """
+    counts = Counter() if counts is None else counts
+    loop, closest = Oscillators(description, case, weaken), 0.0
+    expected: tuple[int, float, float] | None = None         # since, bound, prediction
+    turned, resting = np.zeros(4), False
+    for wait, kind, value in [*case['events'], [0.0, 'stop', None], [LONGEST, 'end', None]]:
+        for _ in range(round(wait / case['tick_s'])):
+            before, held = phase(loop.x), loop.held and loop.stop.armed
+            loop.advance()
+            moved = (phase(loop.x) - before + np.pi) % (2.0 * np.pi) - np.pi
+            turned = turned + moved if resting and loop.stop.requested else np.zeros(4)
+            resting = loop.stop.requested and (resting or loop.stop.word == 'at_rest')
+            if not np.all(np.isfinite(loop.x)):
+                return 'the oscillators diverge', closest
+            if held and loop.inhibition.requested and not loop.held:
+                return 'C is left again', closest
+            if np.abs(turned).max() > STRIDE:
+                return 'a leg takes a stride while the stop is in force', closest
+            if expected is None:
+                if kind == 'end' and loop.stop.word == 'at_rest':
+                    break
+                continue
+            since = (loop.now_ns - expected[0]) * 1e-9
+            if loop.stop.word == 'at_rest':
+                closest = max(closest, since / expected[1])
+                if since > expected[1] + 1e-9:
+                    return f'at rest after {since:.3f} s, at most {expected[1]:.3f}', closest
+                if abs(since - expected[2]) > 1e-6:
+                    return f'at rest after {since:.3f} s, predicted {expected[2]:.3f}', closest
+                expected = None
+                if kind == 'end':
+                    break
+            elif since > expected[1] + case['tick_s'] * 1.5:
+                return f'not at rest after {since:.3f} s, at most {expected[1]:.3f}', closest
+        resting = resting and kind != 'start'
+        counts[kind] += kind != 'end'
+        if kind != 'end':
+            expected = _do(loop, kind, value, expected, counts)
+    return ('' if loop.stop.word == 'at_rest' else 'the last stop does not end'), closest
+
+
+def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, float] | None,
+        counts: Counter[str]) -> tuple[int, float, float] | None:
+    """Do what an event says; what is expected of the stop that it asks for."""
+    if kind == 'stop' and not loop.stop.requested:
+        bound = loop.time_to_rest() if loop.certified() else np.inf
+        predicted = loop.request(True)
+        return loop.now_ns, bound, predicted if predicted < np.inf else LONGEST
+    if kind == 'stop':
+        return expected
+    if kind == 'start':
+        loop.request(False)
+        return None
+    if kind == 'command':
+        loop.command(*value)
+    elif kind == 'vote':
+        loop.vote(value)
+        return None
+    else:
+        try:
+            accepted = not loop.change({'gait': value} if kind == 'gait' else value)
+        except DmpCpgError:
+            accepted = False
+        counts['accepted'] += accepted
+        # What was said of a stop holds for the parameters that it was said for.
+        return None if accepted else expected
+    return expected
+
+
+_WORDS = {'coupling_graph': ('all_to_all', 'ring', 'path', 'star', 'directed_ring')}
+_NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain': (60.0, 4000.0),
+            'region_radius': (0.03, 1.2), 'cadence_scale': (0.25, 4.0), 'alpha_r': (0.7, 20.0),
+            'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0)}
+_DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': False}
+
+
+def _value(rng: np.random.Generator, name: str) -> Any:
+    low, high = _NUMBERS[name]
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def _legs(rng: np.random.Generator) -> tuple[str, ...]:
+    return tuple(rng.permutation(LEGS)[:1 + rng.choice(4, p=(0.5, 0.3, 0.15, 0.05))].tolist())
+
+
+def setting(rng: np.random.Generator) -> Case:
+    """Random parameters, certified or not."""
+    names = rng.permutation(list(_NUMBERS))[:rng.integers(0, 7)]
+    parameters: Case = {**_DEFAULTS, **{str(name): _value(rng, str(name)) for name in names}}
+    parameters['coupling_graph'] = str(rng.choice(_WORDS['coupling_graph']))
+    parameters['inhibited_legs'] = _legs(rng)
+    if rng.random() < 0.1:
+        parameters['voting'] = True
+    return {'gait': str(rng.choice(list(GAITS))), 'parameters': parameters,
+            'tick_s': float(rng.choice([0.001, 0.002, 0.004, 0.004, 0.01])), 'events': []}
+
+
+def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
+    """Random events; the first two start the gait."""
+    events: list[list[Any]] = [[0.1, 'start', None],
+                               [0.0, 'command', [float(rng.uniform(0.0, 3.0)), 0.0, 0.0]]]
+    if rng.random() < 0.6:
+        return events + _telling(rng)
+    for _ in range(rng.integers(3, 14)):
+        kind = str(rng.choice(['stop', 'start', 'set', 'gait', 'command', 'vote'],
+                              p=(0.33, 0.25, 0.25, 0.05, 0.09, 0.03)))
+        value: Any = None
+        if kind == 'set':
+            name = str(rng.choice([*_NUMBERS, 'inhibited_legs', 'coupling_graph']))
+            value = {name: _legs(rng) if name == 'inhibited_legs' else str(rng.choice(
+                _WORDS[name])) if name in _WORDS else _value(rng, name)}
+        elif kind == 'gait':
+            value = str(rng.choice(list(GAITS)))
+        elif kind == 'command':
+            value = [float(rng.uniform(-1.0, 3.0)), 0.0, float(rng.uniform(-0.5, 0.5))]
+        elif kind == 'vote':
+            if not voting:
+                continue
+            value = {str(leg): 1.0 for leg in rng.permutation(LEGS)[:rng.integers(1, 5)]}
+        wait = float(np.exp(rng.uniform(np.log(0.004), np.log(3.0))))
+        events.append([wait, kind, value])
+    return events
+
+
+def _telling(rng: np.random.Generator) -> list[list[Any]]:
+    """Sequences that once told that something was missing, at other times and values."""
+    def change(*names: str) -> Any:
+        name = str(rng.choice(names))
+        return {name: _legs(rng) if name == 'inhibited_legs' else _value(rng, name)}
+
+    def soon() -> float:
+        return float(np.exp(rng.uniform(np.log(0.004), np.log(0.6))))
+
+    kind = rng.integers(4)
+    if kind == 0:                                            # stops within starts
+        return [entry for _ in range(3) for entry in (
+            [2.0, 'stop', None], [2.0, 'start', None], [soon(), 'stop', None],
+            [soon(), 'start', None], [soon(), 'stop', None])]
+    if kind == 1:                                            # what acts is not what was accepted
+        return [[1.5, 'set', change('cadence_scale')],
+                [soon(), 'set', change('inhibition_gain', 'region_radius', 'cadence_scale')],
+                [soon(), 'stop', None], [3.0, 'start', None],
+                [1.0, 'set', change('cadence_scale')], [soon(), 'stop', None]]
+    if kind == 2:                                            # changes at rest
+        return [[1.0, 'stop', None], *([2.0, 'set', change(
+            'inhibited_legs', 'coupling_gain', 'inhibition_gain', 'region_radius', 'rho')]
+            for _ in range(3)), [2.0, 'start', None]]
+    return [[0.0, 'command', [3.0, 0.0, 0.0]], [1.5, 'set', change('max_speed', 'alpha_r')],
+            [soon(), 'stop', None]]
+
+
+def varied(rng: np.random.Generator, case: Case) -> Case:
+    """A case with other waits, or with one event more or less."""
+    events = [[max(0.0, wait * float(np.exp(0.2 * rng.normal()))), kind, value]
+              for wait, kind, value in case['events']]
+    if rng.random() < 0.3 and len(events) > 3:
+        events.pop(int(rng.integers(2, len(events))))
+    if rng.random() < 0.5:
+        events += random_events(rng, 'voting' in case['parameters'])[2:4]
+    return {**case, 'events': events}
+
+
+def smaller(case: Case, fails: Callable[[Case], bool]) -> Case:
+    """A case from which no event and no parameter can be left out without losing the failure."""
+    again = True
+    while again:
+        again = False
+        for k in reversed(range(len(case['events']))):
+            events = case['events'][:k] + case['events'][k + 1:]
+            if fails({**case, 'events': events}):
+                case, again = {**case, 'events': events}, True
+        for name in list(case['parameters']):
+            rest = {key: value for key, value in case['parameters'].items() if key != name}
+            if fails({**case, 'parameters': rest}):
+                case, again = {**case, 'parameters': rest}, True
+    return case

@@ -1,0 +1,186 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The suite in settings for which its certificate was once wrong: bounds and predictions hold."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from core_examples import GAITS, TICK, TICK_NS, quadruped, suite_parameters
+
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
+
+ROBOT = quadruped()
+
+
+class Walk:
+    """The suite on a robot that does what it is told."""
+
+    def __init__(self, gait: str = 'amble', inhibition: dict[str, Any] | None = None,
+                 reference: dict[str, Any] | None = None, **canonical: Any) -> None:
+        parameters = suite_parameters(
+            canonical=CanonicalParameters(**canonical),
+            inhibition=InhibitionParameters(**{'auto_inhibit': False, **(inhibition or {})}),
+            reference=ReferenceParameters(cmd_vel_timeout=0.0, **(reference or {})))
+        self.loop = WalkingLoop(ROBOT, GAITS[gait], parameters, GAITS)
+        self.robot = PerfectTrackingRobot(ROBOT, TICK_NS)
+        self.state = self.robot.reset()
+        self.left_region = 0
+        self.turned = np.zeros(4)
+        self.tick()
+
+    def tick(self) -> None:
+        loop = self.loop
+        before, held = phase(loop.x), self._held()
+        self.state = self.robot.step(loop.tick(self.state).targets)
+        self.turned += (phase(loop.x) - before + np.pi) % (2.0 * np.pi) - np.pi
+        self.left_region += held and loop.inhibition.requested and not self._held()
+
+    def _held(self) -> bool:
+        loop = self.loop
+        return bool(loop.inhibition.requested
+                    and loop.inhibition.acting_gains(loop.x, loop.network.target).any())
+
+    def run(self, seconds: float) -> None:
+        for _ in range(round(seconds / TICK)):
+            self.tick()
+
+    def walk(self, speed: float, seconds: float) -> None:
+        self.loop.command(speed)
+        self.loop.request(False)
+        self.run(seconds)
+
+    def stop(self) -> tuple[float, float, float]:
+        """Stop: bound, prediction and what it took [s]; C is not left once it is entered."""
+        bound, predicted = self.loop.time_to_rest(), self.loop.request(True)
+        ticks = 0
+        while self.loop.stop.word != 'at_rest':
+            self.tick()
+            ticks += 1
+            assert ticks * TICK < bound + TICK, 'beyond the bound'
+        assert self.left_region == 0
+        return bound, predicted, ticks * TICK
+
+
+def accepted(walk: Walk, **values: Any) -> bool:
+    return walk.loop.change(values) == ''
+
+
+@pytest.mark.parametrize('delay', [0.012, 0.02, 0.04, 0.2])
+@pytest.mark.parametrize('gain', [14.0, 16.0])
+def test_several_inhibited_legs_stop_within_a_start(gain: float, delay: float) -> None:
+    walk = Walk(inhibition={'inhibited_legs': ('fl', 'rr')}, coupling_graph='star',
+                coupling_gain=gain)
+    certificate = walk.loop.in_force().certificate()
+    assert certificate.holds, certificate.explained()
+    walk.run(1.0)
+    walk.walk(0.5, delay)
+    bound, predicted, measured = walk.stop()
+    assert measured == pytest.approx(predicted, abs=1e-9)
+    assert measured <= bound
+
+
+@pytest.mark.parametrize('values', [{'inhibition_gain': 110.0}, {'region_radius': 0.09}])
+def test_a_gain_for_the_accepted_cadence_waits_for_the_acting_one(values: dict[str, float]
+                                                                  ) -> None:
+    walk = Walk(inhibition={'capture_speed': 2.0}, cadence_scale=2.0)
+    walk.walk(1.2, 2.0)
+    assert accepted(walk, cadence_scale=0.5)
+    told = walk.loop.change(values)
+    assert 'capture' in told and 'nearest value' in told
+    walk.run(3.5)                                            # the cadence has arrived
+    assert accepted(walk, **values)
+    _, predicted, measured = walk.stop()
+    assert measured == pytest.approx(predicted, abs=1e-9)
+
+
+@pytest.mark.parametrize(('first', 'then'), [(0.25, 2.0), (1.0, 2.0), (1.0, 0.5)])
+@pytest.mark.parametrize('wait', [0.0, 0.1, 0.35, 0.6])
+def test_a_stop_while_the_cadence_moves_is_predicted_to_the_tick(first: float, then: float,
+                                                                 wait: float) -> None:
+    walk = Walk(cadence_scale=first)
+    walk.walk(0.6, 3.0)
+    assert accepted(walk, cadence_scale=then)
+    walk.run(wait)
+    _, predicted, measured = walk.stop()
+    assert measured == pytest.approx(predicted, abs=1e-9)
+
+
+def test_a_stop_after_the_speed_limit_was_lowered_is_bounded_from_where_the_reference_is() -> None:
+    walk = Walk('trot')
+    walk.walk(3.0, 4.0)
+    assert accepted(walk, max_speed=0.2)
+    assert accepted(walk, max_lateral_speed=0.0, max_turn_rate=0.0)
+    walk.tick()
+    bound, predicted, measured = walk.stop()
+    assert measured == pytest.approx(predicted, abs=1e-9)
+    walk.walk(0.2, 4.0)                                      # slow, the bound is that of the limit
+    assert walk.loop.time_to_rest() < bound
+
+
+@pytest.mark.parametrize('leg', ['fr', 'rl', 'rr'])
+@pytest.mark.parametrize('gain', [25.0, 40.0, 50.0, 100.0])
+def test_no_leg_takes_a_stride_when_the_inhibited_leg_changes_at_rest(gain: float, leg: str
+                                                                      ) -> None:
+    walk = Walk(coupling_gain=gain)
+    walk.run(1.0)
+    walk.turned[:] = 0.0
+    told = walk.loop.change({'inhibited_legs': (leg,)})
+    walk.run(3.0)
+    assert walk.loop.stop.word == 'at_rest'
+    assert np.abs(walk.turned).max() < np.radians(50.0)      # atan(omega/k), not a turn
+    assert not told or f'{leg} rests' in told
+    if gain == 100.0:
+        assert not told
+    walk.walk(0.3, 1.0)                                      # while the gait runs it may change
+    assert accepted(walk, inhibited_legs=(leg,))
+    walk.stop()
+
+
+@pytest.mark.parametrize('gain', [25.0, 1000.0])
+def test_no_leg_takes_a_stride_when_the_coupling_changes_at_rest(gain: float) -> None:
+    walk = Walk(coupling_gain=25.0 if gain > 100.0 else 100.0)
+    walk.run(1.0)
+    walk.turned[:] = 0.0
+    walk.loop.change({'coupling_gain': gain})
+    walk.run(3.0)
+    assert walk.loop.stop.word == 'at_rest' and np.abs(walk.turned).max() < np.radians(50.0)
+
+
+def test_what_captures_cannot_change_while_it_captures() -> None:
+    walk = Walk()
+    walk.walk(0.3, 2.0)
+    walk.loop.request(True)
+    while walk.loop.stop.word != 'captured':
+        walk.tick()
+    assert 'being captured' in walk.loop.change({'inhibition_gain': 500.0})
+    while walk.loop.stop.word != 'at_rest':
+        walk.tick()
+    assert accepted(walk, inhibition_gain=500.0)
+
+
+@pytest.mark.parametrize('seed', range(12))
+def test_stops_within_starts_keep_the_bound_that_is_stated(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    while True:
+        graph = rng.choice(['all_to_all', 'ring', 'path', 'star', 'directed_ring'])
+        legs = tuple(rng.permutation(['fl', 'fr', 'rl', 'rr'])[:rng.integers(1, 4)].tolist())
+        walk = Walk(str(rng.choice(['amble', 'trot', 'walk', 'bound'])),
+                    {'inhibited_legs': legs, 'region_radius': rng.uniform(0.05, 0.4),
+                     'inhibition_gain': np.exp(rng.uniform(np.log(200.0), np.log(3000.0)))},
+                    {'max_speed': 1.0}, coupling_graph=str(graph), rho=rng.uniform(1.0, 12.0),
+                    coupling_gain=np.exp(rng.uniform(np.log(10.0), np.log(200.0))))
+        if walk.loop.in_force().certificate().holds:
+            break
+    walk.run(0.5)
+    for _ in range(4):
+        walk.walk(0.4, rng.uniform(0.004, 0.6))
+        bound, predicted, measured = walk.stop()
+        assert measured == pytest.approx(predicted, abs=1e-9) and measured <= bound

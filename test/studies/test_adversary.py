@@ -1,0 +1,73 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The search for a wrong certificate finds one where an inequality is left out, and none else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_examples import quadruped
+
+from dmp_cpg_ros.studies import adversary_networks
+from dmp_cpg_ros.studies.adversary import main
+from dmp_cpg_ros.studies.adversary_suite import CONDITIONS, Case, Oscillators, play, smaller
+
+ROBOT = quadruped()
+
+
+def case(parameters: dict[str, object], *events: tuple[float, str, object]) -> Case:
+    return {'gait': 'amble', 'tick_s': 0.004, 'events': [list(event) for event in events],
+            'parameters': {'auto_inhibit': False, **parameters}}
+
+
+WITHIN_A_START = case(
+    {'coupling_graph': 'star', 'coupling_gain': 14.0, 'inhibited_legs': ('fl', 'rr')},
+    (0.5, 'start', None), (0.012, 'stop', None), (8.0, 'start', None), (0.02, 'stop', None))
+LOWERED_LIMIT = case({}, (0.1, 'start', None), (0.0, 'command', [3.0, 0.0, 0.0]),
+                     (4.0, 'set', {'max_speed': 0.05, 'max_lateral_speed': 0.0,
+                                   'max_turn_rate': 0.0}), (0.004, 'stop', None))
+CADENCE = case({'cadence_scale': 0.25, 'alpha_r': 20.0, 'max_speed': 1.0},
+               (0.1, 'start', None), (3.0, 'set', {'cadence_scale': 2.0}), (0.1, 'stop', None))
+AT_REST = case({'coupling_gain': 25.0}, (1.0, 'set', {'inhibited_legs': ('rr',)}),
+               (3.0, 'start', None))
+BROKEN = {'places': WITHIN_A_START, 'arming': LOWERED_LIMIT, 'acting': CADENCE, 'holding': AT_REST}
+
+
+@pytest.mark.parametrize('weaken', CONDITIONS)
+def test_a_condition_that_is_left_out_is_noticed(weaken: str) -> None:
+    assert Oscillators(ROBOT, BROKEN[weaken]).certified()
+    assert play(ROBOT, BROKEN[weaken])[0] == ''
+    assert play(ROBOT, BROKEN[weaken], weaken)[0]
+
+
+@pytest.mark.parametrize('weaken', adversary_networks.WEAKENED)
+def test_an_inequality_that_is_weakened_is_noticed(weaken: str) -> None:
+    rng = np.random.default_rng(1)
+    found = [adversary_networks.attack(rng, size, 25, weaken)[1] for size in (2, 4, 3, 2, 5)]
+    assert any(found)
+    failure = next(one for one in found if one)[0]
+    rebuilt = adversary_networks.drawn(failure)
+    assert rebuilt.as_mapping() == {key: value for key, value in failure.items()
+                                    if key not in ('attack', 'happened')}
+
+
+@pytest.mark.parametrize('size', [2, 3, 4, 7, 12])
+def test_no_certified_network_fails(size: int) -> None:
+    certified, failures = adversary_networks.attack(np.random.default_rng(size), size, 25)
+    assert certified > 3 and failures == []
+
+
+def test_a_failure_is_made_smaller() -> None:
+    whole = case({'rho': 7.0}, (0.1, 'start', None), (1.0, 'stop', None), (0.5, 'start', None))
+
+    def fails(one: Case) -> bool:
+        return sum(event[1] == 'start' for event in one['events']) >= 1
+
+    small = smaller(whole, fails)
+    assert len(small['events']) == 1 and small['parameters'] == {}
+
+
+def test_the_command_counts_what_it_tried(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['--seconds', '1', '--weaken', 'capture', '--failures', '1']) == 1
+    told = capsys.readouterr().out
+    assert told.startswith('| 0 | 1 x 1 s | capture |') and 'happened: leaves C' in told
