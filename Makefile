@@ -85,7 +85,7 @@ study-recovery: $(INSTALLED) ## stand up, lie down, recover from 50 falls (STUDY
 benchmark-walking: $(INSTALLED) ## measure speeds, pushes, rough ground, gait changes (BENCHMARK_ARGS=...)
 	$(ACTIVATED) benchmark_walking $(BENCHMARK_ARGS)
 
-doc-images: $(INSTALLED) ## make the pictures of the README
+doc-images: $(INSTALLED) ## make the pictures of the documents
 	rm -rf build/doc_images
 	$(ACTIVATED) walk --lock-step --out build/doc_images
 	mkdir -p doc/images

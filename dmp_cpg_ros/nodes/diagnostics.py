@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a node says about itself on ``/diagnostics``."""
+"""Status of a node for ``/diagnostics``."""
 
 from __future__ import annotations
 

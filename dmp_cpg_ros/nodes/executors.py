@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Running nodes: which executor, how long, and what the process says at its end."""
+"""Running nodes: executor, lifetime, and exit message of the process."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the suite asks of the middleware, as its users do: by a profile file."""
+"""Settings of the middleware, by a profile file."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Copies of other nodes' parameters that are true while those nodes change them."""
+"""Copies of other nodes' parameters, kept up to date while those nodes change them."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the operating system's scheduler is to treat a node's threads.
+"""Scheduling policy of a node's threads.
 
-Every message wakes its reader, and a reader that Linux wakes takes the core from the writer, who
-has four more messages to publish: ten processes on two cores changed places 9,000 times a second.
-Under ``SCHED_BATCH`` (sched(7)) whoever is woken waits until the writer has finished its tick and
-sleeps. The policy needs no privilege and changes nobody's share of the processor.
+Every message wakes its reader, and under the default policy the reader preempts the writer before
+the writer has published the rest of its tick: ten processes on two cores switched 9,000 times a
+second. Under ``SCHED_BATCH`` (sched(7)) a woken reader waits until the writer sleeps. The policy
+needs no privilege and does not change the processes' shares of the processor.
 """
 
 from __future__ import annotations

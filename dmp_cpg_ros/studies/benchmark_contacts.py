@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The table of what feeling the ground is good for: the same seeds with and without."""
+"""The table of contact reflexes and contact feedback: the same seeds with and without them."""
 
 from __future__ import annotations
 
