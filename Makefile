@@ -89,7 +89,7 @@ study-adversary: $(INSTALLED) ## search for a certificate that is wrong (STUDY_A
 benchmark-walking: $(INSTALLED) ## measure speeds, pushes, rough ground, gait changes (BENCHMARK_ARGS=...)
 	$(ACTIVATED) benchmark_walking $(BENCHMARK_ARGS)
 
-doc-images: $(INSTALLED) ## make the pictures of the README
+doc-images: $(INSTALLED) ## make the pictures of the documents
 	rm -rf build/doc_images
 	$(ACTIVATED) walk --lock-step --out build/doc_images
 	mkdir -p doc/images

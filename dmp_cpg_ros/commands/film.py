@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``film``: the robot's way as a film, drawn from a recording after the run."""
+"""``film``: a recorded run as a film, drawn after the run."""
 
 from __future__ import annotations
 

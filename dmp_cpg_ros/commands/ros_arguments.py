@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``--ros-args`` of the commands that are not nodes: what they take of it and what not."""
+"""``--ros-args`` of the commands that are not nodes: which of them are accepted."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the parameters of a run tell about it: the robot, the gait, the inhibition.
+"""Robot, gait and inhibition of a run, from its parameters.
 
 The analysis itself knows neither MuJoCo nor configuration files; here both are read for it.
 """

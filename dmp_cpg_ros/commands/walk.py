@@ -286,7 +286,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         '--lock-step',
         action='store_true',
-        help='the robot waits for every target: no run depends on the speed of the machine',
+        help='wait for every target, so that the run does not depend on the speed of the machine',
     )
     parser.add_argument(
         '--composed', action='store_true', help='all nodes in one process and one executor'

@@ -133,7 +133,7 @@ class RobotParameters(Parameters):
 
     physics: str = parameter(
         'mujoco',
-        'what moves the robot: MuJoCo, or joints that track perfectly',
+        'simulation of the robot: MuJoCo, or joints that track perfectly',
         choices=('mujoco', 'perfect_tracking'),
     )
     reading: str = parameter(
@@ -152,7 +152,7 @@ class RobotParameters(Parameters):
     seed: int = parameter(0, 'seed of the initial spread', minimum=0)
     start_pose: str = parameter(
         'standing',
-        'how the robot is found: standing, lying on its belly, or fallen somehow by the seed',
+        'start pose: standing, lying on the belly, or fallen, drawn by the seed',
         choices=('standing', 'lying', 'fallen'),
     )
     initial_spread: float = parameter(
@@ -164,7 +164,7 @@ class RobotParameters(Parameters):
     )
     target_timeout: float = parameter(
         0.2,
-        "age of a leg's targets after which the robot holds a stand by itself",
+        "age of a leg's targets after which the fallback controller takes over",
         unit='s',
         minimum=0.01,
         maximum=10.0,

@@ -39,13 +39,15 @@ TICK_TOPIC = 'joint_states'
 class RecorderParameters(Parameters):
     """Parameters of the recorder."""
 
-    output: str = parameter('bag', 'folder of the recording; where it exists the next free of '
-                            'bag_1, bag_2, ...')
-    storage: str = parameter('mcap', 'kind of file; only mcap survives a killed recorder',
+    output: str = parameter('bag',
+        'folder of the recording; if it exists, the next free of bag_1, bag_2, ...')
+    storage: str = parameter('mcap',
+        'file format; only mcap stays readable when the recorder is killed',
                              choices=STORAGES)
     topics: tuple[str, ...] = parameter((ALL,), 'topics to record', choices=(
         ALL, *(topic.name for topic in RECORDED)))
-    flush_period: float = parameter(0.25, 'time between flushes; what is older survives a kill',
+    flush_period: float = parameter(0.25,
+        'time between flushes to disk; older messages survive when the recorder is killed',
                                     unit='s', minimum=0.02, maximum=60.0)
     stamped_cmd_vel: bool = parameter(False, 'whether cmd_vel is TwistStamped')
 

@@ -118,7 +118,7 @@ class MujocoRobotNode(SuiteNode):
             self._viewer = open_viewer(self._robot)  # type: ignore[arg-type]
 
     def activate(self) -> None:
-        """Begin with the first tick: at the gate, or as soon as there is somebody to tell."""
+        """Begin with the first tick: at the gate, when all nodes are connected, or at once."""
         self._timer: Any = None
         if self._options.gated:
             self._hold()
@@ -326,8 +326,8 @@ class MujocoRobotNode(SuiteNode):
             self._publish_state()
 
     def _wait_for_targets(self) -> bool:
-        """Whether to let wall time pass: a machine too slow for real time shall not make the
-        robot fall.
+        """Whether to let wall time pass, so that a machine too slow for real time does not make
+        the robot fall.
         """
         now = self._state.time_ns
         lag = round(self._options.longest_lag * 1e9)

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``posture_control``: what the body does, and while it stands the torques that balance it."""
+"""``posture_control``: mode of the body, and the torques that balance it while it stands."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Who touches the ground, and how hard."""
+"""Contact forces between the robot's parts and the ground."""
 
 from __future__ import annotations
 

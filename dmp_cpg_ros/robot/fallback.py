@@ -1,9 +1,9 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Fallback controller: what the joints do when their commands stop.
+"""Fallback controller: joint targets when the commands stop.
 
-A robot that stands takes up a stand. One that is upright but low (on its way up or down, or on its
-belly) lowers itself onto its belly. One that is tilted holds its joints by damping alone.
+A standing robot holds its stance. One that is upright but low (on its way up or down, or on its
+belly) is lowered onto its belly. The joints of a tilted one are damped.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Finds the legs of a quadruped in any MJCF, so that nobody writes its robot file by hand."""
+"""Finds the legs of a quadruped in any MJCF, for its robot file."""
 
 from __future__ import annotations
 

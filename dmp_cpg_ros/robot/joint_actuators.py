@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How torques get into MuJoCo: through motors where the model has them, else directly."""
+"""Joint torques in MuJoCo: through the model's motors, else as generalised forces."""
 
 from __future__ import annotations
 

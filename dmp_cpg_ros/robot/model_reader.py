@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the controllers must know of a robot, read from its compiled model."""
+"""Reads the description of a robot from its compiled model."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The port behind which every robot sits: simulated, imagined or real."""
+"""Interface of a robot to the suite: simulated, perfectly tracking, or real."""
 
 from __future__ import annotations
 

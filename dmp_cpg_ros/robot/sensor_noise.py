@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Noise and biases between what is and what the robot's sensors say."""
+"""Adds noise and biases to the simulated sensor readings."""
 
 from __future__ import annotations
 

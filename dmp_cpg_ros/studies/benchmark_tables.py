@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of the walking benchmark: which cases they take, and what they say of them."""
+"""The tables of the walking benchmark: their cases, and the rows made of the outcomes."""
 
 from __future__ import annotations
 

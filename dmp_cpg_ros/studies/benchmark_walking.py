@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Measures how the robot walks, from fixed seeds, and prints the tables of the README.
+"""Measures how the robot walks, from fixed seeds, and prints the tables of doc/results.md.
 
 speeds: steady velocities against the commanded ones. pushes: largest speed change survived, in
 eight directions at every phase. rough: share of seeds that cross 5 m of rough ground. contacts:

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A MuJoCo robot under the plain loop, ticked by the studies; copies go their own way."""
+"""A MuJoCo robot under the plain loop, ticked by the studies; it can be copied at any tick."""
 
 from __future__ import annotations
 

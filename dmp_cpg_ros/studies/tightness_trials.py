@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What really works, by simulation and bisection: the yardstick of the certificates."""
+"""Smallest values that work, by simulation and bisection; certificates are compared with them."""
 
 from __future__ import annotations
 

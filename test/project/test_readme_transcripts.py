@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The README's console blocks, run in their order: what they show is what happens."""
+"""The console blocks of the documents, run in their order: what they show is what happens."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from ros_processes import NodeProcess, Processes, Ros, reserved_domain
-from test_readme import as_shown, transcripts
+from test_readme import TRANSCRIPTS, as_shown, transcript
 
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
@@ -33,7 +33,7 @@ PATIENCE_S = 240.0
 
 
 class Reader:
-    """A reader of the README: waits until the robot has done one thing before the next."""
+    """A reader of a document: waits until the robot has done one thing before the next."""
 
     def __init__(self, domain: int, folder: Path) -> None:
         self.processes, self.ros, self.folder = Processes(domain), Ros(domain), folder
@@ -97,9 +97,10 @@ def reader(tmp_path: Path) -> Iterator[Reader]:
             started.end()
 
 
-def test_what_the_transcripts_show_is_what_happens(reader: Reader) -> None:
-    happened = [(command, shown, reader.type(command)) for command, shown in transcripts()]
+@pytest.mark.parametrize('document', TRANSCRIPTS, ids=lambda document: document.name)
+def test_what_the_transcripts_show_is_what_happens(reader: Reader, document: Path) -> None:
+    happened = [(command, shown, reader.type(command)) for command, shown in transcript(document)]
     assert any(shown for _, shown, _ in happened)
-    wrong = [f'$ {command}\n{printed}--- the README shows ---\n{shown}'
+    wrong = [f'$ {command}\n{printed}--- {document.name} shows ---\n{shown}'
              for command, shown, printed in happened if not as_shown(printed, shown)]
     assert not wrong, '\n'.join(wrong)

@@ -66,7 +66,7 @@ SIDEWAYS = 0.3
 """Speed sideways from which no sway is planned, in √(g l)."""
 
 STRAIGHT = LateralPlan(0.0, 0.0, 0.0)
-"""Of a gait that never stands on one side only."""
+"""Plan of a gait without single-side stance."""
 
 
 def lateral_plan(

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Footholds: where swinging feet come down, and how standing feet go along with a push.
+"""Footholds: placement of swinging feet, and compliance of standing feet with a push.
 
 A foot comes down at
 

@@ -49,11 +49,15 @@ class PostureParameters(Parameters):
         maximum=100.0,
     )
     friction: float = parameter(
-        0.45, 'friction coefficient that the forces respect', minimum=0.05, maximum=2.0
+        0.45,
+        'coefficient of the friction cones of the stance forces',
+        minimum=0.05,
+        maximum=2.0,
     )
     load_transfer: float = parameter(
         0.08,
-        'fraction of the cycle over which a foot takes and gives load',
+        'fraction of the cycle over which the load of a foot rises after touchdown and falls '
+        'before lift-off',
         minimum=0.001,
         maximum=0.3,
     )
@@ -65,28 +69,31 @@ class PostureParameters(Parameters):
     )
     slope_following: float = parameter(
         1.0,
-        "share of the ground's estimated slope by which the body leans with it; 0: it stays level",
+        "fraction of the ground's estimated slope that the body follows; 0: the body stays level",
         minimum=0.0,
         maximum=1.0,
     )
     slope_lean: float = parameter(
         1.0,
-        'share of the way downhill by which feet are placed so that the body is over them',
+        'fraction of the downhill foothold shift that puts the body over its feet',
         minimum=0.0,
         maximum=1.5,
     )
     reach: float = parameter(
-        0.95, 'share of the straight leg within which feet are placed', minimum=0.1, maximum=1.0
+        0.95,
+        'largest distance of a foothold from its hip, as a fraction of the straight leg',
+        minimum=0.1,
+        maximum=1.0,
     )
     yielding: float = parameter(
         0.5,
-        'share of the error of velocity with which the standing feet go along',
+        'fraction of the velocity error that is added to the velocity of the standing feet',
         minimum=0.0,
         maximum=1.0,
     )
     levelling: float = parameter(
         1.0,
-        'share of the tilt for which the height of swinging feet makes up',
+        'fraction of the tilt that the height of swinging feet compensates',
         minimum=0.0,
         maximum=1.0,
     )
@@ -107,11 +114,11 @@ class PostureParameters(Parameters):
         0.25, 'turn rate per error of heading, in sqrt(g/l)', minimum=0.0, maximum=20.0
     )
     heading_limit: float = parameter(
-        0.3, 'largest error of heading that is remembered', unit='rad', minimum=0.0, maximum=1.5
+        0.3, 'limit of the integrated heading error', unit='rad', minimum=0.0, maximum=1.5
     )
     activity_rate: float = parameter(
         12.0,
-        'rate at which planned swings fade when the phase stops',
+        'rate at which the planned body motion fades when the phase stops',
         unit='1/s',
         minimum=0.1,
         maximum=1e3,

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Coupling graphs: who is pulled by whom, how strongly, and at which phase offset.
+"""Coupling graphs: edges with their gains and phase offsets.
 
 An edge (i, j) means that oscillator i feels K_ij (R(φ_ij) x_j − x_i), with φ_ij the phase by which
 i leads j (paper, Section 5; Wang & Slotine 2005 for the block Laplacian).

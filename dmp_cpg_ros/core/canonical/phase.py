@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Phase of an oscillator state: the one place that knows the direction of rotation.
+"""Phase of an oscillator state: the only file with the direction of rotation.
 
 With the signs that the paper prints (eqs. hopf1, hopf2) the state turns clockwise. The phase is
 defined as φ = atan2(−x₂, x₁), so that it *grows* at the rate ω on the limit cycle; φ = 0 is the

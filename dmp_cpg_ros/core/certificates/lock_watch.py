@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Are the running oscillators as close to their places as theory says they must be.
+"""Monitor of the phase lock: phase errors of the running oscillators against their bound.
 
 In the places' own frames, z_i = R(−φ_i) x_i, the disagreement ε = (Σ ξ_i |z_i − z̄|²)^½ of a free
 network obeys ε̇ ≤ −λε + δr (Theorem 4 with the disturbance of Section 3.4): λ is the margin of the

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a contraction test found, and how much it is worth."""
+"""Result of a contraction test, with its grade."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the sensors tell of the body, and how the controllers take it."""
+"""Estimate of the body's state, and its form for the controllers."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What standing legs tell about the motion of the body: one velocity per foot.
+"""Leg odometry: one velocity of the body from each standing foot.
 
 The centre of a round foot of radius ρ that rolls on a plane of normal n moves at ω_shank × ρ n,
 and with the body's velocity v, its angular velocity ω and the shank's s relative to it,

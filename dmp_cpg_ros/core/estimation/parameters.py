@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters of the body's state: whose it is, and what its estimator believes of the sensors."""
+"""Parameters of the state estimate: its source, and the sensor noise that the filter assumes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class StateSourceParameters(Parameters):
 
     state_source: str = parameter(
         ESTIMATE,
-        "body state from the robot's sensors, or (for comparison) from the simulator",
+        "source of the body's state: the estimator, or (for comparison) the simulator",
         choices=(ESTIMATE, GROUND_TRUTH),
     )
 
@@ -27,8 +27,8 @@ class StateSourceParameters(Parameters):
 class EstimationParameters(Parameters):
     """Noise that the estimator expects, and when a foot counts as standing.
 
-    The noise of the IMU is larger than its data sheet says: between two readings the body shakes
-    more than a mean over the tick tells.
+    The noise of the IMU is larger than in its data sheet, because the body vibrates between two
+    readings, which the mean over a tick does not show.
     """
 
     gyro_noise: float = parameter(
@@ -57,34 +57,35 @@ class EstimationParameters(Parameters):
     )
     foot_noise: float = parameter(
         0.1,
-        'deviation of the velocity of a foot that stands',
+        'standard deviation of the velocity of a standing foot',
         unit='m/s',
         minimum=1e-4,
         maximum=10.0,
     )
     foot_freedom: float = parameter(
         4.0,
-        "degrees of freedom of Student's t for a foot's velocity: few forgive slips, many "
-        'trust every foot alike',
+        "degrees of freedom of Student's t distribution of a foot's velocity; fewer: slipping "
+        'feet count less',
         minimum=1.0,
         maximum=1e6,
     )
     contact_share: float = parameter(
         0.25,
-        'normal force from which a foot is trusted in full, as a share of the weight',
+        'normal force from which a foot has full weight in the estimate, as a fraction of the '
+        'body weight',
         minimum=1e-3,
         maximum=1.0,
     )
     contact_settling: float = parameter(
         0.06,
-        'time after touchdown in which the trust in a foot grows',
+        'time after touchdown over which the weight of a foot in the estimate rises',
         unit='s',
         minimum=1e-3,
         maximum=1.0,
     )
     terrain_time: float = parameter(
         0.3,
-        "time constant with which the ground's plane is followed",
+        "time constant of the filter on the ground's plane",
         unit='s',
         minimum=0.01,
         maximum=10.0,

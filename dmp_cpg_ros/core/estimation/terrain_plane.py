@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The plane on which the robot walks, from where its feet last stood.
+"""Ground plane through the newest footholds.
 
 A least-squares plane through the newest foothold of every leg, followed slowly (Gehring et al.,
 "Dynamic trotting on slopes for quadrupedal robots", IROS 2015). Footholds are kept in ``odom``:

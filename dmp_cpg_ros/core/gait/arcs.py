@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which way round each leg moves from its place in one gait to its place in another.
+"""Arcs of the phase offsets from one gait to another: direction and length for each leg.
 
 Leg i is at the position o_i = rest − lag_i of its cycle when oscillator fl has phase 0. From one
 gait to another it moves by the arc a_i ≡ o_i' − o_i (mod 1). Only differences matter: a common arc

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Automatic choice of the gait by speed, as animals do: walk slowly, trot faster.
+"""Automatic choice of the gait by speed.
 
 Animals change gait at similar dimensionless speeds û = u/√(g l) (Alexander & Jayes 1983: from
 walk to trot about û = 0.7, Froude number 0.5), and later when they speed up than when they slow

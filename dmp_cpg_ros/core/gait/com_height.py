@@ -1,13 +1,13 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How the body rises and falls in a gait that leaves the ground.
+"""Plan of the height of the centre of mass in a gait with flight phases.
 
-Where no foot stands, the body falls freely; so it must have been thrown up before. With flights of
-duration t_f and stances of duration t_s in turn, and a constant force in stance, momentum over a
-period demands z̈ = −g in flight and z̈ = g t_f / t_s in stance, hence a take-off at g t_f / 2.
-Feet leave and meet the ground at the height of the gait's path; the legs give way by g t_f t_s / 8
-in the middle of stance. A body that was planned to stay at its height would come down early, on
-feet that are still swinging forward, and stumble.
+Where no foot stands, the body falls freely, so it needs a vertical velocity at take-off. With
+flights of duration t_f and stances of duration t_s in turn, and a constant force in stance,
+momentum over a period demands z̈ = −g in flight and z̈ = g t_f / t_s in stance, hence a take-off
+at g t_f / 2. Feet leave and meet the ground at the height of the gait's path; the legs are
+compressed by g t_f t_s / 8 in the middle of stance. A body that was planned to stay at its height
+would come down early, on feet that are still swinging forward, and stumble.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Bounce(NamedTuple):
 
 
 LEVEL = Bounce(0.0, 0.0, 0.0)
-"""Of a gait that always has a foot on the ground."""
+"""Plan of a gait without flight phases."""
 
 
 def stance_groups(lag: NDArray[np.float64]) -> int:

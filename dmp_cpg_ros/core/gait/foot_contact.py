@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Does a foot stand? Its force with hysteresis, measured in even shares of the weight."""
+"""Stance detection of a foot: its normal force over a quarter of the weight, with hysteresis."""
 
 from __future__ import annotations
 

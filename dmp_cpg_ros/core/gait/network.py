@@ -50,7 +50,7 @@ class CanonicalParameters(Parameters):
     )
     coupling_graph: str = parameter(
         'all_to_all',
-        'who is coupled with whom',
+        'coupling graph of the legs',
         choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'),
     )
     cadence_scale: float = parameter(
@@ -68,13 +68,13 @@ class CanonicalParameters(Parameters):
     )
     contact_hold: float = parameter(
         0.5,
-        'largest share of the cadence by which late feet hold the phase back',
+        'largest decrease of the cadence by late feet, as a fraction of the cadence',
         minimum=0.0,
         maximum=0.9,
     )
     margin_share: float = parameter(
         0.5,
-        'share of the margin for unequal leg frequencies that contact feedback may use',
+        'fraction of the margin for unequal leg frequencies that contact feedback may use',
         minimum=0.0,
         maximum=0.95,
     )

@@ -12,7 +12,7 @@ new parameters at once: they enter ẋ and leave x as it is. The factor on the c
   the last one is taken.
 - While a stop is under way, a change in progress pauses and a new one waits: what was predicted
   and bounded for the stop holds for the blend as it stands.
-- At rest all feet are on the ground and no leg swings, so the gait that is wanted takes force at
+- At rest all feet are on the ground and no leg swings, so the requested gait takes effect at
   once: the oscillators are turned to their places in it and to its equilibrium, and the legs,
   whose swing height and speed are zero, stay where they are.
 """

@@ -1,15 +1,14 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""No gait is asked for more than its highest speed, nor for a curve that would throw it out.
+"""Limits of commands: the highest speed of the gait, and the curves that friction can hold.
 
 Commands are limited before they are filtered, by the gait that is wanted
 (:class:`~dmp_cpg_ros.core.reference.filter.CommandGate`), so that the reference comes to the
-highest
-speed as smoothly as to any other. While gaits change, the reference is not there yet, or the old
-gait cannot do what the new one can: whatever reads the reference by a gait, the oscillators'
-frequency, the legs' paths and the posture controller, takes it within the limit of the gait in
-force, which moves from one to the other with the blend. The robot slows down on the way into a
-slower gait and speeds up on the way into a faster one.
+highest speed as smoothly as to any other. While gaits change, the reference is not there yet, or
+the old gait cannot do what the new one can: whatever reads the reference by a gait, the
+oscillators' frequency, the legs' paths and the posture controller, takes it within the limit of
+the gait in force, which moves from one to the other with the blend. The robot slows down on the
+way into a slower gait and speeds up on the way into a faster one.
 
 A body at speed u that turns with γ is accelerated by u |γ| towards the centre of its curve. The
 feet push it there as far as friction bears that, and the less the more the legs are at their limit

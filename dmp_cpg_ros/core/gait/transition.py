@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From one gait to another while walking: the phase offsets move, the network stays certified.
+"""Change of gait while walking: the phase offsets move and the network stays certified.
 
 **The spectrum does not see the offsets.** With offsets φ_i the coupling is −Σ_j k (x_i −
 R(φ_i − φ_j) x_j). Let R = blockdiag(R(φ_1), …, R(φ_N)) and x = R y. Then Rᵀ L_φ R has the blocks

@@ -1,10 +1,10 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""When will it be at rest, when will it be walking: the model run ahead of the robot.
+"""Prediction of the times to rest and to walking, by simulating the model ahead.
 
 The canonical system and the reference form a closed hierarchy: nothing of the body enters them.
 From their present state the same code that drives the legs can therefore be run ahead, and its
-answer is kept to the tick.
+prediction is exact to the tick.
 """
 
 from __future__ import annotations

@@ -1,14 +1,13 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What makes legs vote: feet without footing or in a collision, tilt, and silent sensors.
+"""Conditions for votes of the legs: lost footing, collision, tilt, and sensor timeout.
 
 Feet: no load in stance, a load in swing. Planned and real touchdown differ by a few hundredths of
 a cycle on any ground, and by more on rough ground, so that only the central share of stance and
 swing is judged, and nothing until the gait has run for a while.
 
 Tilt: a complementary filter (Mahony, Hamel and Pflimlin 2008) on the upward direction, from the
-IMU alone. It is for whoever wants to notice a fall whatever else has failed; balance uses the
-body's estimate.
+IMU alone. It detects a fall independently of the state estimate, which balance uses.
 """
 
 from __future__ import annotations

@@ -31,12 +31,12 @@ class VotingParameters(VotingSwitch):
 
     vote_rule: str = parameter(
         SUM,
-        'whether every vote acts on its own oscillator, or the largest alone',
+        'whether every vote acts on its own oscillator, or only the largest vote acts',
         choices=(SUM, WINNER_TAKE_ALL),
     )
     vote_majority: int = parameter(
         3,
-        'number of legs whose votes stop the gait, while one leg less does not',
+        'number of voting legs that stops the gait; one leg fewer does not',
         minimum=1,
         maximum=4,
     )
@@ -49,7 +49,7 @@ class VotingParameters(VotingSwitch):
     )
     vote_fade: float = parameter(
         1.0,
-        'time in which a vote that is not renewed fades to nothing',
+        'time over which a vote that is not renewed fades to zero',
         unit='s',
         minimum=0.01,
         maximum=60.0,
@@ -76,7 +76,7 @@ class VoteSourceParameters(Parameters):
     )
     footing_share: float = parameter(
         0.5,
-        'share of a stance without footing after which the leg votes',
+        'fraction of a stance without footing after which the leg votes',
         minimum=0.0,
         maximum=1.0,
     )
@@ -98,13 +98,13 @@ class VoteSourceParameters(Parameters):
     )
     judged_share: float = parameter(
         0.7,
-        'central share of stance and swing in which contact is judged',
+        'central fraction of stance and swing in which contact is evaluated',
         minimum=0.0,
         maximum=1.0,
     )
     judged_after: float = parameter(
         1.0,
-        'time of walking after which contact is judged',
+        'time of walking after which contact is evaluated',
         unit='s',
         minimum=0.0,
         maximum=60.0,
@@ -114,7 +114,7 @@ class VoteSourceParameters(Parameters):
     )
     tilt_limit: float = parameter(
         0.6,
-        'angle between the vertical and the upright of the body beyond which all legs vote',
+        "angle between the vertical and the body's z axis beyond which all legs vote",
         unit='rad',
         minimum=0.01,
         maximum=3.1,
@@ -127,7 +127,7 @@ class VoteSourceParameters(Parameters):
     )
     silence_time: float = parameter(
         0.5,
-        'time without a good value after which a sensor counts as dead',
+        'time without a valid value after which a sensor counts as dead',
         unit='s',
         minimum=0.02,
         maximum=60.0,

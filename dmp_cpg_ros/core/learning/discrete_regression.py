@@ -66,7 +66,7 @@ class DiscreteTask:
         return self.demonstrations[i].duration / self.duration
 
     def bases(self, count: int) -> GaussianBases:
-        """So many bases over the movement."""
+        """Bases of the given number over the movement."""
         return GaussianBases.evenly_in_time(
             count, self.decay, self.duration, self.options.overlap_or(_OVERLAP)
         )

@@ -71,7 +71,7 @@ class RhythmicTask:
         return self.leads[i] + 2.0 * np.pi / self.periods[i] * (times - times[0])
 
     def bases(self, count: int) -> VonMisesBases:
-        """So many bases around the cycle."""
+        """Bases of the given number around the cycle."""
         return VonMisesBases.evenly_around(count, self.options.overlap_or(_OVERLAP))
 
 

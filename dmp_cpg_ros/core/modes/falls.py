@@ -129,18 +129,19 @@ class FallParameters(Parameters):
         maximum=0.95,
     )
     fall_delay: float = parameter(
-        0.1, 'time after which a tilted or low robot has fallen', unit='s', minimum=0.0,
+        0.1, 'time with a large tilt or a low body after which a robot has fallen', unit='s',
+        minimum=0.0,
         maximum=5.0,
     )
     fall_support: float = parameter(
         0.08,
-        'share of the weight on the legs below which a robot that should stand has lost the '
-        'ground; 0: never',
+        'load on the legs below which a robot that should stand has lost ground contact, as a '
+        'fraction of the weight; 0: never',
         minimum=0.0,
         maximum=0.9,
     )
     fall_support_delay: float = parameter(
-        0.6, 'time after which a robot without ground under its feet has fallen', unit='s',
+        0.6, 'time without ground contact after which a robot has fallen', unit='s',
         minimum=0.05, maximum=10.0,
     )
 

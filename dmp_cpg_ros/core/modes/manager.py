@@ -59,10 +59,10 @@ class ModeParameters(FallParameters):
     """How the robot begins, when it has fallen, how often it tries to get up."""
 
     start_mode: str = parameter(
-        'standing', 'what the robot does at the start', choices=('standing', 'lying', 'damped')
+        'standing', 'mode of the body at the start', choices=('standing', 'lying', 'damped')
     )
     recovery_tries: int = parameter(
-        5, 'how often it tries to roll onto its belly', minimum=1, maximum=100
+        5, 'number of attempts to roll onto the belly', minimum=1, maximum=100
     )
 
 

@@ -50,14 +50,14 @@ class ReferenceParameters(Parameters):
     )
     max_acceleration: float = parameter(
         4.0,
-        'largest acceleration of the reference, other than in braking to rest',
+        'largest acceleration of the reference, except when braking to rest',
         unit='m/s^2',
         minimum=0.1,
         maximum=1e3,
     )
     cmd_vel_timeout: float = parameter(
         0.5,
-        'silence of cmd_vel after which the command is zero; 0: never',
+        'time without cmd_vel after which the command is zero; 0: never',
         unit='s',
         minimum=0.0,
         maximum=3600.0,

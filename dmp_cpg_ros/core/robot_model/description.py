@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the controllers must know of a robot; read from its model, never typed in."""
+"""Geometry, mass and limits of a robot for the controllers, read from its model."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class LegGeometry:
         Reflected rotor inertia at the joint [kg m^2] (the paper's J).
     foot_radius : float
         Distance from the centre of the contact sphere to where it touches the ground while the
-        robot stands: its radius, less what soft feet give way [m].
+        robot stands: its radius, less the compression of soft feet [m].
     """
 
     name: str

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the sensors of one tick say, and what of it can be used."""
+"""Sensor readings of one tick, and which of them are valid."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How good the simulated robot's sensors are.
+"""Noise and biases of the simulated sensors.
 
-The defaults are those of the inertial sensor that Mini Cheetah carries (VectorNav VN-100, data
+The defaults are those of the inertial sensor of Mini Cheetah (VectorNav VN-100, data
 sheet: 0.0035 °/s/√Hz and 0.14 mg/√Hz) with biases as they remain after calibration at the
 factory, and of 14-bit encoders behind a gear of 1:6 whose velocity is filtered.
 """
@@ -20,7 +20,7 @@ class SensorParameters(Parameters):
 
     sensor_noise: float = parameter(
         1.0,
-        'factor of all noise and biases of the simulated sensors; 0: sensors are perfect',
+        'factor on all noise and biases of the simulated sensors; 0: perfect sensors',
         minimum=0.0,
         maximum=100.0,
     )
@@ -29,7 +29,7 @@ class SensorParameters(Parameters):
     )
     gyro_bias: float = parameter(
         1e-3,
-        "deviation of the gyroscope's constant bias",
+        "standard deviation of the gyroscope's constant bias",
         unit='rad/s',
         minimum=0.0,
         maximum=1.0,
@@ -43,14 +43,18 @@ class SensorParameters(Parameters):
     )
     accelerometer_bias: float = parameter(
         0.02,
-        "deviation of the accelerometer's constant bias",
+        "standard deviation of the accelerometer's constant bias",
         unit='m/s^2',
         minimum=0.0,
         maximum=10.0,
     )
     encoder_noise: float = parameter(
-        1e-4, 'deviation of a measured joint angle', unit='rad', minimum=0.0, maximum=0.1
+        1e-4, 'standard deviation of a measured joint angle', unit='rad', minimum=0.0, maximum=0.1
     )
     joint_velocity_noise: float = parameter(
-        0.02, 'deviation of a measured joint velocity', unit='rad/s', minimum=0.0, maximum=10.0
+        0.02,
+        'standard deviation of a measured joint velocity',
+        unit='rad/s',
+        minimum=0.0,
+        maximum=10.0,
     )

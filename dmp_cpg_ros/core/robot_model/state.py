@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the robot tells and what it is told, as plain arrays."""
+"""State and joint targets of the robot, as plain arrays."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""How a world is chosen: by parameters of the robot, or by the entry ``world`` of a scenario."""
+"""Choice of the world: by parameters of the robot, or by the entry ``world`` of a scenario."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PREFIX = 'world_'
 class WorldParameters(Parameters):
     """Which world the robot walks in; each kind uses those of its own."""
 
-    world: str = parameter('flat', 'what the robot walks on', choices=tuple(WORLDS))
+    world: str = parameter('flat', 'kind of ground', choices=tuple(WORLDS))
     world_degrees: float = parameter(
         10.0, 'slope: its angle; negative: downhill', unit='deg', minimum=-40.0, maximum=40.0
     )

@@ -71,19 +71,19 @@ class LegParameters(Parameters):
         40.0, 'rate at which a swinging foot follows its placement shift', unit='1/s', minimum=0.1,
         maximum=1e3)
     yielding_rate: float = parameter(
-        20.0, 'rate at which the target of a standing foot goes to where the foot is',
+        20.0, 'rate at which the target of a standing foot approaches the measured foot position',
         unit='1/s', minimum=0.0, maximum=1e3)
     levelling_rate: float = parameter(
-        10.0, 'rate at which a standing foot gives up the height that made up for the tilt',
+        10.0, 'rate at which a standing foot returns the height that compensated the tilt',
         unit='1/s', minimum=0.1, maximum=1e3)
     stumble_lift: float = parameter(
         0.13,
-        'additional height of a swinging foot that something holds up, as a fraction of the '
+        'additional height of a swinging foot that meets an obstacle, as a fraction of the '
         'standing height; 0: no reflex', minimum=0.0, maximum=0.4)
     stumble_lag: float = parameter(
         0.035,
-        'distance from its target at which a swinging foot that stands still has met '
-        'something, as a fraction of the standing height', minimum=0.005, maximum=1.0)
+        'distance from its target at which a swinging foot at rest has met an obstacle, as a '
+        'fraction of the standing height', minimum=0.005, maximum=1.0)
 
 
 @dataclass(frozen=True)

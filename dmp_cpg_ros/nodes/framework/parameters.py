@@ -42,7 +42,8 @@ class NodeParameters(Parameters):
 
     autostart: bool = parameter(
         True, 'whether the node configures and activates itself when it starts')
-    executor: str = parameter('events', "rclpy's executor; events needs a quarter of single's CPU",
+    executor: str = parameter('events',
+        "rclpy's executor; events needs a quarter of the CPU time of single",
                               choices=('events', 'single'))
     scheduling: str = parameter(
         BATCH, 'policy of the Linux scheduler; batch keeps a reader from interrupting its writer',

@@ -1,9 +1,9 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Matching of messages by stamp: what belongs to one tick, however the messages arrive.
+"""Matching of messages by stamp into the inputs of one tick, in any order of arrival.
 
-The class knows no ROS, so that its rules can be tested by themselves; :func:`drain` takes any
-rclpy subscription.
+The class does not depend on ROS, so that its rules can be tested by themselves; :func:`drain`
+takes any rclpy subscription.
 """
 
 from __future__ import annotations
@@ -207,7 +207,7 @@ def drain(subscription: Any) -> int:
 
     A node calls this for its command topics at the start of its tick, so that commands which
     arrived before the tick act in it whatever the executor's order. The executor later finds the
-    queue empty, which it takes in its stride.
+    queue empty and goes on.
 
     Parameters
     ----------

@@ -193,7 +193,7 @@ RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 SERVICES: tuple[Interface, ...] = (
     Interface('inhibit', SetBool, 'true stops the gait, false resumes it',
               (INHIBITION,), ('user',), service=True),
-    Interface('stand_up', Trigger, 'stand up from wherever it lies or sinks',
+    Interface('stand_up', Trigger, 'stand up from lying or lowering',
               (POSTURE,), ('user',), service=True),
     Interface('lie_down', Trigger, 'stop the gait and lie down on the belly',
               (POSTURE,), ('user',), service=True),

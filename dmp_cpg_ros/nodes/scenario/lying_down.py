@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Lays a live robot down at the end of a run: a robot that nobody controls shall not drop."""
+"""Lays the robot down at the end of a real-time run, so that it does not drop."""
 
 from __future__ import annotations
 
