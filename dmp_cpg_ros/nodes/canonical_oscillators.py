@@ -25,6 +25,7 @@ from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
@@ -190,7 +191,7 @@ def inhibition_from(message: InhibitionMessage) -> Inhibition:
     parameters allow.
     """
     largest_gain = range_of(InhibitionParameters, 'inhibition_gain')[1]
-    largest_gain *= range_of(InhibitionParameters, 'vote_limit')[1]
+    largest_gain *= range_of(VotingParameters, 'vote_limit')[1]
     gains = np.array([message.number(f'gain_{leg}', 0.0, largest_gain) for leg in LEGS])
     return Inhibition(
         message.flag('requested'),
