@@ -147,7 +147,8 @@ def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
     need(all(len(row) == N and min(row) >= 0 == row[i] for i, row in enumerate(p['coupling']))
          and len(p['coupling']) == N and not any(map(sum, zip(*L, strict=True))), 'coupling')
     found['premises'] = F(0), sum(numbers.values()) + sum(gains) + sum(map(sum, p['coupling']))
-    b, T, D = w['connectivity'], w['T'], w['D']
+    b, D = w['connectivity'], w['D']
+    T = [[*row, F(1)] + [F(0)] * (N - 1 - i) for i, row in enumerate(w['T'])]
     S = [[(L[i][j] + L[j][i]) / 2 + 2 * b / N - b * (i == j) for j in range(N)] for i in range(N)]
     need(min(D) >= 0 and S == [times(T, [x * d for x, d in zip(row, D, strict=True)])
                                for row in T], 'factors of another matrix')
@@ -198,10 +199,9 @@ def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
 
 def check(proof: Any) -> dict[str, tuple[F, F]]:
     """Return both sides of every inequality; raise an error unless the proof is one."""
-    need(proof['format'] == 'dmp_cpg_ros proof 1', 'format')
-    found = rows(read(proof['parameters']), read(proof['witnesses']))
-    need(read(proof['rows']) == {name: list(sides) for name, sides in found.items()}
-         and all(left < right for left, right in found.values()), 'rows')
+    found = rows(*(read(proof[name]) for name in ('parameters', 'witnesses')))
+    need(read(proof['rows']) == {name: list(sides) for name, sides in found.items()} and all(
+        left < right for left, right in found.values()), 'rows')
     return found
 
 

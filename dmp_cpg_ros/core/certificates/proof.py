@@ -152,7 +152,7 @@ def _factors(p: Values, b: Fraction) -> tuple[list[list[Fraction]], list[Fractio
         for i in range(k + 1, N):
             T[i][k] = S[i][k] / S[k][k]
             S[i] = [x - T[i][k] * y for x, y in zip(S[i], S[k], strict=True)]
-    return T, D
+    return [row[:i] for i, row in enumerate(T)], D
 
 
 def _box(p: Values, analysis: NetworkAnalysis) -> list[Fraction]:
