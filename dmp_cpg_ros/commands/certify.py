@@ -10,12 +10,14 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.certificates.proof import proof_of
 from dmp_cpg_ros.core.certificates.suggest import Suggestion, suggest_gains
 from dmp_cpg_ros.core.certificates.votes import VotesNeeded, votes_needed
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
@@ -74,6 +76,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             overrides['robot'] = str(find_config(options.robot).resolve())
         suite = load_suite(options.file or ros.parameters_file, overrides, ros.namespace)
         certified = certify_suite(suite, options.suggest)
+        if options.proof is not None and certified.certificate.holds:
+            options.proof.write_text(json.dumps(_proof(suite), indent=1) + '\n', encoding='utf-8')
+    except OSError as error:
+        print(f'certify: {options.proof}: {error.strerror}', file=sys.stderr)
+        return BAD_INPUT
     except DmpCpgError as error:
         print(f'certify: {error}', file=sys.stderr)
         return BAD_INPUT
@@ -84,6 +91,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for entry in certified.certificate.failing:
         print(f'certify: fails: {entry.explained()}', file=sys.stderr)
     return HOLDS if certified.certificate.holds else FAILS
+
+
+def _proof(suite: Suite) -> dict[str, Any]:
+    """Exact witnesses; raises DmpCpgError where there are none."""
+    from dmp_cpg_ros.robot.model_reader import load_description
+
+    p = suite.parameters
+    if p.voting.voting or p.canonical.contact_feedback:
+        raise ParameterError('voting and contact_feedback have no exact proof; --proof needs both '
+                             'to be off')
+    network = GaitNetwork(p.canonical, suite.gait, body_scale(load_description(suite.robot_file)))
+    return proof_of(network, p.inhibition, p.reference, p.leg, p.posture, suite.tick_ns * 1e-9)
 
 
 def certify_suite(suite: Suite, suggest: bool = False) -> Certified:
@@ -211,6 +230,8 @@ def _parser() -> argparse.ArgumentParser:
     add('--gait', metavar='NAME', help='gait instead of the one that the file names')
     add('--robot', metavar='FILE', help='robot file instead of the one that the file names')
     add('--json', action='store_true', help='print JSON instead of a table')
+    add('--proof', metavar='FILE', type=Path,
+        help='write witnesses that check_proof.py checks exactly, when it holds')
     add('--suggest', action='store_true', help='propose coupling and inhibition gains that hold')
     return parser
 

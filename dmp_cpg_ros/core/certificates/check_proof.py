@@ -1,0 +1,213 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Check what ``certify --proof FILE`` wrote, in exact arithmetic; ``python3 check_proof.py FILE``
+needs nothing of the package. doc/certificate.md has the format and the reasons.
+"""
+
+import json
+import sys
+from fractions import Fraction as F  # noqa: N817 - the file is read more than any other
+from typing import Any
+
+GRID, CELL, FEW = F(1, 2**40), F(1, 100), F(0.02)
+
+
+def need(holds: bool, what: str) -> None:
+    """Refuse what does not hold."""
+    if not holds:
+        raise ValueError(what)
+
+
+def read(value: Any) -> Any:
+    """Fractions of strings, which must be in lowest terms."""
+    if isinstance(value, (list, dict)):
+        return ([read(one) for one in value] if isinstance(value, list) else
+                {key: read(one) for key, one in value.items()})
+    need(isinstance(value, str) and str(F(value)) == value, f'{value!r} is no fraction')
+    return F(value)
+
+
+def least(x: F, holds: Any) -> F:
+    """Return x if it is the smallest number of the grid for which something holds."""
+    need((x / GRID).denominator == 1 and holds(x) and not holds(x - GRID), 'not the least')
+    return x
+
+
+def root(x: F, square: F) -> F:
+    """Return x if it is the root of a square, rounded upwards to the grid."""
+    return least(x, lambda y: y >= 0 and y * y >= square)
+
+
+def exp_below(x: F) -> F:
+    """Lower bound of the exponential of x >= 0."""
+    return (1 + x / 64 + x * x / 8192)**64
+
+
+def times(M: Any, v: Any) -> list[F]:
+    """M v."""
+    return [sum(a * b for a, b in zip(row, v, strict=True)) for row in M]
+
+
+def field(p: Any, omega: F, z: Any) -> tuple[F, F]:
+    """dz/dt of an oscillator alone."""
+    grow = p['rho'] * (p['radius']**2 - z[0]**2 - z[1]**2)
+    return grow * z[0] + omega * z[1], grow * z[1] - omega * z[0]
+
+
+def laplacian(p: Any, held: int) -> list[list[F]]:
+    """L, or L + diag(gains) where the nodes are held."""
+    return [[sum(row) + held * a if i == j else -k for j, k in enumerate(row)]
+            for i, (row, a) in enumerate(zip(p['coupling'], p['gains'], strict=True))]
+
+
+def pull(p: Any, u: Any) -> list[F]:
+    """What drives u_i outwards on the face u_i of the box, without inhibition."""
+    r, faces = p['radius'], [(d, max(-3 * d / 4, -p['radius'])) for d in u]
+    return [p['omega_max'] * r + max(F(0), p['rho'] * (-d * d - 2 * d * c) * (c + d)) - out
+            for (d, c), out in zip(faces, times(laplacian(p, 0), u), strict=True)]
+
+
+def turned(t: F) -> tuple[F, F]:
+    """Cosine and sine of the angle of which t is the tangent of the half."""
+    return (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
+
+
+def plane_rates(p: Any, u: Any, t: F, h: Any) -> list[F]:
+    """What drives states on the edge of the half-plane n.y >= h into it, n = (c, -s)."""
+    r, (c, s) = p['radius'], turned(t)
+    return [x - p['omega_max'] * min(max(d - r * s, F(0)), r)
+            for x, d in zip(times(laplacian(p, 1), [r * c - x for x in h]), u, strict=True)]
+
+
+def entry_height(p: Any, t: F, sine: F) -> F:
+    """Lowest n.y where |y| >= 0.98 r in C."""
+    r, r0, (c, s), short = p['radius'], p['region_radius'], turned(t), (1 - FEW) * p['radius']
+    cosine = (short**2 + r**2 - r0**2) / (2 * short * r)
+    corner = short * (cosine * c - root(sine, 1 - cosine**2) * s)
+    reached = r**2 + r0**2 - 2 * r * r0 * c >= short**2 or not 0 <= cosine <= 1
+    return r * c - r0 if reached else max(r * c - r0, corner)
+
+
+def shrinks(p: Any, v: Any, inner: Any, rate: F) -> list[F]:
+    """(M - diag(rho (r^2 - inner^2)) - rate) v."""
+    return [x - (p['rho'] * (p['radius']**2 - a * a) + rate) * y
+            for x, a, y in zip(times(laplacian(p, 1), v), inner, v, strict=True)]
+
+
+def speeds(p: Any, omega: F, y: Any) -> list[F]:
+    """|dy_i/dt|^2."""
+    flows = [times(laplacian(p, 1), axis) for axis in zip(*y, strict=True)]
+    return [(f - a + g * p['radius'])**2 + (e - b)**2 for (f, e), a, b, g in zip(
+        (field(p, omega, z) for z in y), *flows, p['gains'], strict=True)]
+
+
+def leads_outwards(p: Any, size: F) -> bool:
+    """Whether Kutta's step does from a circle."""
+    h, z, a = p['tick'], (size, F(0)), field(p, p['omega_max'], (size, F(0)))
+    b = field(p, p['omega_max'], [x + h / 2 * k for x, k in zip(z, a, strict=True)])
+    c = field(p, p['omega_max'], [x - h * k + 2 * h * m for x, k, m in zip(z, a, b, strict=True)])
+    return sum((x + h * (k + 4 * m + n) / 6)**2 for x, k, m, n in zip(
+        z, a, b, c, strict=True)) > size**2
+
+
+def time_to_rest(p: Any, w: Any, inner: Any, size: F, arc: F) -> F:
+    """Bound on the time from a request to rest [s]."""
+    u, v, rate, r, slow = w['u'], w['v'], w['rate'], p['radius'], p['omega_armed_min']
+    fastest = p['omega_armed_max'] * r + F('0.385') * p['rho'] * r**3 + 2 * max(u) * max(
+        row[i] for i, row in enumerate(laplacian(p, 1)))
+    a, e = fastest / min(v), 2 * max(u) / min(v)
+    start, activity = w['arming_time'] + (F(710, 113) - arc) / slow, F(1)     # 355/113 > pi
+    speed = p['armed_speed'] / exp_below(p['alpha_r'] * (F(710, 113) - arc) / slow)
+    drive = p['omega_slope'] * r / (rate * min(v))
+    keep, fade, swing = (1 / exp_below(x * CELL) for x in (rate, p['alpha_r'], p['activity_rate']))
+    for k in range(1000):
+        lows = [max(x, size - e * y) for x, y in zip(inner, v, strict=True)]
+        a, e = max(a, drive * p['alpha_r'] * speed), max(e, drive * speed)
+        phase = max(a * y / x for x, y in zip(lows, v, strict=True)) if min(lows) > 0 else slow + 1
+        if phase <= F('0.05') and speed <= F('0.01') and activity <= FEW:
+            return start + k * CELL + 6 * p['tick']
+        wanted = min(F(1), phase / slow)
+        activity, a, e, speed = (-F(-x * 2**80 // 1, 2**80) for x in (     # rounded upwards
+            wanted + max(F(0), activity - wanted) * swing,
+            drive * p['alpha_r'] * speed * (1 - keep) + a * keep,
+            drive * speed * (1 - keep) + e * keep, speed * fade))
+    raise ValueError('no time to rest')
+
+
+def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
+    """Both sides of every inequality."""
+    r, r0, omega, tick = (p[x] for x in ('radius', 'region_radius', 'omega_max', 'tick'))
+    u, v, planes = w['u'], w['v'], w['half_planes']
+    L, gains, growth, N = laplacian(p, 0), p['gains'], p['rho'] * r * r, len(p['gains'])
+    legs, found = [i for i, gain in enumerate(gains) if gain > 0], {}  # type: Any, Any
+    numbers = {name: x for name, x in p.items() if name not in ('coupling', 'gains')}
+    need(min(gains) >= 0 and max(p['omega_at_rest'], p['omega_armed_max']) <= omega and all(
+        x > 0 or x == 0 and name in ('omega_slope', 'clearance', 'foot_speed', 'armed_speed')
+        for name, x in numbers.items()), 'parameters')
+    need(all(len(row) == N and min(row) >= 0 == row[i] for i, row in enumerate(p['coupling']))
+         and len(p['coupling']) == N and not any(map(sum, zip(*L, strict=True))), 'coupling')
+    found['premises'] = F(0), sum(numbers.values()) + sum(gains) + sum(map(sum, p['coupling']))
+    b, D = w['connectivity'], w['D']
+    T = [[*row, F(1)] + [F(0)] * (N - 1 - i) for i, row in enumerate(w['T'])]
+    S = [[(L[i][j] + L[j][i]) / 2 + 2 * b / N - b * (i == j) for j in range(N)] for i in range(N)]
+    need(min(D) >= 0 and S == [times(T, [x * d for x, d in zip(row, D, strict=True)])
+                               for row in T], 'factors of another matrix')
+    found['synchronisation'] = growth, b
+    places = r * min(FEW, p['omega_at_rest'] / max(L[i][i] for i in range(N)))
+    need(pull(p, u) == w['pull'] and all(
+        d == r0 if i in legs else d == 2 * r or x <= 0 <= d - r0 - places
+        for i, (d, x) in enumerate(zip(u, w['pull'], strict=True))), 'box')
+    found['capture'] = max(w['pull'][i] / (r0 * gains[i]) for i in legs), F(1)
+    for plane in planes:
+        t, h = plane['tangent'], plane['height']
+        need(plane_rates(p, u, t, h) == plane['rates'] and min(plane['rates']) >= 0 <= min(h)
+             and 0 <= t < 1 and max(h) <= entry_height(p, t, plane['sine']) - places, 'half-plane')
+    inner = [max(F(0), r - d, *(plane['height'][i] for plane in planes)) * bool(planes)
+             for i, d in enumerate(u)]
+    need(shrinks(p, v, inner, w['rate']) == w['shrinks'] and min(v) > 0 <= min(w['shrinks']),
+         'contraction')
+    found['contraction'], rest = (F(0), w['rate']), []
+    for name, at in (('fast', omega), ('rest', p['omega_at_rest'])):
+        y, flow = w[f'y_{name}'], w[f'flow_{name}']
+        squares = [((z[0] - r)**2 + z[1]**2, z[0]**2 + z[1]**2) for z in y]
+        need(flow == speeds(p, at, y) and all(
+            far <= d * d and size <= r * r for (far, size), d in zip(squares, u, strict=True))
+             and all(c * z[0] - s * z[1] >= x for plane in planes for c, s in [turned(
+                 plane['tangent'])] for z, x in zip(y, plane['height'], strict=True)), 'outside')
+        most = max(f / q**2 for f, q in zip(flow, v, strict=True)) / w['rate']**2
+        rest.append((max(squares[i][0] for i in legs), min(size for _, size in squares),
+                     root(w[f'error_{name}'], most) * max(v)))
+    found['rest_in_region'] = root(w['rest_distance'], rest[0][0]) + rest[0][2], r0
+    size = -least(-w['rest_size'], lambda x: x >= 0 or x * x <= rest[1][1]) - rest[1][2]
+    found['rest_radius'], mild = (r / 2, size), root(w['mild_root'], omega**2 + growth**2) + growth
+    slowest, d, k = min(b - growth, w['rate'], 2 * growth), p['damping'], p['stiffness']
+    rates = p['alpha_r'], p['slowest_filter'], slowest, d * k / (k + d * d) / 3
+    found['time_step'] = max(tick * mild / F('1.4'), tick**3 * mild**4 / 40 / slowest), F(1)
+    found['cycle_radius'] = least(w['cycle_error'], lambda x: leads_outwards(
+        p, r - r * x) and not leads_outwards(p, r + r * x)), min(FEW, (r0 / r)**2)
+    q = min(F(1), r0 / (2 * r))
+    arc = 4 * (q + q**3 / 6 + 3 * q**5 / 40 + 5 * q**7 / 112)              # below 4 asin q
+    found['region_per_tick'] = omega * tick, arc
+    found['reference'], found['transformation'] = (F(0), rates[0]), (F(0), rates[3])
+    found['hierarchy'] = F(0), 1 / sum(1 / x for x in rates)
+    found['rest_posture'] = p['clearance'] * FEW, F(1, 100)
+    least(w['arming_time'], lambda x: x >= 0 and exp_below(
+        p['alpha_r'] * x) * p['armed_speed'] >= p['foot_speed'])
+    found['time_to_rest'] = time_to_rest(p, w, inner, size, arc), F(10)
+    return found
+
+
+def check(proof: Any) -> dict[str, tuple[F, F]]:
+    """Return both sides of every inequality; raise an error unless the proof is one."""
+    found = rows(*(read(proof[name]) for name in ('parameters', 'witnesses')))
+    need(read(proof['rows']) == {name: list(sides) for name, sides in found.items()} and all(
+        left < right for left, right in found.values()), 'rows')
+    return found
+
+
+if __name__ == '__main__':
+    try:
+        with open(sys.argv[1], encoding='utf-8') as file:
+            print('accepted:', *check(json.load(file)))
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        sys.exit(f'refused: {error!r}')

@@ -1,0 +1,248 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Exact witnesses of a certificate, which anyone can check without this package.
+
+The witnesses are found in double precision, rounded to the safe side on a binary grid, and
+completed in rational arithmetic with the formulas of
+:mod:`~dmp_cpg_ros.core.certificates.check_proof`. doc/certificate.md describes the format.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates import check_proof as exact
+from dmp_cpg_ros.core.certificates.network import NetworkAnalysis, analyse_network
+from dmp_cpg_ros.core.certificates.step import cycle_radius_error
+from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
+from dmp_cpg_ros.core.contraction.inhibited import GLOBAL
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
+from dmp_cpg_ros.core.transformation.leg import LegParameters
+
+Array = NDArray[np.float64]
+Values = dict[str, Any]
+
+_ROUNDING = 1e-9  # share that is given away, so that rounding does not decide
+
+
+def proof_of(network: GaitNetwork, inhibition: InhibitionParameters,
+             reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
+             tick_s: float) -> Values:
+    """Prove the required inequalities of a gait without voting and contact feedback.
+
+    Parameters
+    ----------
+    network, inhibition, reference, leg, posture, tick_s
+        As of :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
+
+    Returns
+    -------
+    dict
+        What strict JSON can write, for
+        :func:`~dmp_cpg_ros.core.certificates.check_proof.check`.
+
+    Raises
+    ------
+    ParameterError
+        If an inequality fails, or holds too narrowly for these witnesses.
+    """
+    span = operating_range(network, inhibition, reference)
+    analysis = analyse_network(network, inhibition, span)
+    p = _parameters(network, inhibition, reference, leg, posture, tick_s, span, analysis)
+    reason = 'it does not contract'
+    for regional in (False, True):
+        if not regional and analysis.contraction.reach != GLOBAL:
+            continue
+        try:
+            w = _witnesses(p, analysis, regional)
+            proof = {'format': 'dmp_cpg_ros proof 1', 'parameters': _written(p),
+                     'witnesses': _written(w), 'rows': _written(exact.rows(p, w))}
+            exact.check(proof)
+            return proof
+        except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+            reason = str(error)
+    raise ParameterError(f'no exact proof is found: {reason}')
+
+
+def _parameters(network: GaitNetwork, inhibition: InhibitionParameters,
+                reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
+                tick_s: float, span: OperatingRange, analysis: NetworkAnalysis) -> Values:
+    """Numbers that the suite runs with, as the fractions that they are."""
+    graph = network.system.graph
+    coupling = np.zeros((graph.size, graph.size))
+    for (i, j), gain in zip(graph.edges, graph.gains, strict=True):
+        coupling[i, j] = gain[0, 0]
+    values = {
+        'rho': network.parameters.rho, 'radius': network.parameters.radius,
+        'region_radius': inhibition.region_radius, 'tick': tick_s,
+        'omega_max': span.omega[1], 'omega_at_rest': span.omega_at_rest,
+        'omega_armed_min': span.omega_armed[0], 'omega_armed_max': span.omega_armed[1],
+        'omega_slope': span.omega_slope, 'foot_speed': span.foot_speed,
+        'armed_speed': span.armed_speed, 'alpha_r': reference.alpha_r,
+        'activity_rate': leg.activity_rate, 'stiffness': leg.stiffness, 'damping': leg.damping,
+        'slowest_filter': min(leg.activity_rate, leg.placement_rate, posture.activity_rate),
+        'clearance': leg.clearance}
+    return {**{name: Fraction(value) for name, value in values.items()},
+            'coupling': [[Fraction(k) for k in row] for row in coupling.tolist()],
+            'gains': [Fraction(gain) for gain in analysis.capture.gains.tolist()]}
+
+
+def _witnesses(p: Values, analysis: NetworkAnalysis, regional: bool) -> Values:
+    """Everything that is not a parameter."""
+    rest, fast, found = analysis.rest, analysis.rest_at_speed, analysis.found
+    if rest is None or fast is None or not analysis.capture.holds:
+        raise ValueError('there is no equilibrium, or C is left')
+    b = _down(found.connectivity * (1.0 - _ROUNDING))
+    T, D = _factors(p, b)
+    u = _box(p, analysis)
+    planes = _half_planes(p, u) if regional else []
+    rows = [plane['height'] for plane in planes]
+    inner = [max(Fraction(0), *(h[i] for h in rows), p['radius'] - d) if rows else Fraction(0)
+             for i, d in enumerate(u)]
+    v, rate, left = _shrinking(p, inner)
+    w: Values = {
+        'connectivity': b, 'T': T, 'D': D, 'u': u, 'pull': exact.pull(p, u),
+        'half_planes': planes, 'v': v, 'rate': rate, 'shrinks': left}
+    r = p['radius']
+    for name, at, equilibrium in (('fast', 'omega_max', fast), ('rest', 'omega_at_rest', rest)):
+        y = w[f'y_{name}'] = _places(equilibrium)
+        flow = w[f'flow_{name}'] = exact.speeds(p, p[at], y)
+        w[f'error_{name}'] = _root(
+            max(f / q**2 for f, q in zip(flow, v, strict=True)) / rate**2)
+    far = max((z[0] - r)**2 + z[1]**2 for z, gain in zip(w['y_fast'], p['gains'], strict=True)
+              if gain > 0)
+    size = min(z[0]**2 + z[1]**2 for z in w['y_rest'])
+    rho, radius, fastest, tick = (float(p[name]) for name in (
+        'rho', 'radius', 'omega_max', 'tick'))
+    ratio = p['foot_speed'] / p['armed_speed'] if p['foot_speed'] else Fraction(1)
+    w['rest_distance'] = _root(far)
+    w['rest_size'] = -_least(-math.sqrt(size), lambda x: x >= 0 or x * x <= size)
+    w['mild_root'] = _root(p['omega_max']**2 + (p['rho'] * r * r)**2)
+    w['cycle_error'] = _least(
+        cycle_radius_error(rho, radius, fastest, tick), lambda x: exact.leads_outwards(
+            p, r * (1 - x)) and not exact.leads_outwards(p, r * (1 + x)))
+    # Where the lower bound (1 + x/64 + x²/8192)^64 of the exponential reaches the ratio.
+    logarithm = 64.0 * (math.sqrt(2.0 * float(ratio)**(1.0 / 64.0) - 1.0) - 1.0)
+    w['arming_time'] = _least(
+        logarithm / float(p['alpha_r']), lambda x: x >= 0 and exact.exp_below(
+            p['alpha_r'] * x) * p['armed_speed'] >= p['foot_speed'])
+    return w
+
+
+def _factors(p: Values, b: Fraction) -> tuple[list[list[Fraction]], list[Fraction]]:
+    """S = T diag(D) Tᵀ of S = L_s + (2b/N) 1 1ᵀ − b I, by elimination."""
+    L = exact.laplacian(p, 0)
+    N = len(L)
+    S = [[(L[i][j] + L[j][i]) / 2 + 2 * b / N - b * (i == j) for j in range(N)]
+         for i in range(N)]
+    T, D = [[Fraction(i == j) for j in range(N)] for i in range(N)], []
+    for k in range(N):
+        D.append(S[k][k])
+        for i in range(k + 1, N):
+            T[i][k] = S[i][k] / S[k][k]
+            S[i] = [x - T[i][k] * y for x, y in zip(S[i], S[k], strict=True)]
+    return [row[:i] for i, row in enumerate(T)], D
+
+
+def _box(p: Values, analysis: NetworkAnalysis) -> list[Fraction]:
+    """The box of the capture set, a little larger where that makes it solve its inequality."""
+    u, L, edge = analysis.capture.distance, _float(exact.laplacian(p, 0)), 2 * p['radius']
+    legs = np.array([gain > 0 for gain in p['gains']])
+    free = ~legs & (u < float(edge))
+    larger = np.zeros(len(u))
+    if free.any():
+        larger[free] = np.linalg.solve(L[np.ix_(free, free)], np.ones(int(free.sum())))
+    for room in 10.0 ** np.arange(-10.0, -4.0):
+        box = [p['region_radius'] if leg else min(edge, _down(d) + exact.GRID) for leg, d in zip(
+            legs, (u + room * larger * float(p['omega_max'] * p['radius'])).tolist(), strict=True)]
+        if all(x <= 0 or leg or d == edge for x, d, leg in zip(
+                exact.pull(p, box), box, legs, strict=True)):
+            break
+    return box
+
+
+def _half_planes(p: Values, u: list[Fraction]) -> list[Values]:
+    """Half-planes of which each holds one leg farther from the origin than all others do."""
+    r, M = float(p['radius']), _float(exact.laplacian(p, 1))
+    sine = _root(1 - (((1 - exact.FEW)**2 + 1 - (p['region_radius'] / p['radius'])**2)
+                      / (2 * (1 - exact.FEW)))**2)
+    degree = max(row[i] for i, row in enumerate(exact.laplacian(p, 0)))
+    places = p['radius'] * min(exact.FEW, p['omega_at_rest'] / degree)
+    planes: list[Values] = []
+    for beta in np.linspace(0.0, 1.2, 13):
+        t = _down(math.tan(0.5 * beta))
+        c, s = (float(x) for x in exact.turned(t))
+        loss = float(p['omega_max']) * np.clip(_float(u) - r * s, 0.0, r)
+        below = np.linalg.solve(M, loss + _ROUNDING * (1.0 + loss.max()))
+        entry = float(exact.entry_height(p, t, sine) - places)
+        below += max(0.0, float((r * c - below).max()) - entry) + 1e-11
+        h = [_down(x) for x in (r * c - below).tolist()]
+        rates = exact.plane_rates(p, u, t, h)
+        if min(h) >= 0 and min(rates) >= 0:
+            planes.append({'tangent': t, 'height': h, 'sine': sine, 'rates': rates})
+    most = np.max([_float(plane['height']) for plane in planes], axis=0, initial=0.0)
+    return [plane for plane in planes if np.any(_float(plane['height']) == most)]
+
+
+def _shrinking(p: Values, inner: list[Fraction]
+               ) -> tuple[list[Fraction], Fraction, list[Fraction]]:
+    """Weights and rate of the norm in which solutions approach each other."""
+    M = _float(exact.laplacian(p, 1)) - np.diag(float(p['rho']) * (
+        float(p['radius'])**2 - _float(inner)**2))
+    values, vectors = np.linalg.eig(M)
+    slowest = int(values.real.argmin())
+    weights = np.abs(vectors[:, slowest].real)
+    v = [_down(x) for x in (weights / weights.max()).tolist()]
+    for room in 10.0 ** np.arange(-9.0, -2.0):
+        rate = _down(float(values[slowest].real) * (1.0 - room))
+        left = exact.shrinks(p, v, inner, rate)
+        if min(left) >= 0:
+            break
+    return v, rate, left
+
+
+def _places(rest: InhibitedEquilibrium) -> list[tuple[Fraction, Fraction]]:
+    """States of an equilibrium in locked coordinates."""
+    return [(_down(size * math.cos(ahead)), _down(-size * math.sin(ahead)))
+            for size, ahead in zip(rest.radius.tolist(), rest.phase_ahead.tolist(), strict=True)]
+
+
+def _least(guess: float, holds: Callable[[Fraction], bool]) -> Fraction:
+    """Smallest number of the grid, near a guess, for which something holds."""
+    x = _down(guess)
+    while not holds(x):
+        x += exact.GRID
+    while holds(x - exact.GRID):
+        x -= exact.GRID
+    return x
+
+
+def _root(square: Fraction) -> Fraction:
+    """Root of a square that is not negative, rounded upwards."""
+    return _least(math.sqrt(max(square, Fraction(0))), lambda x: x >= 0 and x * x >= square)
+
+
+def _down(x: float) -> Fraction:
+    return math.floor(Fraction(x) / exact.GRID) * exact.GRID
+
+
+def _float(values: Any) -> Array:
+    return np.array(values, dtype=float)
+
+
+def _written(value: Any) -> Any:
+    """Fractions as strings."""
+    if isinstance(value, dict):
+        return {key: _written(one) for key, one in value.items()}
+    return str(value) if isinstance(value, Fraction) else [_written(one) for one in value]

@@ -1,0 +1,174 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Proofs of certificates: written, checked by a script that knows nothing of the package, and
+refused when anything in them is changed.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from core_examples import GAITS, TICK, network, suite_parameters
+
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates import check_proof
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.proof import proof_of
+from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.robot_model.state import LEGS
+
+P = suite_parameters()
+
+
+def proof(gait: GaitNetwork, inhibition: InhibitionParameters = P.inhibition,
+          tick: float = TICK) -> dict[str, Any]:
+    """As it stands in a file."""
+    found: dict[str, Any] = json.loads(json.dumps(
+        proof_of(gait, inhibition, P.reference, P.leg, P.posture, tick), allow_nan=False))
+    return found
+
+
+def settings(seed: int, share: tuple[float, float]
+             ) -> Iterator[tuple[GaitNetwork, InhibitionParameters, float, Certificate]]:
+    """Random certified settings with a coupling gain in a range, as multiples of rho r^2."""
+    rng = np.random.default_rng(seed)
+    while True:
+        def some(low: float, high: float) -> float:
+            return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+        radius, growth = some(0.3, 1.6), some(0.5, 30.0)
+        gait = network(
+            str(rng.choice(list(GAITS))), rho=growth / radius**2, radius=radius,
+            coupling_gain=growth * some(*share), cadence_scale=some(0.25, 3.0),
+            coupling_graph=str(rng.choice(['all_to_all', 'ring', 'path', 'star',
+                                           'directed_ring'])))
+        inhibition = InhibitionParameters(
+            inhibition_gain=some(60.0, 6000.0), region_radius=radius * some(0.03, 1.2),
+            inhibited_legs=tuple(rng.permutation(LEGS)[:rng.integers(1, 4)].tolist()))
+        tick = float(rng.choice([0.001, 0.004, 0.01]))
+        certificate = certify(gait, inhibition, P.reference, P.leg, P.posture, tick)
+        if certificate.holds:
+            yield gait, inhibition, tick, certificate
+
+
+@pytest.mark.parametrize('gait', GAITS)
+def test_every_gait_has_a_proof_of_every_inequality(gait: str) -> None:
+    found = check_proof.check(proof(network(gait)))
+    certificate = certify(network(gait), P.inhibition, P.reference, P.leg, P.posture, TICK)
+    assert set(found) == {row.name for row in certificate.inequalities if row.required} | {
+        'premises'}
+    assert float(found['synchronisation'][1]) == pytest.approx(
+        certificate['synchronisation'].right, rel=1e-6)
+    assert float(found['capture'][0]) == pytest.approx(
+        certificate['capture'].left / certificate['capture'].right, rel=1e-6)
+    assert certificate.time_to_rest <= float(found['time_to_rest'][0]) < 1.5 * (
+        certificate.time_to_rest)
+
+
+def test_random_certified_settings_have_proofs() -> None:
+    for _, (gait, inhibition, tick, _) in zip(range(60), settings(1, (5.0, 100.0)), strict=False):
+        check_proof.check(proof(gait, inhibition, tick))
+
+
+def test_settings_that_contract_on_a_region_alone_have_proofs() -> None:
+    regional = (case for case in settings(2, (1.5, 5.0))
+                if case[3].contraction_grade == 'regional' and case[3].time_to_rest < 4.0)
+    for _, (gait, inhibition, tick, _) in zip(range(8), regional, strict=False):
+        found = proof(gait, inhibition, tick)
+        assert found['witnesses']['half_planes']
+        check_proof.check(found)
+
+
+def test_what_is_not_certified_has_no_proof() -> None:
+    for changes in ({'coupling_gain': 2.0}, {'coupling_gain': 8.0}):
+        with pytest.raises(ParameterError, match='no exact proof'):
+            proof(network(**changes))
+    with pytest.raises(ParameterError, match='no exact proof'):
+        proof(network(), InhibitionParameters(inhibition_gain=150.0))
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """Paths of all strings."""
+    if isinstance(value, str):
+        yield path
+    else:
+        for key, one in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from places(one, (*path, key))
+
+
+def mutated(found: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """The proof with a digit, a sign or an entry changed."""
+    changed = copy.deepcopy(found)
+    paths = [path for path in places(changed) if path[0] != 'format']
+    *way, last = paths[rng.integers(len(paths))]
+    inside = changed
+    for key in way:
+        inside = inside[key]
+    text = inside[last]
+    kind = rng.integers(4)
+    if kind == 0:
+        del inside[last]
+    elif kind == 1 and Fraction(text):
+        inside[last] = str(-Fraction(text))
+    else:
+        digits = [k for k, sign in enumerate(text) if sign.isdigit()]
+        k = digits[rng.integers(len(digits))]
+        other = str((int(text[k]) + rng.integers(1, 10)) % 10)
+        inside[last] = text[:k] + other + text[k + 1:]
+    return changed
+
+
+def test_mutated_proofs_are_refused() -> None:
+    rng = np.random.default_rng(3)
+    regional = next(case for case in settings(2, (1.5, 5.0))
+                    if case[3].contraction_grade == 'regional' and case[3].time_to_rest < 4.0)
+    originals = [proof(network()), proof(network('trot', coupling_graph='directed_ring')),
+                 proof(*regional[:3])]
+    for original in originals:
+        check_proof.check(original)
+        for _ in range(200):
+            changed = mutated(original, rng)
+            with pytest.raises((ArithmeticError, LookupError, TypeError, ValueError)):
+                check_proof.check(changed)
+
+
+@pytest.mark.parametrize(('name', 'value'), [
+    ('coupling_gain', None), ('inhibition', None), ('omega_max', '40'), ('tick', '1/5')])
+def test_a_proof_is_not_accepted_for_parameters_that_are_worse(name: str, value: str | None
+                                                               ) -> None:
+    changed = proof(network())
+    p = changed['parameters']
+    if name == 'coupling_gain':
+        p['coupling'] = [[str(Fraction(k) / 100) for k in row] for row in p['coupling']]
+    elif name == 'inhibition':
+        p['gains'] = [str(Fraction(gain) / 4) for gain in p['gains']]
+    else:
+        p[name] = value
+    with pytest.raises(ValueError):
+        check_proof.check(changed)
+
+
+def test_the_checker_is_a_script_of_its_own(tmp_path: Path) -> None:
+    path, script = tmp_path / 'proof.json', tmp_path / 'check_proof.py'
+    script.write_bytes(Path(check_proof.__file__).read_bytes())
+    found = proof(network())
+    path.write_text(json.dumps(found), encoding='utf-8')
+
+    def status() -> int:
+        return subprocess.run([sys.executable, '-I', str(script), str(path)],
+                              capture_output=True, check=False).returncode
+
+    assert status() == 0
+    found['witnesses']['rate'] = '1'
+    path.write_text(json.dumps(found), encoding='utf-8')
+    assert status() == 1
