@@ -24,8 +24,7 @@ from dmp_cpg_ros.core.estimation.estimate import estimated_state
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE
 from dmp_cpg_ros.core.gait.choice import highest_speed
-from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
-from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
+from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits, quarter_weight
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork

@@ -22,7 +22,7 @@ from dmp_cpg_ros.core.canonical.inhibition import (
 from dmp_cpg_ros.core.certificates.lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
-from dmp_cpg_ros.core.gait.foot_contact import quarter_weight
+from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dmp_cpg_ros.core.contraction.interval import Interval
+from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
 from dmp_cpg_ros.core.errors import ParameterError
 
 Array = NDArray[np.float64]

@@ -18,7 +18,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.contraction.connectivity import synchronisation_complement
+from dmp_cpg_ros.core.contraction.synchronisation import synchronisation_complement
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.paper.matrix_measure import matrix_measure
 

@@ -14,8 +14,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED, Finding
-from dmp_cpg_ros.core.contraction.interval import Interval
 from dmp_cpg_ros.core.contraction.region import Box, Region
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.paper.jacobians import Field, numerical_jacobian

@@ -17,7 +17,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.certify import certify
-from dmp_cpg_ros.core.contraction.connectivity import synchronisation_complement
+from dmp_cpg_ros.core.contraction.synchronisation import synchronisation_complement
 from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters

@@ -9,12 +9,12 @@ import sys
 
 import numpy as np
 import pytest
+from demonstrations import joint_angles, walking_joints
 
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
 from dmp_cpg_ros.commands.learn import BAD_INPUT, main
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
-from dmp_cpg_ros.paper.demonstrations import joint_angles, walking_joints
 from dmp_cpg_ros.primitive_files import load_primitive
 
 WALK, REACH = walking_joints(0.5, 2.6, dt=0.005), joint_angles(dt=0.004)

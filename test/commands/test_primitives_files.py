@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from demonstrations import joint_angles, walking_joints
 
 from dmp_cpg_ros.core.errors import DataError, MissingFileError, ParameterError
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
-from dmp_cpg_ros.paper.demonstrations import joint_angles, walking_joints
 from dmp_cpg_ros.primitive_files import load_primitive, save_primitive
 
 PRIMITIVES = {

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.interval import Interval
+from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.paper.jacobians import (
     complex_step_jacobian,

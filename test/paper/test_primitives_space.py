@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from demonstrations import walking_joints
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,6 @@ from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.states import DiscreteInput
 from dmp_cpg_ros.paper.algebra import slowed, summed, transformed
 from dmp_cpg_ros.paper.daughters import Daughter, DaughterSum, transported_metric
-from dmp_cpg_ros.paper.demonstrations import walking_joints
 from dmp_cpg_ros.paper.diffeomorphism import (
     Composition,
     FunctionDiffeomorphism,

@@ -31,7 +31,7 @@ from dmp_cpg_ros.core.balance.velocity_correction import VelocityCorrection
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
-from dmp_cpg_ros.core.gait.foot_contact import believed
+from dmp_cpg_ros.core.gait.contact_feedback import believed
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import (

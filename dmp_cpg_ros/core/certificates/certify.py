@@ -12,28 +12,46 @@ legs can vote, a majority stops the gait and fewer do not.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.certificates.contact import contact_limits, later_stop, slowest_cadence
-from dmp_cpg_ros.core.certificates.hierarchy import hierarchy_inequalities
+from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates.inequality import Inequality
-from dmp_cpg_ros.core.certificates.network import analyse_network, network_inequalities
-from dmp_cpg_ros.core.certificates.rest import rest_inequalities
+from dmp_cpg_ros.core.certificates.network import (
+    analyse_network,
+    contact_limits,
+    later_stop,
+    network_inequalities,
+    slowest_cadence,
+)
 from dmp_cpg_ros.core.certificates.step import step_inequalities
 from dmp_cpg_ros.core.certificates.timing import time_to_rest, time_to_walking
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
+from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.finding import PROVED, weakest
+from dmp_cpg_ros.core.contraction.hierarchy import (
+    CONTRACTING,
+    TRANSVERSE,
+    Part,
+    coupled_primitives,
+)
+from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_contraction
+from dmp_cpg_ros.core.contraction.region import Annulus
+from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
+from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 Array = NDArray[np.float64]
@@ -211,3 +229,117 @@ def _verdict(entry: Inequality) -> str:
 
 def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+GROUND = 0.01
+"""Height of a foot that counts as on the ground, as a fraction of the standing height."""
+
+SMALLEST_RADIUS = 0.5
+"""Radius that every oscillator must keep at rest for its phase to be sound, as a fraction of r."""
+
+
+def rest_inequalities(network: GaitNetwork, leg: LegParameters,
+                      rest: InhibitedEquilibrium | None) -> list[Inequality]:
+    """Inequalities (f): feet on the ground and sound phases at the inhibited equilibrium.
+
+    The clearance of a swing is scaled by an activity that vanishes with the phase's speed. At rest
+    it is below ``REST_ACTIVITY``, so that a foot whose leg came to rest within its swing hangs
+    over the ground by that share of its path's height at most, and sinks on.
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        Gait and oscillators.
+    leg : LegParameters
+        For the clearance.
+    rest : InhibitedEquilibrium or None
+        Equilibrium at zero reference; None when there is none.
+
+    Returns
+    -------
+    list of Inequality
+    """
+    height = float('inf') if rest is None else max(_heights(network, leg, rest))
+    radius = 0.0 if rest is None else float(rest.radius.min()) / network.parameters.radius
+    ahead = 'there is no equilibrium' if rest is None else (
+        'legs rest ' + ', '.join(f'{np.degrees(a):.1f}' for a in rest.phase_ahead)
+        + ' degrees ahead of their places')
+    return [
+        Inequality('rest_posture', height, GROUND, '', 'highest foot', 'on the ground', PROVED,
+                   f'as fractions of the standing height, when rest is declared; {ahead}'),
+        Inequality('rest_radius', SMALLEST_RADIUS, radius, '', 'sound radius',
+                   'smallest |x_i|/r at rest', PROVED,
+                   'every oscillator at rest is far from the origin, so that its phase is sound')]
+
+
+def _heights(network: GaitNetwork, leg: LegParameters, rest: InhibitedEquilibrium) -> list[float]:
+    """Heights of the feet at rest, as fractions of the standing height."""
+    duty = network.gait.duty(0.0, network.scale)
+    path = FootPath((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 1.0, duty, leg.clearance * REST_ACTIVITY)
+    positions = network.gait.cycle_position(phase(rest.state))
+    return [float(path.at(float(position))[0][2]) for position in positions]
+
+
+_CRITICAL = 1e-3  # share of the rate that is given away where no metric attains it
+_INNER = 0.9  # inner radius of the annulus around the cycle, as a share of r
+
+
+def spring_damper_contraction(stiffness: float, damping: float) -> tuple[float, Array]:
+    """Contraction rate of θ̈ = k(g − θ) + b(ġ − θ̇) with the coordinates that show it.
+
+    In (s θ, θ̇ + (b/2) θ) the Jacobian is [[−b/2, s], [(b²/4 − k)/s, −b/2]], whose matrix measure
+    is −b/2 + |s + (b²/4 − k)/s|/2. With s² = |k − b²/4| it is the slowest eigenvalue's real part;
+    critical damping has none that attains it, and s = 2ε(b/2) comes within ε.
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        k > 0 [1/s^2] and b > 0 [1/s].
+
+    Returns
+    -------
+    rate : float
+        λ [1/s].
+    Theta : ndarray (2, 2)
+        Change of coordinates of (θ, θ̇).
+    """
+    half = 0.5 * damping
+    s = max(math.sqrt(abs(stiffness - half**2)), 2.0 * _CRITICAL * half)
+    rate = half - 0.5 * abs(s + (half**2 - stiffness) / s)
+    return rate, np.array([[s, 0.0], [half, 1.0]])
+
+
+def hierarchy_inequalities(reference: ReferenceParameters, leg: LegParameters,
+                           posture: PostureParameters, found: Synchronisation, rho: float,
+                           radius: float, omega: float) -> list[Inequality]:
+    """Inequalities (e): rates of the driving and the driven systems, and Theorem 4 for the whole.
+
+    Parameters
+    ----------
+    reference, leg, posture : ReferenceParameters, LegParameters, PostureParameters
+        Parameters of the systems.
+    found : Synchronisation
+        Of the oscillators.
+    rho, radius, omega : float
+        Parameters of the oscillators, the smallest ω.
+
+    Returns
+    -------
+    list of Inequality
+    """
+    spring, _ = spring_damper_contraction(leg.stiffness, leg.damping)
+    filters = min(leg.activity_rate, leg.placement_rate, posture.activity_rate)
+    oscillator = transverse_contraction(AndronovHopf(rho, radius), omega,
+                                        Annulus(_INNER * radius, radius))
+    whole = coupled_primitives(
+        Part('reference', CONTRACTING, reference.alpha_r),
+        Part('oscillator', TRANSVERSE, oscillator.rate), found,
+        [Part('swing filters', CONTRACTING, filters), Part('joints', CONTRACTING, spring)])
+    return [
+        Inequality('reference', 0.0, reference.alpha_r, '1/s', 'zero', 'alpha_r', PROVED,
+                   'the reference forgets how it was commanded before, but while its acceleration '
+                   'is limited'),
+        Inequality('transformation', 0.0, spring, '1/s', 'zero', 'rate of the joints', PROVED,
+                   'the joints converge to what the oscillators and the reference ask for'),
+        Inequality('hierarchy', 0.0, whole.rate, '1/s', 'zero', 'smallest rate of all', PROVED,
+                   f'for a held command the whole suite is {whole.kind} (Theorem 4)')]

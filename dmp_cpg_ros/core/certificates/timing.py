@@ -21,10 +21,13 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
-from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
-from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
+from dmp_cpg_ros.core.contraction.synchronisation import (
+    Synchronisation,
+    comparison_laplacian,
+    synchronisation,
+)
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import (
     LOCKED_ACTIVITY,

@@ -27,8 +27,12 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import phase_rotation
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian, overshoot, slowest_rate
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
+from dmp_cpg_ros.core.contraction.synchronisation import (
+    comparison_laplacian,
+    overshoot,
+    slowest_rate,
+)
 from dmp_cpg_ros.core.errors import ParameterError
 
 Array = NDArray[np.float64]

@@ -11,13 +11,15 @@ be together. It needs no synchronisation beforehand, and gains several times tho
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian
-from dmp_cpg_ros.core.contraction.interval import Interval
+from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian
+from dmp_cpg_ros.core.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -83,3 +85,136 @@ def _maximum(function: Callable[[Interval], Interval]) -> float:
         boxes = Interval(np.concatenate([boxes.lower, middle]),
                          np.concatenate([middle, boxes.upper]))
     return max(settled, float(function(boxes).upper.max()))
+
+
+def _down(x: Array) -> Array:
+    return np.nextafter(x, -np.inf)
+
+
+def _up(x: Array) -> Array:
+    return np.nextafter(x, np.inf)
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Closed intervals [lower, upper], element by element.
+
+    Attributes
+    ----------
+    lower, upper : ndarray (...)
+        Ends; lower ≤ upper.
+
+    Raises
+    ------
+    DataError
+        If an end is not a number or the ends are in the wrong order.
+    """
+
+    lower: Array
+    upper: Array
+    __array_ufunc__ = None  # lets ``ndarray + Interval`` reach __radd__
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        lower, upper = np.asarray(self.lower, float), np.asarray(self.upper, float)
+        if not np.all(lower <= upper):
+            raise DataError('the ends of an interval must be numbers with lower <= upper')
+        object.__setattr__(self, 'lower', lower)
+        object.__setattr__(self, 'upper', upper)
+
+    @classmethod
+    def of(cls, value: Interval | ArrayLike) -> Interval:
+        """Return the value as intervals; numbers become points."""
+        if isinstance(value, Interval):
+            return value
+        point = np.asarray(value, dtype=float)
+        return cls(point, point)
+
+    def __add__(self, other: Interval | ArrayLike) -> Interval:
+        other = Interval.of(other)
+        return Interval(_down(self.lower + other.lower), _up(self.upper + other.upper))
+
+    def __neg__(self) -> Interval:
+        return Interval(-self.upper, -self.lower)
+
+    def __sub__(self, other: Interval | ArrayLike) -> Interval:
+        return self + (-Interval.of(other))
+
+    def __mul__(self, other: Interval | ArrayLike) -> Interval:
+        other = Interval.of(other)
+        products = (self.lower * other.lower, self.lower * other.upper,
+                    self.upper * other.lower, self.upper * other.upper)
+        return Interval(_down(np.minimum.reduce(products)), _up(np.maximum.reduce(products)))
+
+    def __truediv__(self, other: Interval | ArrayLike) -> Interval:
+        other = Interval.of(other)
+        if np.any((other.lower <= 0.0) & (other.upper >= 0.0)):
+            raise DataError('an interval can only be divided by intervals without zero')
+        one = np.ones_like(other.lower)
+        return self * Interval(_down(one / other.upper), _up(one / other.lower))
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __rsub__(self, other: Interval | ArrayLike) -> Interval:
+        return (-self) + other
+
+    def square(self) -> Interval:
+        """x², tight where the interval contains zero."""
+        low, high = self.lower * self.lower, self.upper * self.upper
+        contains_zero = (self.lower <= 0.0) & (self.upper >= 0.0)
+        smallest = np.where(contains_zero, 0.0, np.maximum(_down(np.minimum(low, high)), 0.0))
+        return Interval(smallest, _up(np.maximum(low, high)))
+
+    def sqrt(self) -> Interval:
+        """√x of the part that is not negative.
+
+        Raises
+        ------
+        DataError
+            If an interval is negative altogether.
+        """
+        if np.any(self.upper < 0.0):
+            raise DataError('the square root needs intervals that reach zero or above')
+        lower = np.maximum(_down(np.sqrt(np.maximum(self.lower, 0.0))), 0.0)
+        return Interval(lower, _up(np.sqrt(self.upper)))
+
+    @property
+    def middle(self) -> Array:
+        """Midpoint, an ordinary array."""
+        return 0.5 * (self.lower + self.upper)
+
+    @property
+    def radius(self) -> Array:
+        """Half width, rounded up so that middle ± radius contains the interval."""
+        return _up(np.maximum(self.upper - self.middle, self.middle - self.lower))
+
+    @property
+    def magnitude(self) -> Array:
+        """Largest absolute value."""
+        return np.maximum(np.abs(self.lower), np.abs(self.upper))
+
+    def __getitem__(self, key: Any) -> Interval:
+        return Interval(self.lower[key], self.upper[key])
+
+
+def stack(rows: list[list[Interval | float]]) -> Interval:
+    """Intervals (…,) of equal shape put together as matrices.
+
+    Parameters
+    ----------
+    rows : list of lists
+        Entries of the matrix, intervals or numbers.
+
+    Returns
+    -------
+    Interval (..., n, m)
+    """
+    entries = [[Interval.of(entry) for entry in row] for row in rows]
+    shape = np.broadcast_shapes(*(entry.lower.shape for row in entries for entry in row))
+
+    def packed(end: str) -> Array:
+        return np.stack([np.stack([np.broadcast_to(getattr(entry, end), shape) for entry in row],
+                                  axis=-1) for row in entries], axis=-2)
+
+    return Interval(packed('lower'), packed('upper'))

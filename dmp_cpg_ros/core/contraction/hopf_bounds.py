@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.contraction.capture_anywhere import Interval, stack
 from dmp_cpg_ros.core.contraction.finding import PROVED, Finding
-from dmp_cpg_ros.core.contraction.interval import Interval, stack
 from dmp_cpg_ros.core.contraction.region import Annulus
 
 Array = NDArray[np.float64]

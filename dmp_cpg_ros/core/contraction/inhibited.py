@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
-from dmp_cpg_ros.core.contraction.connectivity import (
+from dmp_cpg_ros.core.contraction.hopf_bounds import growth
+from dmp_cpg_ros.core.contraction.synchronisation import (
     comparison_laplacian,
     grounded_connectivity,
     slowest_rate,
 )
-from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.errors import ParameterError
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.contraction.interval import Interval
+from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
 from dmp_cpg_ros.core.errors import ParameterError
 
 Array = NDArray[np.float64]

@@ -17,14 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph
-from dmp_cpg_ros.core.contraction.connectivity import (
-    comparison_laplacian,
-    components,
-    connectivity,
-    left_null_weights,
-    overshoot,
-    slowest_rate,
-)
 
 Array = NDArray[np.float64]
 
@@ -139,3 +131,161 @@ def _hierarchical(graph: CouplingGraph, L: Array, scalar: Array,
     if not others or not np.isfinite(smallest) or smallest <= 1e-9:
         return None
     return Synchronisation(float(smallest), growth, None, 'hierarchical')
+
+
+_TINY = 1e-9
+
+
+def synchronisation_complement(size: int, dimension: int = 2,
+                               weights: Array | None = None) -> Array:
+    """Matrix V with orthonormal rows whose null space is where all (√ξ-weighted) nodes agree.
+
+    Parameters
+    ----------
+    size : int
+        Number N of nodes.
+    dimension : int
+        State dimension n of one node.
+    weights : ndarray (N,), optional
+        ξ > 0; equal without.
+
+    Returns
+    -------
+    ndarray ((N−1)n, Nn)
+    """
+    direction = np.ones(size) if weights is None else np.sqrt(weights)
+    across = np.linalg.svd(direction[None])[2][1:]                           # (N-1, N)
+    return np.kron(across, np.eye(dimension))
+
+
+def connectivity(L: Array, size: int, weights: Array | None = None) -> float:
+    """Smallest decay of the disagreement Σ ξ_i |x_i − x̄|² under ẋ = −L x.
+
+    Parameters
+    ----------
+    L : ndarray (Nn, Nn)
+        Block Laplacian, L (1 ⊗ z) = 0; it need not be symmetric.
+    size : int
+        Number N of nodes.
+    weights : ndarray (N,), optional
+        ξ > 0 of the disagreement, x̄ the ξ-weighted mean; equal without. Any ξ gives a true bound;
+        the left null vector of a directed graph's Laplacian is the natural one.
+
+    Returns
+    -------
+    float
+        λ_min(V L_K Vᵀ) in the weighted coordinates [1/s]; for a symmetric L_K without weights the
+        smallest eigenvalue that is not one of the n zeros.
+    """
+    dimension = len(L) // size
+    V = synchronisation_complement(size, dimension, weights)
+    if len(V) == 0:
+        return float('inf')
+    if weights is not None:
+        root = np.repeat(np.sqrt(weights), dimension)
+        L = root[:, None] * L / root[None, :]
+    return float(np.linalg.eigvalsh(V @ (0.5 * (L + L.T)) @ V.T)[0])
+
+
+def comparison_laplacian(graph: CouplingGraph) -> Array:
+    """Scalar Laplacian that bounds the couplings node by node.
+
+    |x_i − z| falls at least like this matrix says: λ_min of K_ij's symmetric part on the diagonal,
+    −‖K_ij‖ beside it. For gains K_ij = k_ij I it is the graph's own weighted Laplacian.
+
+    Returns
+    -------
+    ndarray (N, N)
+        [1/s]
+    """
+    L = np.zeros((graph.size, graph.size))
+    if not graph.edges:
+        return L
+    symmetric = 0.5 * (graph.gains + np.swapaxes(graph.gains, 1, 2))
+    held = np.linalg.eigvalsh(symmetric)[:, 0]
+    pulled = np.linalg.svd(graph.gains, compute_uv=False)[:, 0]
+    for (i, j), weakest, strongest in zip(graph.edges, held, pulled, strict=True):
+        L[i, i] += weakest
+        L[i, j] -= strongest
+    return L
+
+
+def overshoot(laplacian: Array) -> float:
+    """Largest Σ_j (‖K_ij‖ − λ_min(K_ij)) of a node [1/s], from the comparison Laplacian.
+
+    The disc |x| ≤ R cannot be left when ρ(R² − r²) is not below it; it is 0 for K_ij = k_ij I.
+    """
+    most = -float(laplacian.sum(axis=1).min(initial=0.0))
+    return most if most > 1e-9 * (1.0 + float(np.abs(laplacian).max(initial=0.0))) else 0.0
+
+
+def slowest_rate(M: Array) -> float:
+    """Smallest decay rate of u̇ = −M u for a matrix with no positive entry off its diagonal.
+
+    The eigenvalue of smallest real part of such a matrix is real (Perron-Frobenius; Berman &
+    Plemmons 1994, chapter 6), and positive exactly when M is a nonsingular M-matrix. With its
+    eigenvector v > 0 the norm max_i |x_i|/v_i shrinks at that rate: the matrix measure of a
+    weighted norm, and for a symmetric M the same number as in the 2-norm.
+
+    Returns
+    -------
+    float
+        [1/s]
+    """
+    if np.array_equal(M, M.T):
+        return float(np.linalg.eigvalsh(M)[0])
+    return float(np.linalg.eigvals(M).real.min())
+
+
+def grounded_connectivity(graph: CouplingGraph, gains: Array) -> float:
+    """Decay of everything when nodes are held by gains α: that of L_K + diag(α).
+
+    Parameters
+    ----------
+    graph : CouplingGraph
+        Couplings.
+    gains : ndarray (N,)
+        α_i ≥ 0 [1/s].
+
+    Returns
+    -------
+    float
+        The better of λ_min(L_K + diag α) in the 2-norm and the weighted max-norm [1/s].
+    """
+    L = graph.block_laplacian()
+    symmetric = 0.5 * (L + L.T) + np.diag(np.repeat(gains, 2))
+    return max(float(np.linalg.eigvalsh(symmetric)[0]),
+               slowest_rate(comparison_laplacian(graph) + np.diag(gains)))
+
+
+def left_null_weights(laplacian: Array) -> Array | None:
+    """Weights ξ with ξᵀ L = 0 and Σ ξ = 1 of a strongly connected scalar Laplacian.
+
+    Returns
+    -------
+    ndarray (N,) or None
+        None when the graph is not strongly connected, so that no ξ > 0 exists.
+    """
+    xi = np.abs(np.linalg.svd(laplacian.T)[2][-1])
+    xi /= xi.sum()
+    return xi if xi.min() > _TINY else None
+
+
+def components(graph: CouplingGraph) -> list[list[int]]:
+    """Strongly connected components in an order in which no component acts on an earlier one.
+
+    Returns
+    -------
+    list of list of int
+        The first component is a root: nothing outside acts on it.
+    """
+    reach = np.eye(graph.size, dtype=bool)                  # [i, j]: j acts on i
+    for i, j in graph.edges:
+        reach[i, j] = True
+    for k in range(graph.size):
+        reach |= reach[:, k:k + 1] & reach[k:k + 1, :]
+    groups: list[list[int]] = []
+    for i in range(graph.size):
+        if not any(i in group for group in groups):
+            groups.append([int(j) for j in np.flatnonzero(reach[i] & reach[:, i])])
+    return sorted(groups, key=lambda group: int(np.count_nonzero(reach[group[0]])))

@@ -13,7 +13,7 @@ legs' frequencies, bounded by what the certificate leaves free:
 - c is common to all legs: what the legs ask for together. A frequency that all legs share does not
   pull them apart (it leaves x_i − x_j to the couplings), whatever it is and however it jumps.
 - d_i is what is left of the leg's own request. δ̄ is a share of the margin for unequal frequencies
-  (:func:`~dmp_cpg_ros.core.certificates.contact.contact_margin`): within it phases, radii and
+  (:func:`~dmp_cpg_ros.core.certificates.network.contact_margin`): within it phases, radii and
   distances stay inside what phase lock and capture assume, under every sequence of contacts.
 - While a stop is requested, and after a release until the legs are certified to be in their
   places, there is no feedback: capture, rest and start, their bounds and their predictions are
@@ -35,9 +35,11 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import phase
-from dmp_cpg_ros.core.gait.foot_contact import standing
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait
+from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.sensor_readings import LARGEST_FORCE
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
@@ -181,3 +183,38 @@ def touchdown_error(cycle_position: Array, duty: float, stands: NDArray[np.bool_
     early = stands & (cycle_position > 0.0) & (late < -PUNCTUAL)
     waiting = ~stands & (late > PUNCTUAL) & (late < PATIENCE)
     return np.where(early, -late - PUNCTUAL, 0.0) - np.where(waiting, late - PUNCTUAL, 0.0)
+
+
+LOADED, UNLOADED = 0.25, 0.1
+"""Share of a quarter of the weight above which a foot has touched down, and below which it has
+left the ground. In a trot a standing foot bears two of these quarters."""
+
+
+def quarter_weight(description: RobotDescription) -> float:
+    """Force on each foot of a robot that stands evenly [N]."""
+    return description.mass * GRAVITY / len(LEGS)
+
+
+def believed(force: Array) -> Array:
+    """Forces [N], (n,), with 0 for those that no contact sensor can have measured."""
+    return np.array([
+        value if -LARGEST_FORCE <= value <= LARGEST_FORCE else 0.0 for value in force.tolist()])
+
+
+def standing(before: NDArray[np.bool_], force: Array, quarter: float) -> NDArray[np.bool_]:
+    """Which feet stand.
+
+    Parameters
+    ----------
+    before : ndarray (n,) of bool
+        Which stood at the last tick.
+    force : ndarray (n,)
+        Normal forces [N]; where one is not a number, the foot counts as it did before.
+    quarter : float
+        As from :func:`quarter_weight` [N].
+
+    Returns
+    -------
+    ndarray (n,) of bool
+    """
+    return (force > LOADED * quarter) | (before & ~(force < UNLOADED * quarter))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rate
-from dmp_cpg_ros.core.gait.foot_contact import LOADED, quarter_weight
+from dmp_cpg_ros.core.gait.contact_feedback import LOADED, quarter_weight
 from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, minus, moved, pair, plus, triple

@@ -13,8 +13,7 @@ from core_examples import GAITS, TICK, network
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
-from dmp_cpg_ros.core.certificates.hierarchy import spring_damper_contraction
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify, spring_damper_contraction
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.certificates.suggest import nearest_value, suggest_gains
 from dmp_cpg_ros.core.errors import ParameterError

@@ -25,9 +25,12 @@ from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.contraction.capture import capture_set
-from dmp_cpg_ros.core.contraction.connectivity import synchronisation_complement
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
-from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
+from dmp_cpg_ros.core.contraction.synchronisation import (
+    Synchronisation,
+    synchronisation,
+    synchronisation_complement,
+)
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range

@@ -18,9 +18,8 @@ from dmp_cpg_ros.core.contraction.capture import (
     outward_growth_within,
     place_tolerance,
 )
-from dmp_cpg_ros.core.contraction.connectivity import comparison_laplacian
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
-from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
+from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian, synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
 
 TICK = 0.002

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.contraction.interval import Interval, stack
+from dmp_cpg_ros.core.contraction.capture_anywhere import Interval, stack
 from dmp_cpg_ros.core.errors import DataError
 
 NUMBERS = st.floats(-1e6, 1e6, allow_subnormal=False)

@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.connectivity import (
+from dmp_cpg_ros.core.contraction.synchronisation import (
     components,
     connectivity,
     grounded_connectivity,
+    synchronisation,
     synchronisation_complement,
 )
-from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.paper.matrix_measure import matrix_measure
 from dmp_cpg_ros.paper.norm_form import (

@@ -16,14 +16,16 @@ from dmp_cpg_ros.core.certificates.certify import Certificate
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.contraction.capture import PLACE_TOLERANCE, RADIUS_TOLERANCE
 from dmp_cpg_ros.core.gait.contact_feedback import (
+    LOADED,
+    UNLOADED,
     ContactLimits,
     ContactState,
     bounded,
     contact_feedback,
     initial_contact_state,
+    standing,
     touchdown_error,
 )
-from dmp_cpg_ros.core.gait.foot_contact import LOADED, UNLOADED, standing
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.loop import WalkingLoop

@@ -8,6 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from demonstrations import (
+    LETTERS,
+    handwriting,
+    joint_angles,
+    straight_reach,
+    walking_joints,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,13 +27,6 @@ from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, derivatives
 from dmp_cpg_ros.core.primitives.states import DiscreteInput, RhythmicInput
 from dmp_cpg_ros.paper.algebra import transformed
-from dmp_cpg_ros.paper.demonstrations import (
-    LETTERS,
-    handwriting,
-    joint_angles,
-    straight_reach,
-    walking_joints,
-)
 from dmp_cpg_ros.paper.homogeneous import Homogeneous
 
 DISCRETE = {

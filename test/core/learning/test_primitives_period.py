@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from demonstrations import straight_reach, walking_joints
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,7 +19,6 @@ from dmp_cpg_ros.core.learning.period import (
     spread_between_cycles,
 )
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.paper.demonstrations import straight_reach, walking_joints
 
 SHAPES = {
     'sine': lambda u: np.sin(u),
