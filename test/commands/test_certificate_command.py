@@ -13,6 +13,7 @@ pytest.importorskip('mujoco')  # the robot's geometry is read from its model
 
 from dmp_cpg_ros.commands.certify import main
 from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.certificates.check_proof import check
 
 
 def file_with(folder: Path, **changes: object) -> str:
@@ -79,3 +80,13 @@ def test_names_and_values_that_are_wrong_have_status_2(
     assert "no parameter 'inhibition_gian'" in capsys.readouterr().err
     assert main([file_with(tmp_path, region_radius=-1.0)]) == 2
     assert "'region_radius' = -1.0" in capsys.readouterr().err
+
+
+def test_a_proof_is_written_where_one_exists(tmp_path: Path,
+                                             capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / 'proof.json'
+    assert main(['--proof', str(path)]) == 0
+    assert 'time_to_rest' in check(json.loads(path.read_text(encoding='utf-8')))
+    assert main([file_with(tmp_path, voting='true'), '--proof', str(path)]) == 2
+    assert 'voting' in capsys.readouterr().err
+    assert main(['--proof', str(tmp_path)]) == 2
