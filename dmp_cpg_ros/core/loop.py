@@ -303,19 +303,8 @@ class WalkingLoop:
         return estimated_state(readings, estimate)
 
     def vote(self, weights: Mapping[str, float], voter: str = '') -> None:
-        """Vote for a stop, as the topic ``votes`` does; counts from the next tick on.
-
-        Parameters
-        ----------
-        weights : mapping of str to float
-            Weight of each leg that is voted for.
-        voter : str
-            Who votes.
-
-        Raises
-        ------
-        DataError
-            If a name or a number cannot be used.
+        """Vote for a stop with a weight for each leg, as the topic ``votes`` does, from the next
+        tick on; raises DataError for a name or a number that cannot be used.
         """
         self.inbox.accept(weights, voter)
 

@@ -125,4 +125,4 @@ def test_values_on_the_command_line_are_read_as_strictly(
         value: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['--set', f'gait:={value}']) == 2
     told = capsys.readouterr().err.splitlines()
-    assert len(told) == 1 and "--set 'gait', line 1" in told[0]
+    assert len(told) == 1 and "'gait', line 1" in told[0]

@@ -80,21 +80,8 @@ class SpringDamper:
             raise ParameterError(f'form must be one of {", ".join(FORMS)}, not {self.form!r}')
 
     def spread(self, dofs: int) -> SpringDamper:
-        """The same with one entry per degree of freedom; one number serves for all.
-
-        Parameters
-        ----------
-        dofs : int
-            Number of degrees of freedom.
-
-        Returns
-        -------
-        SpringDamper
-
-        Raises
-        ------
-        ParameterError
-            If there is neither one entry nor one per degree of freedom.
+        """The same with one entry per degree of freedom; one number serves for all. Raises
+        ParameterError if there is neither one entry nor one per degree of freedom.
         """
         return SpringDamper(
             columns(self.stiffness, dofs, 'stiffness'),
@@ -103,13 +90,7 @@ class SpringDamper:
         )
 
     def groups(self) -> list[tuple[float, float, NDArray[np.int_]]]:
-        """Degrees of freedom that share their gains.
-
-        Returns
-        -------
-        list of (float, float, ndarray of int)
-            k, b and the indices of the degrees of freedom.
-        """
+        """Degrees of freedom that share their gains: k, b and their indices."""
         pairs = np.stack([self.stiffness, self.damping], axis=1)
         return [
             (float(k), float(b), np.flatnonzero(np.all(pairs == (k, b), axis=1)))
@@ -256,19 +237,8 @@ class SpringDamper:
         return SpringState(np.array(position), np.array(velocity))
 
     def goals(self, position: Array, velocity: Array, dt: Array) -> Array:
-        """Goals that states one after the other have followed, the inverse of :meth:`follow`.
-
-        Parameters
-        ----------
-        position, velocity : ndarray (m + 1, n)
-            States.
-        dt : ndarray (m,)
-            Times between them [s].
-
-        Returns
-        -------
-        ndarray (m, n)
-            Goals at the ends of the steps.
+        """Goals (m, n) at the ends of steps of dt (m,) [s] that states, ndarrays (m + 1, n), have
+        followed: the inverse of :meth:`follow`.
         """
         h = dt[:, None]
         (a, b), (c, d) = spring_exponential(self.stiffness, self.damping, h)  # (m, n) each

@@ -61,8 +61,7 @@ class LegParameters(Parameters):
         0.2, 'height of the swing as a fraction of the standing height', minimum=0.0, maximum=0.6
     )
     motion: str = parameter(
-        '', 'file of a learned motion that the feet play, scaled to the clearance; empty: the '
-        'foot path of the package'
+        '', 'file of a learned motion of the feet, scaled to the clearance; empty: the foot path'
     )
     activity_rate: float = parameter(
         12.0, 'rate at which the swing height follows the phase speed', unit='1/s', minimum=0.1,
@@ -101,7 +100,7 @@ class LegState:
     stumble : Stumble
         What the stumbling reflex does.
     motion : object
-        State of the foot's motion.
+        Of the foot's motion.
     """
 
     joints: SpringState
@@ -124,8 +123,7 @@ class LegFeedback:
     drift_in_base : ndarray (2,)
         Added to the velocity of a standing foot [m/s].
     correction : ndarray (3,)
-        Added to the reference for the stance velocity, not for the cadence: v_x, v_y [m/s],
-        γ [rad/s].
+        Added to the reference for the stance velocity, not the cadence [m/s], [m/s], [rad/s].
     foot_force : float
         Measured normal force of the foot [N]; 0 without a contact sensor.
     """
@@ -269,8 +267,8 @@ class LegPrimitive:
         if self.stumble_lift:
             touches = feedback.foot_force > self.touch_force
             progress = swing_progress(path, swung, measured, target, touches)
-        stumble = stumble_step(
-            state.stumble, progress, activity * self.stumble_lift, self.stumble_lag, dt)
+        lift = activity * self.stumble_lift
+        stumble = stumble_step(state.stumble, progress, lift, self.stumble_lag, dt)
         placement, (height, _) = triple(feedback.shift_in_base.tolist()), swing_height(swung)
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
         return compliant_offset_rate(stumble, rate, path_velocity, away), stumble

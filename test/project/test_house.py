@@ -1,0 +1,61 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The house: no rooms without doors, no folder or file too large to overlook, one home per idea."""
+
+from __future__ import annotations
+
+import ast
+
+import pytest
+from checkout import PACKAGE, ROOT, modules
+from house import reached
+
+MOST_FILES, MOST_LINES = 12, 350
+
+HOMES = {
+    'AndronovHopf': 'core.canonical.hopf',
+    'CouplingGraph': 'core.canonical.graph',
+    'CanonicalSystem': 'core.canonical.system',
+    'GaitNetwork': 'core.gait.network',
+    'SpringDamper': 'core.primitives.spring_damper',
+    'FirstOrderFilter': 'core.maths.first_order',
+    'minimum_jerk': 'core.primitives.demonstration',
+    'TickClock': 'core.clock',
+    'GRAVITY': 'core.maths.constants',
+    'SUITE_TABLE': 'suite_table',
+    'POSTURE_ROWS': 'layouts',
+    'parse_yaml': 'configuration',
+}
+"""Ideas by the name that defines them."""
+
+
+def definitions() -> dict[str, set[str]]:
+    """Modules that define a name at their top."""
+    found: dict[str, set[str]] = {}
+    for module, path in modules().items():
+        for node in ast.parse(path.read_text(encoding='utf-8')).body:
+            names = ([node.name] if isinstance(node, (ast.FunctionDef, ast.ClassDef)) else
+                     [target.id for target in getattr(node, 'targets', [getattr(node, 'target', 0)])
+                      if isinstance(target, ast.Name)])
+            for name in names:
+                found.setdefault(name, set()).add(module.removeprefix(f'{PACKAGE}.'))
+    return found
+
+
+def test_no_module_is_reached_by_tests_alone() -> None:
+    assert not set(modules()) - reached() - {f'{PACKAGE}.models'}  # data, found by its path
+
+
+@pytest.mark.parametrize('name', HOMES)
+def test_an_idea_has_one_home(name: str) -> None:
+    assert definitions().get(name) == {HOMES[name]}
+
+
+def test_folders_and_files_of_the_core_can_be_overlooked() -> None:
+    core = ROOT / PACKAGE / 'core'
+    for folder in {path.parent for path in core.rglob('*.py')}:
+        files = [path for path in folder.glob('*.py') if path.name != '__init__.py']
+        assert len(files) <= MOST_FILES, folder
+    long = {path.name: lines for path in core.rglob('*.py')
+            if (lines := len(path.read_text(encoding='utf-8').splitlines())) > MOST_LINES}
+    assert not long
