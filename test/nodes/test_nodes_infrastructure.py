@@ -681,7 +681,9 @@ def test_every_thread_of_a_process_is_scheduled_in_batches() -> None:
          'print({os.sched_getscheduler(int(t)) for t in os.listdir("/proc/self/task")}'
          ' == {os.SCHED_BATCH})\n'
          'event.set()'], capture_output=True, text=True, check=True, preexec_fn=_normal_policy)
-    assert told.stdout.split() == ['0', '2', '0', 'True']
+    normal, batch, again, all_are = told.stdout.split()
+    assert (normal, again, all_are) == ('0', '0', 'True')
+    assert int(batch) >= 2  # those of the numerical libraries, too
 
 
 def _normal_policy() -> None:

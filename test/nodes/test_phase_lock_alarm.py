@@ -53,12 +53,12 @@ def test_a_disturbed_oscillator_raises_an_alarm_and_its_return_ends_it(ros: Ros)
 
     run(20)
     assert not said(DiagnosticStatus.WARN, 'alarm')
-    node._x[2] = ahead @ node._x[2]                  # leg rl is suddenly 2 rad ahead
+    node._state.x[2] = ahead @ node._state.x[2]                  # leg rl is suddenly 2 rad ahead
     run(1)
     ros.spin_until(lambda: said(DiagnosticStatus.WARN, 'alarm: phase-lock error'))
     diagnostics.clear()
     for _ in range(30):                              # and something keeps it there
-        node._x[2] = ahead @ node._x[2]
+        node._state.x[2] = ahead @ node._state.x[2]
         run(1)
     ros.spin_until(lambda: said(DiagnosticStatus.ERROR, 'does not come back'))
     diagnostics.clear()
