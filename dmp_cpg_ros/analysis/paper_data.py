@@ -88,7 +88,8 @@ def local_dynamics(inhibited: bool, duration: float = 6.0, dt: float = 0.005) ->
     angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False) + 0.3
     start = np.concatenate([state_at(angles, 1.55), state_at(angles[::2], 0.08)])
     steps, count = round(duration / dt), len(start)
-    inhibition = Inhibition(inhibited, np.full(count, LOCAL_GAIN * inhibited), LOCAL_REGION)
+    # Not one stop of a network, where inhibited nodes act together: each state is on its own.
+    inhibition = Inhibition(False, np.full(count, LOCAL_GAIN * inhibited), LOCAL_REGION)
     target = state_at(np.zeros(count))
     of = OscillatorNetwork(HopfOscillators(count, LOCAL_OMEGA, LOCAL_RHO), target=target)
     trajectories = _simulated(of, start, steps, dt, inhibition).swapaxes(0, 1)
@@ -97,7 +98,7 @@ def local_dynamics(inhibited: bool, duration: float = 6.0, dt: float = 0.005) ->
     flat = states.reshape(-1, 2)
     everywhere = OscillatorNetwork(HopfOscillators(len(flat), LOCAL_OMEGA, LOCAL_RHO),
                                    target=state_at(np.zeros(len(flat))))
-    gains = Inhibition(inhibited, np.full(len(flat), LOCAL_GAIN * inhibited), LOCAL_REGION)
+    gains = Inhibition(False, np.full(len(flat), LOCAL_GAIN * inhibited), LOCAL_REGION)
     field = everywhere.field(flat, gains.acting_gains(flat, everywhere.target))
     return LocalDynamics(trajectories, grid, field.reshape(states.shape), target[0],
                          LOCAL_REGION * inhibited)

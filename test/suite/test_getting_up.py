@@ -60,7 +60,7 @@ def test_it_stands_up_from_its_belly_within_its_limits_and_never_sinks() -> None
     low = life.robot.description.belly_depth
     assert life.states[0].base_position_in_world[2] == pytest.approx(low, abs=2e-3)
     life.loop.request_mode('stand_up')
-    life.go(life.loop.body.movements.duration(('rise',)))
+    life.go(life.loop.body.modes.movements.duration(('rise',)))
     height = life.column('base_position_in_world')[:, 2]
     assert (np.diff(height) > -5e-4).all()
     life.go(0.8)
