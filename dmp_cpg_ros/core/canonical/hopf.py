@@ -87,6 +87,10 @@ class AndronovHopf:
         ndarray (..., 2)
             ẋ [1/s].
         """
+        if np.iscomplexobj(x):  # of a derivative by complex steps
+            growth = self.rho * (self.radius**2 - np.sum(x * x, axis=-1))
+            turned = x @ phase_generator().T
+            return np.asarray(np.asarray(omega)[..., None] * turned + growth[..., None] * x)
         z = np.ascontiguousarray(x).view(complex)[..., 0]
         linear = self.rho * self.radius**2 - 1j * omega
         rate = (linear - self.rho * (z.real * z.real + z.imag * z.imag)) * z
