@@ -116,7 +116,7 @@ clean: ## remove .venv and everything built; runs/ stays
 
 $(INSTALLED): $(READY) $(SOURCES)
 	@echo 'Installing dmp_cpg_ros into .venv ...'
-	@rm -rf $(BUILD) && mkdir -p $(BUILD)
+	@rm -rf $(BUILD) $(SITE)/dmp_cpg_ros && mkdir -p $(BUILD)  # no module that has moved stays behind
 	@printf '[build]\nbuild_base=%s\n[egg_info]\negg_base=%s\n' $(BUILD) $(BUILD) > $(DIST_EXTRA_CONFIG)
 	@$(PIP_INSTALL) --no-deps --force-reinstall .
 	@grep -q environment.sh $(BIN)/activate || { \
