@@ -375,7 +375,8 @@ def test_the_suite_walks_on_among_garbage(processes: Processes, ros: Ros) -> Non
     ros.spin_until(lambda: opener.get_subscription_count() > 0)
     opener.publish(Clock(clock=Time(sec=10_000)))
     ros.spin_until(lambda: bool(places))
-    assert ros.call(SetBool, 'inhibit', SetBool.Request(data=False)).success
+    # The service needs a tick of the oscillators and of the reference, which may come later.
+    ros.spin_until(lambda: ros.call(SetBool, 'inhibit', SetBool.Request(data=False)).success)
     command, rounds = Twist(), 0
     command.linear.x = 0.4
 
