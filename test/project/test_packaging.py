@@ -34,6 +34,7 @@ DEPENDENCIES = {
 }
 TEST_DEPENDENCIES = {
     'pytest': 'python3-pytest',
+    'pytest-xdist': 'python3-pytest-xdist',
     'hypothesis': 'python3-hypothesis',
     'ruff': 'python3-ruff-pip',
     'mypy': 'python3-mypy',

@@ -10,8 +10,9 @@ import copy
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -38,12 +39,18 @@ def proof(gait: GaitNetwork, inhibition: InhibitionParameters = P.inhibition,
     return found
 
 
-def settings(seed: int, share: tuple[float, float]
+REGIONAL = (901, 1704, 3450, 3472, 4154, 6203)
+"""Seeds of settings with little coupling that contract on a region alone and rest within 4 s; one
+in a thousand does."""
+
+
+def settings(seeds: Iterable[int], share: tuple[float, float]
              ) -> Iterator[tuple[GaitNetwork, InhibitionParameters, float, Certificate]]:
     """Random certified settings with a coupling gain in a range, as multiples of rho r^2."""
-    rng = np.random.default_rng(seed)
-    while True:
-        def some(low: float, high: float) -> float:
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+
+        def some(low: float, high: float, rng: np.random.Generator = rng) -> float:
             return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
         radius, growth = some(0.3, 1.6), some(0.5, 30.0)
@@ -76,14 +83,16 @@ def test_every_gait_has_a_proof_of_every_inequality(gait: str) -> None:
 
 
 def test_random_certified_settings_have_proofs() -> None:
-    for _, (gait, inhibition, tick, _) in zip(range(60), settings(1, (5.0, 100.0)), strict=False):
+    cases = settings(count(), (5.0, 100.0))
+    for _, (gait, inhibition, tick, _) in zip(range(60), cases, strict=False):
         check_proof.check(proof(gait, inhibition, tick))
 
 
 def test_settings_that_contract_on_a_region_alone_have_proofs() -> None:
-    regional = (case for case in settings(2, (1.5, 5.0))
-                if case[3].contraction_grade == 'regional' and case[3].time_to_rest < 4.0)
-    for _, (gait, inhibition, tick, _) in zip(range(8), regional, strict=False):
+    cases = list(settings(REGIONAL, (1.5, 5.0)))
+    assert len(cases) == len(REGIONAL)
+    for gait, inhibition, tick, certificate in cases:
+        assert certificate.contraction_grade == 'regional'
         found = proof(gait, inhibition, tick)
         assert found['witnesses']['half_planes']
         check_proof.check(found)
@@ -130,8 +139,7 @@ def mutated(found: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
 
 def test_mutated_proofs_are_refused() -> None:
     rng = np.random.default_rng(3)
-    regional = next(case for case in settings(2, (1.5, 5.0))
-                    if case[3].contraction_grade == 'regional' and case[3].time_to_rest < 4.0)
+    regional = next(settings(REGIONAL, (1.5, 5.0)))
     originals = [proof(network()), proof(network('trot', coupling_graph='directed_ring')),
                  proof(*regional[:3])]
     for original in originals:
