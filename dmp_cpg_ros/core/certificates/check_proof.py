@@ -20,9 +20,10 @@ def need(holds: bool, what: str) -> None:
 
 def read(value: Any) -> Any:
     """Fractions of strings, which must be in lowest terms."""
-    if isinstance(value, (list, dict)):
-        return ([read(one) for one in value] if isinstance(value, list) else
-                {key: read(one) for key, one in value.items()})
+    if isinstance(value, list):
+        return [read(one) for one in value]
+    if isinstance(value, dict):
+        return {key: read(one) for key, one in value.items()}
     need(isinstance(value, str) and str(F(value)) == value, f'{value!r} is no fraction')
     return F(value)
 
@@ -38,9 +39,14 @@ def root(x: F, square: F) -> F:
     return least(x, lambda y: y >= 0 and y * y >= square)
 
 
-def exp_below(x: F) -> F:
-    """Lower bound of the exponential of x >= 0."""
-    return (1 + x / 64 + x * x / 8192)**64
+def up(x: F) -> F:
+    """x, rounded upwards to 80 binary places."""
+    return -F(-x * 2**80 // 1, 2**80)
+
+
+def decay(x: F) -> F:
+    """Upper bound of exp(-x), x >= 0."""
+    return up((1 + x / 64 + x * x / 8192)**-64)
 
 
 def times(M: Any, v: Any) -> list[F]:
@@ -62,9 +68,17 @@ def laplacian(p: Any, held: int) -> list[list[F]]:
 
 def pull(p: Any, u: Any) -> list[F]:
     """What drives u_i outwards on the face u_i of the box, without inhibition."""
-    r, faces = p['radius'], [(d, max(-3 * d / 4, -p['radius'])) for d in u]
-    return [p['omega_max'] * r + max(F(0), p['rho'] * (-d * d - 2 * d * c) * (c + d)) - out
-            for (d, c), out in zip(faces, times(laplacian(p, 0), u), strict=True)]
+    r, inwards = p['radius'], times(laplacian(p, 0), u)
+    return [p['omega_max'] * r + max(F(0), p['rho'] * (-d * d - 2 * d * c) * (c + d)) - x
+            for d, x in zip(u, inwards, strict=True) for c in [max(-3 * d / 4, -r)]]
+
+
+def disagreement(p: Any, xi: Any, b: F) -> list[list[F]]:
+    """Symmetric part of P (L - b I), and b xi xi', with P = diag(xi) - xi xi'."""
+    P = [[x * ((i == j) - y) for j, y in enumerate(xi)] for i, x in enumerate(xi)]
+    PL = [times(zip(*laplacian(p, 0), strict=True), row) for row in P]
+    return [[(x + z) / 2 + b * (xi[i] * xi[j] - P[i][j]) for j, (x, z) in enumerate(
+        zip(row, (other[i] for other in PL), strict=True))] for i, row in enumerate(PL)]
 
 
 def turned(t: F) -> tuple[F, F]:
@@ -116,18 +130,18 @@ def time_to_rest(p: Any, w: Any, inner: Any, size: F, arc: F) -> F:
     fastest = p['omega_armed_max'] * r + F('0.385') * p['rho'] * r**3 + 2 * max(u) * max(
         row[i] for i, row in enumerate(laplacian(p, 1)))
     a, e = fastest / min(v), 2 * max(u) / min(v)
-    start, activity = w['arming_time'] + (F(710, 113) - arc) / slow, F(1)     # 355/113 > pi
-    speed = p['armed_speed'] / exp_below(p['alpha_r'] * (F(710, 113) - arc) / slow)
-    drive = p['omega_slope'] * r / (rate * min(v))
-    keep, fade, swing = (1 / exp_below(x * CELL) for x in (rate, p['alpha_r'], p['activity_rate']))
+    wait, activity = (F(710, 113) - arc) / slow, F(1)                          # 355/113 > pi
+    speed, drive = p['armed_speed'] * decay(p['alpha_r'] * wait), up(
+        p['omega_slope'] * r / (rate * min(v)))
+    keep, fade, swing = (decay(x * CELL) for x in (rate, p['alpha_r'], p['activity_rate']))
     for k in range(1000):
         lows = [max(x, size - e * y) for x, y in zip(inner, v, strict=True)]
         a, e = max(a, drive * p['alpha_r'] * speed), max(e, drive * speed)
         phase = max(a * y / x for x, y in zip(lows, v, strict=True)) if min(lows) > 0 else slow + 1
         if phase <= F('0.05') and speed <= F('0.01') and activity <= FEW:
-            return start + k * CELL + 6 * p['tick']
+            return w['arming_time'] + wait + k * CELL + 6 * p['tick']
         wanted = min(F(1), phase / slow)
-        activity, a, e, speed = (-F(-x * 2**80 // 1, 2**80) for x in (     # rounded upwards
+        activity, a, e, speed = map(up, (
             wanted + max(F(0), activity - wanted) * swing,
             drive * p['alpha_r'] * speed * (1 - keep) + a * keep,
             drive * speed * (1 - keep) + e * keep, speed * fade))
@@ -137,21 +151,19 @@ def time_to_rest(p: Any, w: Any, inner: Any, size: F, arc: F) -> F:
 def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
     """Both sides of every inequality."""
     r, r0, omega, tick = (p[x] for x in ('radius', 'region_radius', 'omega_max', 'tick'))
-    u, v, planes = w['u'], w['v'], w['half_planes']
+    u, v, b, D, xi, planes = (w[x] for x in ('u', 'v', 'connectivity', 'D', 'xi', 'half_planes'))
     L, gains, growth, N = laplacian(p, 0), p['gains'], p['rho'] * r * r, len(p['gains'])
     legs, found = [i for i, gain in enumerate(gains) if gain > 0], {}  # type: Any, Any
     numbers = {name: x for name, x in p.items() if name not in ('coupling', 'gains')}
     need(min(gains) >= 0 and max(p['omega_at_rest'], p['omega_armed_max']) <= omega and all(
         x > 0 or x == 0 and name in ('omega_slope', 'clearance', 'foot_speed', 'armed_speed')
-        for name, x in numbers.items()), 'parameters')
-    need(all(len(row) == N and min(row) >= 0 == row[i] for i, row in enumerate(p['coupling']))
-         and len(p['coupling']) == N and not any(map(sum, zip(*L, strict=True))), 'coupling')
+        for name, x in numbers.items()) and all(len(row) == N and min(row) >= 0 == row[i]
+                                                for i, row in enumerate(p['coupling'])), 'range')
     found['premises'] = F(0), sum(numbers.values()) + sum(gains) + sum(map(sum, p['coupling']))
-    b, D = w['connectivity'], w['D']
     T = [[*row, F(1)] + [F(0)] * (N - 1 - i) for i, row in enumerate(w['T'])]
-    S = [[(L[i][j] + L[j][i]) / 2 + 2 * b / N - b * (i == j) for j in range(N)] for i in range(N)]
-    need(min(D) >= 0 and S == [times(T, [x * d for x, d in zip(row, D, strict=True)])
-                               for row in T], 'factors of another matrix')
+    need(min(D) >= 0 < min(xi) and sum(xi) == 1 and disagreement(p, xi, b) == [
+        times(T, [x * d for x, d in zip(row, D, strict=True)]) for row in T],
+         'factors of another matrix')
     found['synchronisation'] = growth, b
     places = r * min(FEW, p['omega_at_rest'] / max(L[i][i] for i in range(N)))
     need(pull(p, u) == w['pull'] and all(
@@ -191,8 +203,8 @@ def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
     found['reference'], found['transformation'] = (F(0), rates[0]), (F(0), rates[3])
     found['hierarchy'] = F(0), 1 / sum(1 / x for x in rates)
     found['rest_posture'] = p['clearance'] * FEW, F(1, 100)
-    least(w['arming_time'], lambda x: x >= 0 and exp_below(
-        p['alpha_r'] * x) * p['armed_speed'] >= p['foot_speed'])
+    least(w['arming_time'], lambda x: x >= 0 and p['armed_speed'] >= p['foot_speed'] * decay(
+        p['alpha_r'] * x))
     found['time_to_rest'] = time_to_rest(p, w, inner, size, arc), F(10)
     return found
 

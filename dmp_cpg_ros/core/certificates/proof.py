@@ -103,8 +103,12 @@ def _witnesses(p: Values, analysis: NetworkAnalysis, regional: bool) -> Values:
     rest, fast, found = analysis.rest, analysis.rest_at_speed, analysis.found
     if rest is None or fast is None or not analysis.capture.holds:
         raise ValueError('there is no equilibrium, or C is left')
+    if found.weights is None:
+        raise ValueError('components of the graph follow one another')
     b = _down(found.connectivity * (1.0 - _ROUNDING))
-    T, D = _factors(p, b)
+    xi = [_down(share) for share in found.weights.tolist()[:-1]]
+    xi.append(Fraction(1 - sum(xi)))
+    T, D = _factors(exact.disagreement(p, xi, b))
     u = _box(p, analysis)
     planes = _half_planes(p, u) if regional else []
     rows = [plane['height'] for plane in planes]
@@ -112,7 +116,7 @@ def _witnesses(p: Values, analysis: NetworkAnalysis, regional: bool) -> Values:
              for i, d in enumerate(u)]
     v, rate, left = _shrinking(p, inner)
     w: Values = {
-        'connectivity': b, 'T': T, 'D': D, 'u': u, 'pull': exact.pull(p, u),
+        'connectivity': b, 'xi': xi, 'T': T, 'D': D, 'u': u, 'pull': exact.pull(p, u),
         'half_planes': planes, 'v': v, 'rate': rate, 'shrinks': left}
     r = p['radius']
     for name, at, equilibrium in (('fast', 'omega_max', fast), ('rest', 'omega_at_rest', rest)):
@@ -135,17 +139,14 @@ def _witnesses(p: Values, analysis: NetworkAnalysis, regional: bool) -> Values:
     # Where the lower bound (1 + x/64 + x²/8192)^64 of the exponential reaches the ratio.
     logarithm = 64.0 * (math.sqrt(2.0 * float(ratio)**(1.0 / 64.0) - 1.0) - 1.0)
     w['arming_time'] = _least(
-        logarithm / float(p['alpha_r']), lambda x: x >= 0 and exact.exp_below(
-            p['alpha_r'] * x) * p['armed_speed'] >= p['foot_speed'])
+        logarithm / float(p['alpha_r']), lambda x: x >= 0 and p['armed_speed'] >= (
+            p['foot_speed'] * exact.decay(p['alpha_r'] * x)))
     return w
 
 
-def _factors(p: Values, b: Fraction) -> tuple[list[list[Fraction]], list[Fraction]]:
-    """S = T diag(D) Tᵀ of S = L_s + (2b/N) 1 1ᵀ − b I, by elimination."""
-    L = exact.laplacian(p, 0)
-    N = len(L)
-    S = [[(L[i][j] + L[j][i]) / 2 + 2 * b / N - b * (i == j) for j in range(N)]
-         for i in range(N)]
+def _factors(S: list[list[Fraction]]) -> tuple[list[list[Fraction]], list[Fraction]]:
+    """T and D of S = T diag(D) Tᵀ, by elimination."""
+    N = len(S)
     T, D = [[Fraction(i == j) for j in range(N)] for i in range(N)], []
     for k in range(N):
         D.append(S[k][k])
