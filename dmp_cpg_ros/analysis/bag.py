@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import re
 from collections import Counter
@@ -17,9 +18,13 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2 import ReaderError
 from rosbags.typesys import Stores, get_typestore
 
+from dmp_cpg_ros.analysis import rescue
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 
 STORAGE_SUFFIXES = ('.mcap', '.db3')
+
+DIGESTED = ('canonical_state', 'joint_states', 'joint_targets')
+"""Topics whose payloads have digests."""
 
 
 def find_bag(path: Path | str) -> Path:
@@ -46,8 +51,7 @@ def find_bag(path: Path | str) -> Path:
             return folder
     raise DataError(
         f"'{path}' holds no rosbag2 recording; valid are a folder with *.mcap or *.db3, such a "
-        f"file, or a run's folder with such a folder bag/ inside"
-    )
+        "file, or a run's folder with such a folder bag/ inside")
 
 
 @contextmanager
@@ -82,9 +86,8 @@ def base_name(topic: str) -> str:
     return topic.rsplit('/', 1)[-1]
 
 
-def decoded(
-    reader: AnyReader, connections: Collection[Connection], skipped: Counter[str]
-) -> Iterator[tuple[Connection, int, Any]]:
+def decoded(reader: AnyReader, connections: Collection[Connection], skipped: Counter[str],
+            ) -> Iterator[tuple[Connection, int, Any]]:
     """Messages of some connections with their record times [ns], in the order of these.
 
     Parameters
@@ -137,13 +140,9 @@ def _readable(file: Path, bag: Path, stack: ExitStack) -> Path:
     try:
         _reader([file]).close()
         return file
-    except DataError as damage:
+    except DataError:
         if file.suffix != '.mcap':
             raise
-        try:
-            from dmp_cpg_ros.analysis import rescue
-        except ImportError as error:
-            raise DataError(f"{damage}; rescuing it needs the package '{error.name}'") from error
     if not rescue.is_closed(file):
         file = rescue.rescued(file, bag, stack)
     try:
@@ -155,3 +154,41 @@ def _readable(file: Path, bag: Path, stack: ExitStack) -> Path:
 
 def _storage_files(folder: Path) -> list[Path]:
     return sorted(file for file in folder.iterdir() if file.suffix in STORAGE_SUFFIXES)
+
+
+def payload_digests(path: Path | str) -> dict[str, str]:
+    """One SHA-256 per publisher over the message payloads as recorded, in their order.
+
+    Equal digests mean that every byte that was published is equal.
+
+    Parameters
+    ----------
+    path : path-like
+        Bag or run's folder.
+
+    Returns
+    -------
+    dict of str to str
+        Hexadecimal digests of ``joint_states``, ``canonical_state``, and ``joint_targets/fl``, …,
+        whose publisher is known by the leg that its first joint's name begins with.
+
+    Raises
+    ------
+    MissingFileError, DataError
+        If there is no readable bag.
+    """
+    hashes: dict[str, hashlib._Hash] = {}
+    with opened(find_bag(path)) as reader:
+        used = [c for c in reader.connections if base_name(c.topic) in DIGESTED]
+        for connection, _, raw in reader.messages(used) if used else ():
+            key = base_name(connection.topic)
+            if key != 'joint_states':
+                message = reader.deserialize(raw, connection.msgtype)
+            if key == 'joint_targets':  # one publisher per leg; they interleave as they like
+                key += f'/{message.name[0].split("_", 1)[0] if message.name else "unnamed"}'
+            elif key == 'canonical_state':
+                # Its texts change their length, and then the middleware leaves pieces of earlier
+                # messages in the alignment bytes; written anew they are zeros.
+                raw = bytes(reader.typestore.serialize_cdr(message, connection.msgtype))
+            hashes.setdefault(key, hashlib.sha256()).update(raw)
+    return {key: value.hexdigest() for key, value in sorted(hashes.items())}

@@ -33,7 +33,7 @@ def build_manifest(
     seeds : mapping, optional
         Every seed by name.
     digests : mapping, optional
-        As from :func:`~dmp_cpg_ros.analysis.digests.payload_digests`.
+        As from :func:`~dmp_cpg_ros.analysis.bag.payload_digests`.
     **facts
         Anything else that matters, such as ``scenario`` or ``mode``.
 

@@ -28,6 +28,8 @@ from mcap.writer import MCAP0_MAGIC, Writer
 from dmp_cpg_ros.configuration import numbered
 from dmp_cpg_ros.core.errors import DataError
 
+_LOG = logging.getLogger(__name__)
+
 ROS_SCHEMAS = ('ros2msg', 'ros2idl', 'omgidl')
 """Encodings of definitions that readers of ROS know."""
 
@@ -74,7 +76,7 @@ def rescued(file: Path, bag: Path, stack: ExitStack) -> Path:
     count = _copy(file, copy, ros_only=False)
     if lasting:
         copy = _settled(copy, bag.with_name(f'{bag.stem if bag.is_file() else bag.name}.rescued'))
-    _log().warning(
+    _LOG.warning(
         "'%s' was not closed: reading its %d complete messages from the %scopy '%s'",
         file, count, '' if lasting else 'temporary ', copy)
     return copy
@@ -90,12 +92,8 @@ def ros_part(file: Path, stack: ExitStack) -> Path:
     """
     copy = _scratch(None, stack) / file.name
     _copy(file, copy, ros_only=True)
-    _log().warning("'%s': leaving out what is not of ROS", file)
+    _LOG.warning("'%s': leaving out what is not of ROS", file)
     return copy
-
-
-def _log() -> logging.Logger:
-    return logging.getLogger(__name__)
 
 
 def _scratch(folder: Path | None, stack: ExitStack) -> Path:
@@ -114,57 +112,40 @@ def _settled(copy: Path, folder: Path) -> Path:
 def _copy(source: Path, target: Path, *, ros_only: bool) -> int:
     """Write what is complete in a file into a new one; returns the number of messages."""
     count = 0
+    schemas, channels = {0: 0}, dict[int, int]()  # numbers in the copy by those in the file
     try:
         with source.open('rb') as file, target.open('wb') as copy:
             _refuse_recording(file, source)
-            copier = _Copier(Writer(copy), ros_only)
+            writer = Writer(copy)
             for record in _complete_records(file):
-                count += copier.take(record)
-            copier.writer.finish()
+                match record:
+                    case Header():
+                        writer.start('ros2' if ros_only else record.profile)
+                    case Schema() if record.id not in schemas:
+                        if record.encoding in ROS_SCHEMAS or not ros_only:
+                            schemas[record.id] = writer.register_schema(
+                                record.name, record.encoding, record.data)
+                    case Channel() if record.id not in channels:
+                        known = record.message_encoding == 'cdr' and record.schema_id in schemas
+                        if known or not ros_only:
+                            channels[record.id] = writer.register_channel(
+                                record.topic, record.message_encoding, schemas[record.schema_id],
+                                record.metadata)
+                    case Message() if record.channel_id in channels:
+                        writer.add_message(channels[record.channel_id], record.log_time,
+                                           record.data, record.publish_time, record.sequence)
+                        count += 1
+                    case Attachment():
+                        writer.add_attachment(record.create_time, record.log_time, record.name,
+                                              record.media_type, record.data)
+                    case Metadata():
+                        writer.add_metadata(record.name, record.metadata)
+            writer.finish()
     except OSError as error:
         raise DataError(f"'{source}' cannot be rescued: {error}") from error
     if count == 0:
         raise DataError(f"'{source}' holds no complete message")
     return count
-
-
-class _Copier:
-    """Copies records into a writer, which numbers schemas and channels anew."""
-
-    def __init__(self, writer: Writer, ros_only: bool) -> None:
-        self.writer, self._ros_only = writer, ros_only
-        self._schemas, self._channels = {0: 0}, dict[int, int]()  # new numbers by old ones
-
-    def take(self, record: McapRecord) -> int:
-        """Copy a record; returns 1 for a message that was copied, 0 for everything else."""
-        writer = self.writer
-        if isinstance(record, Header):
-            writer.start('ros2' if self._ros_only else record.profile)
-        elif isinstance(record, Schema):
-            wanted = record.encoding in ROS_SCHEMAS or not self._ros_only
-            if wanted and record.id not in self._schemas:
-                self._schemas[record.id] = writer.register_schema(
-                    record.name, record.encoding, record.data)
-        elif isinstance(record, Channel):
-            if record.id not in self._channels and self._is_wanted(record):
-                self._channels[record.id] = writer.register_channel(
-                    record.topic, record.message_encoding, self._schemas[record.schema_id],
-                    record.metadata)
-        elif isinstance(record, Message):
-            if record.channel_id in self._channels:
-                writer.add_message(self._channels[record.channel_id], record.log_time, record.data,
-                                   record.publish_time, record.sequence)
-                return 1
-        elif isinstance(record, Attachment):
-            writer.add_attachment(record.create_time, record.log_time, record.name,
-                                  record.media_type, record.data)
-        elif isinstance(record, Metadata):
-            writer.add_metadata(record.name, record.metadata)
-        return 0
-
-    def _is_wanted(self, channel: Channel) -> bool:
-        return not self._ros_only or (
-            channel.message_encoding == 'cdr' and channel.schema_id in self._schemas)
 
 
 def _complete_records(file: BinaryIO) -> Iterator[McapRecord]:

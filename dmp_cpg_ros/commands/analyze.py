@@ -12,9 +12,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.analysis.bag import find_bag
+from dmp_cpg_ros.analysis.bag import find_bag, payload_digests
 from dmp_cpg_ros.analysis.context import find_parameter
-from dmp_cpg_ros.analysis.digests import payload_digests
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.manifest import build_manifest

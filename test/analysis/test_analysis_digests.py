@@ -17,7 +17,7 @@ from rosbags.rosbag2 import Writer
 from synthetic_bag import STORE, write_bag
 from synthetic_walk import SyntheticWalk
 
-from dmp_cpg_ros.analysis.digests import payload_digests
+from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.manifest import build_manifest
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import to_json

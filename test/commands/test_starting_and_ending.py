@@ -15,7 +15,7 @@ import rclpy
 import ros_processes
 from ros_processes import NodeProcess, Processes, Ros, wait_until
 
-from dmp_cpg_ros.analysis.digests import payload_digests
+from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.suite_run import alone_in_domain
 from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError

@@ -22,8 +22,7 @@ pytest.importorskip('rclpy')
 import ros_processes
 from ros_processes import NodeProcess, Processes
 
-from dmp_cpg_ros.analysis.bag import opened
-from dmp_cpg_ros.analysis.digests import payload_digests
+from dmp_cpg_ros.analysis.bag import opened, payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario
 from dmp_cpg_ros.core.loop import WalkingLoop
