@@ -8,9 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -57,19 +54,14 @@ class RunContext:
             return USUAL_CONTACT_FORCE
         return CONTACT_WEIGHT_SHARE * self.robot.mass * 9.81
 
-    @property
-    def phase_offsets(self) -> NDArray[np.float64] | None:
-        """Phases of the legs relative to fl that the gait plans, ndarray (4,) [rad]."""
-        return None if self.gait is None else self.gait.phases
-
 
 def find_parameter(parameters: Mapping[str, Any] | None, name: str, default: Any = None) -> Any:
     """Value of a parameter wherever it stands in nested mappings."""
     for key, value in (parameters or {}).items():
-        if key == name and not isinstance(value, Mapping):
-            return value
         if isinstance(value, Mapping):
-            found = find_parameter(value, name)
-            if found is not None:
-                return found
+            value = find_parameter(value, name)
+        elif key != name:
+            continue
+        if value is not None:
+            return value
     return default

@@ -4,17 +4,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.motion import stretches
-from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
+from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.canonical.phase import phase
-
-Array = NDArray[np.float64]
 
 STOPPING = ('waiting', 'captured', 'at_rest')
 RUNNING = ('free', 'walking')
@@ -33,8 +31,7 @@ MOVING = 0.02
 """Reference speed [m/s] or turn rate [rad/s] above which the robot is meant to move."""
 
 
-@dataclass(frozen=True)
-class Episode:
+class Episode(NamedTuple):
     """Consecutive inhibition states of one kind.
 
     Attributes
@@ -58,19 +55,11 @@ class Episode:
 
 def episodes(recording: Recording, words: tuple[str, ...]) -> list[Episode]:
     """Longest stretches in which the inhibition's state is one of ``words``."""
-    found: list[Episode] = []
-    current: list[StatusEvent] = []
-    for event in recording.inhibition:
-        if event.message in words:
-            current.append(event)
-        elif current:
-            found.append(Episode(current[0].time, event.time, tuple(current)))
-            current = []
-    if current:
-        found.append(
-            Episode(current[0].time, max(recording.span[1], current[-1].time), tuple(current))
-        )
-    return found
+    events = recording.inhibition
+    times = [event.time for event in events]
+    times.append(max([recording.span[1], *times[-1:]]))
+    return [Episode(times[first], times[past], events[first:past]) for first, past in stretches(
+        np.array([event.message in words for event in events], dtype=bool))]
 
 
 def requested_stops(recording: Recording) -> list[Episode]:
@@ -96,10 +85,8 @@ def within(time: Array, intervals: list[tuple[float, float]]) -> NDArray[np.bool
 
 def changing_intervals(recording: Recording) -> list[tuple[float, float]]:
     """Intervals in which gaits changed [s]."""
-    gaits, time = recording.canonical.gaits, recording.canonical.time
-    if not gaits:
-        return []
-    changing = np.array([bool(gait.after) for gait in gaits])
+    time = recording.canonical.time
+    changing = np.array([gait.after != '' for gait in recording.canonical.gaits], dtype=bool)
     return [(float(time[first]), float(time[min(past, len(time) - 1)]))
             for first, past in stretches(changing)]
 

@@ -4,25 +4,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.motion import held
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.transformation.leg import body_scale
 
-Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class GaitRow:
+class GaitRow(NamedTuple):
     """Rows of the canonical states in one gait, or one row of a blend.
 
     Attributes
@@ -50,10 +47,8 @@ def gait_rows(recording: Recording, context: RunContext) -> list[GaitRow] | None
     known = KnownGaits({**context.gaits, context.gait.name: context.gait})
     borders = [0, *(k for k in range(1, count) if shares[k] != shares[k - 1]), count]
     try:
-        return [
-            GaitRow(slice(first, past), known.in_force(shares[first]))
-            for first, past in zip(borders, borders[1:], strict=False)
-        ]
+        return [GaitRow(slice(first, past), known.in_force(shares[first]))
+                for first, past in zip(borders, borders[1:], strict=False)]
     except DataError:
         return None
 
@@ -64,8 +59,8 @@ def phase_offsets(recording: Recording, context: RunContext) -> Array | None:
     if found is None:
         return None
     offsets = np.empty((len(recording.canonical.time), 4))
-    for entry in found:
-        offsets[entry.rows] = entry.gait.phases
+    for rows, gait in found:
+        offsets[rows] = gait.phases
     return offsets
 
 
@@ -81,15 +76,12 @@ def planned_stance(recording: Recording, context: RunContext) -> tuple[NDArray[n
     found, reference = gait_rows(recording, context), recording.reference
     if found is None or context.robot is None or not reference.time.size:
         return np.zeros((0, 4), dtype=bool), np.zeros(0)
-    scale = body_scale(context.robot)
-    phi = phase(recording.canonical.x)
-    speeds = [
-        scale.foot_speed(*value)
-        for value in held(reference.time, reference.value, recording.canonical.time)]
+    scale, phi = body_scale(context.robot), phase(recording.canonical.x)
+    r = held(reference.time, reference.value, recording.canonical.time)
     duty, position = np.empty(len(phi)), np.empty(phi.shape)
-    for entry in found:
-        duty[entry.rows] = [entry.gait.duty(speed, scale) for speed in speeds[entry.rows]]
-        position[entry.rows] = entry.gait.cycle_position(phi[entry.rows])
+    for rows, gait in found:
+        duty[rows] = [gait.duty(scale.foot_speed(*value), scale) for value in r[rows]]
+        position[rows] = gait.cycle_position(phi[rows])
     return np.abs(position) >= 0.5 * (1.0 - duty[:, None]), duty
 
 

@@ -1,15 +1,20 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Queries on body motion and on time series in general."""
+"""Motion of the base and the feet, and the averages and stretches of what was recorded."""
 
 from __future__ import annotations
+
+from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis.recording import OdometrySeries
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.recording import Array, OdometrySeries, Recording, Series, taken
+from dmp_cpg_ros.core.robot_model import world
+from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 
 def rotations(quaternion: Array) -> Array:
@@ -70,20 +75,17 @@ def integral(time: Array, values: Array) -> Array:
 
 def mean_between(time: Array, values: Array, start: float, end: float) -> Array:
     """Time averages of (n, k) over [start, end], ndarray (k,)."""
-    running = integral(time, values)
-    ends = [np.array([np.interp(t, time, column) for column in running.T]) for t in (start, end)]
-    return (ends[1] - ends[0]) / (end - start)
+    ends = np.array([np.interp((start, end), time, of) for of in integral(time, values).T])
+    return (ends[:, 1] - ends[:, 0]) / (end - start)
 
 
 def smoothed(time: Array, values: Array, window: float) -> Array:
     """Centred moving average over a window [s], narrower at the ends, which stay."""
     if len(time) < 3:
         return values
-    n = len(time)
-    index = np.arange(n)
-    half = np.minimum(
-        round(0.5 * window / float(np.median(np.diff(time)))), np.minimum(index, n - 1 - index)
-    )
+    index = np.arange(len(time))
+    half = np.minimum(round(0.5 * window / float(np.median(np.diff(time)))),
+                      np.minimum(index, index[::-1]))
     running = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
     width = (2 * half + 1).reshape(-1, *(1,) * (values.ndim - 1))
     return (running[index + half + 1] - running[index - half]) / width
@@ -96,13 +98,97 @@ def root_mean_square(values: Array) -> list[float]:
 
 def common_rows(*times: Array) -> list[NDArray[np.int64]]:
     """Rows of several series that bear the same stamps."""
-    common = times[0]
-    for time in times[1:]:
-        common = np.intersect1d(common, time)
+    common = reduce(np.intersect1d, times)
     return [np.searchsorted(time, common) for time in times]
+
+
+def matched(*series: Series) -> list[Any]:
+    """Several series, each reduced to the rows with stamps that all of them have."""
+    rows = common_rows(*(of.time for of in series))
+    return [taken(of, own) for of, own in zip(series, rows, strict=True)]
 
 
 def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Stretches in which a mask (n,) holds: their first rows and the rows past their last."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     return [(int(first), int(past)) for first, past in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def foot_slip(recording: Recording, robot: RobotDescription, contact_force: float) -> Array | None:
+    """Distance that each foot's contact point slid horizontally while it carried load.
+
+    The contact point is the lowest point of the foot's sphere: a foot that rolls without sliding
+    does not slip.
+
+    Parameters
+    ----------
+    recording : Recording
+        Needs joints, odometry and foot forces.
+    robot : RobotDescription
+        Leg geometry.
+    contact_force : float
+        Load from which a foot counts as standing [N].
+
+    Returns
+    -------
+    ndarray (4,) or None
+        [m]; None where a topic is missing.
+    """
+    joints, odometry, feet = matched(recording.joints, recording.odometry, recording.feet)
+    if len(joints.time) < 2:
+        return None
+    R, dt = rotations(odometry.quaternion), np.diff(joints.time)[:, None]
+    slips = []
+    for i, leg in enumerate(robot.legs):
+        q, q_dot = (of[:, 3 * i : 3 * i + 3] for of in (joints.position, joints.velocity))
+        rate = np.einsum(
+            'nij,nj->ni', R, odometry.rate_in_base + shank_rate_in_base(leg, q, q_dot))
+        rolling = leg.foot_radius * np.stack([rate[:, 1], -rate[:, 0]], axis=1)  # ω × (radius ẑ)
+        rolled = 0.5 * (rolling[1:] + rolling[:-1]) * dt
+        steps = np.hypot(*(np.diff(feet_in_world(leg, q, odometry)[:, :2], axis=0) - rolled).T)
+        loaded = feet.force[:, i] > contact_force
+        slips.append(steps[loaded[1:] & loaded[:-1]].sum())
+    return np.array(slips)
+
+
+def feet_in_world(leg: LegGeometry, q: Array, odometry: OdometrySeries) -> Array:
+    """Places of a leg's foot, (n, 3) [m], of its joint angles (n, 3) and the base at each."""
+    return odometry.position_in_world + np.einsum(
+        'nij,nj->ni', rotations(odometry.quaternion), feet_in_base(leg, q))
+
+
+def feet_in_base(leg: LegGeometry, q: Array) -> Array:
+    """Foot positions of a leg's joint angles: (n, 3) → (n, 3) [m]."""
+    kinematics = LegKinematics(leg)
+    return np.array([kinematics.foot_in_base(row) for row in q]).reshape(-1, 3)
+
+
+def shank_rate_in_base(leg: LegGeometry, q: Array, q_dot: Array) -> Array:
+    """Angular velocity of the shank relative to the base: (n, 3), (n, 3) → (n, 3) [rad/s]."""
+    rolling, pitching = leg.axis_sign[0] * q_dot[:, 0], q_dot[:, 1:] @ leg.axis_sign[1:]
+    angle = leg.axis_sign[0] * q[:, 0]
+    return np.stack([rolling, np.cos(angle) * pitching, np.sin(angle) * pitching], axis=1)
+
+
+def height_over_ground(odometry: OdometrySeries, context: RunContext) -> Array:
+    """Height of the base over the ground below its hips.
+
+    Parameters
+    ----------
+    odometry : OdometrySeries
+        The base's way.
+    context : RunContext
+        World and robot; without a robot the ground below the base's origin is taken.
+
+    Returns
+    -------
+    ndarray (n,)
+        [m]
+    """
+    place = odometry.position_in_world
+    if context.world.is_flat or not place.size:
+        return place[:, 2]
+    legs = () if context.robot is None else context.robot.legs
+    hips = np.array([leg.hip_in_base for leg in legs] or [np.zeros(3)])
+    hips_in_world = place[:, None] + np.einsum('nij,lj->nli', rotations(odometry.quaternion), hips)
+    return world.height_over_ground(context.world, place, hips_in_world)

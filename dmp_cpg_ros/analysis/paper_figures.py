@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
 
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.motion import stretches
 from dmp_cpg_ros.analysis.paper_data import LocalDynamics, VanDerPolData
 from dmp_cpg_ros.core.gait.gait import Gait
 
@@ -100,12 +99,9 @@ def gait_figure(gait: Gait, duty: float) -> Figure:
     figure, axes = style.new_figure(1.9)
     panel: Axes = axes[0, 0]
     cycle = np.linspace(0.0, 2.0, 2001)
-    for row, lag in enumerate(gait.lag):
-        # fl touches down at cycle 0
-        position = (cycle - lag + 0.5 * (1.0 - duty) + 0.5) % 1.0 - 0.5
-        stance = np.abs(position) >= 0.5 * (1.0 - duty)
-        bars = [(cycle[a], cycle[b - 1] - cycle[a]) for a, b in stretches(stance)]
-        style.leg_bars(panel, row, bars, 0.7)
+    swing = 0.5 * (1.0 - duty)
+    position = (cycle[:, None] - np.array(gait.lag) + swing + 0.5) % 1.0 - 0.5  # fl lands at 0
+    style.leg_bars(panel, cycle, np.abs(position) >= swing, 0.7)
     style.leg_rows(panel)
     panel.set(xlabel='cycle', xlim=(0.0, 2.0),
               title=f'{gait.name}: feet on the ground, duty factor {duty:.2f}')

@@ -8,15 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis.foot_motion import foot_slip
+from dmp_cpg_ros.analysis import motion
 from dmp_cpg_ros.analysis.metrics.stops import STILL_SPEED
-from dmp_cpg_ros.analysis.motion import tilt, velocity_in_world
-from dmp_cpg_ros.analysis.recording import OdometrySeries, Recording, taken
+from dmp_cpg_ros.analysis.recording import Recording, taken
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-
-Array = NDArray[np.float64]
 
 STANDING_WINDOW = 0.5
 """Time at the end of the hold in which the robot must stand still [s]."""
@@ -103,29 +99,24 @@ def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float)
         Without what the oscillators and the resume tell.
     """
     odometry = hold.odometry
+    time, path = odometry.time - odometry.time[0], odometry.position_in_world[:, :2]
     speed = np.linalg.norm(odometry.velocity_in_base, axis=1)
-    time = odometry.time - odometry.time[0]
     last = time > time[-1] - STANDING_WINDOW
     still, loaded = speed[last] < STILL_SPEED, hold.feet.force[last] > contact_force
     moving = np.flatnonzero(speed >= STILL_SPEED)
     rest = min(moving[-1] + 1, len(time) - 1) if moving.size else 0
-    path = odometry.position_in_world[: rest + 1, :2]
-    until_rest = Recording(
-        joints=taken(hold.joints, slice(rest + 1)), odometry=taken(odometry, slice(rest + 1)),
-        feet=taken(hold.feet, slice(rest + 1)))
-    slip = foot_slip(until_rest, robot, contact_force)
+    until_rest = Recording(**{name: taken(getattr(hold, name), slice(rest + 1))
+                              for name in ('joints', 'odometry', 'feet')})
+    slip = motion.foot_slip(until_rest, robot, contact_force)
+    velocity = motion.velocity_in_world(odometry)[:, :2]
+    rows = round(DECELERATION_WINDOW / float(np.diff(time).mean()))
+    change = np.hypot(*(velocity[rows:] - velocity[:-rows]).T)
     return StopOutcome(
         fell=False, standing=bool(still.all() and loaded.all()), body_rest_s=float(time[rest]),
         slip_m=0.0 if slip is None else float(slip.mean()),
-        displacement_m=float(np.hypot(*(path[-1] - path[0]))),
-        tilt=float(tilt(odometry.quaternion).max()), deceleration=_deceleration(odometry))
-
-
-def _deceleration(odometry: OdometrySeries) -> float:
-    velocity = velocity_in_world(odometry)[:, :2]
-    rows = round(DECELERATION_WINDOW / float(np.diff(odometry.time).mean()))
-    change = velocity[rows:] - velocity[:-rows]
-    return float(np.hypot(*change.T).max() / DECELERATION_WINDOW)
+        displacement_m=float(np.hypot(*(path[rest] - path[0]))),
+        tilt=float(motion.tilt(odometry.quaternion).max()),
+        deceleration=float(change.max() / DECELERATION_WINDOW))
 
 
 @dataclass(frozen=True)
@@ -146,7 +137,7 @@ class StopSummary:
 
     def spread(self, name: str) -> tuple[float, float]:
         """Median and worst of a number, such as ``slip_m``; NaN where no outcome has it."""
-        upright = [outcome for outcome in self.outcomes if not outcome.fell]
-        values = np.array([getattr(outcome, name) for outcome in upright])
+        values = np.array([getattr(outcome, name) for outcome in self.outcomes
+                           if not outcome.fell])
         values = values[np.isfinite(values)]
         return (float(np.median(values)), float(values.max())) if values.size else (np.nan, np.nan)

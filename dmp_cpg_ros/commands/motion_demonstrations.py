@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.bag import find_bag
 from dmp_cpg_ros.analysis.context import find_parameter
-from dmp_cpg_ros.analysis.foot_motion import feet_in_base
 from dmp_cpg_ros.analysis.gait_in_force import GaitRow, gait_rows
 from dmp_cpg_ros.analysis.loading import load_recording
-from dmp_cpg_ros.analysis.motion import common_rows, held, rotations, stretches
+from dmp_cpg_ros.analysis.motion import common_rows, feet_in_base, held, rotations, stretches
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.commands.analyze import read_json
 from dmp_cpg_ros.commands.run_knowledge import run_context

@@ -14,9 +14,8 @@ from synthetic_walk import BELIEVED, MASS, SyntheticWalk, robot
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.facts import facts
-from dmp_cpg_ros.analysis.foot_motion import feet_in_base, foot_slip, shank_rate_in_base
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
-from dmp_cpg_ros.analysis.motion import rotations
+from dmp_cpg_ros.analysis.motion import feet_in_base, foot_slip, rotations, shank_rate_in_base
 from dmp_cpg_ros.analysis.recording import (
     FootForceSeries,
     JointSeries,

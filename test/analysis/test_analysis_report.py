@@ -20,7 +20,7 @@ from synthetic_walk import SyntheticWalk, robot
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.figures.catalogue import CATALOGUE, write_figures
-from dmp_cpg_ros.analysis.figures.footfall import planned_stance
+from dmp_cpg_ros.analysis.figures.over_time import planned_stance
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw

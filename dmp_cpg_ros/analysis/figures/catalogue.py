@@ -5,27 +5,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.figures import (
-    footfall,
-    over_time,
-    path,
-    phase_portrait,
-    style,
-    timing,
-    torques,
-)
+from dmp_cpg_ros.analysis.figures import over_time, plane, style
 from dmp_cpg_ros.analysis.recording import Recording
 
 
-@dataclass(frozen=True)
-class FigureEntry:
+class FigureEntry(NamedTuple):
     """A figure of the report.
 
     Attributes
@@ -57,19 +48,19 @@ CATALOGUE = (
         'The four oscillators across the addition and the removal of sparse inhibition. Only the '
         'inhibited leg feels it; the coupling brings the other three to rest near their places.'),
     FigureEntry(
-        'phase_portrait', 'Phase portrait', phase_portrait.draw,
+        'phase_portrait', 'Phase portrait', plane.phase_portrait,
         'The first stop in the plane of the oscillators. Left: the inhibited oscillator runs on '
         'its limit cycle until inhibition is armed and it enters the region C, where it is held '
         'near its target. Middle: close-up of C; the small distance at which it rests is the '
         'pull of the other oscillators over the gain. Right: all four legs; dots mark where they '
         'rest, rings their places in the gait.'),
     FigureEntry(
-        'footfall', 'Footfall', footfall.draw,
+        'footfall', 'Footfall', over_time.footfall,
         'Bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles '
         'of steady walking. Bottom: the first stop and the start after it; at rest all four bars '
         'should be unbroken.'),
     FigureEntry(
-        'path', 'Path', path.draw,
+        'path', 'Path', plane.path,
         'The base from above. Small dots are footholds, one for each stance; squares mark where '
         'the robot stood still, arrows its heading every two seconds.'),
     FigureEntry(
@@ -87,12 +78,12 @@ CATALOGUE = (
         "contacts, minus the simulator's truth: velocity in the base, tilt, and yaw, which "
         'nothing it has can correct.'),
     FigureEntry(
-        'torques', 'Joint torques', torques.draw,
+        'torques', 'Joint torques', over_time.torques,
         'Left: three cycles of steady walking; grey lines are the limits where they are in view. '
         'Right: the whole run as share of the limit; bars reach to the 99th percentile, ticks '
         'mark the largest value.'),
     FigureEntry(
-        'timing', 'Timing', timing.draw,
+        'timing', 'Timing', over_time.timing,
         'Top: what the robot measured of itself, control rate and latency from a state to the '
         'last of the four targets that answer it. Bottom, where the recording bears wall time: '
         'how far apart the states reached the recorder, and how long after a state the last '

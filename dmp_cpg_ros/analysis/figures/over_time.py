@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Figures over time: targets, oscillators, speeds, attitude of the body and its estimate.
+"""Figures whose horizontal axis is time.
 
 Each function draws from a recording and its context, and returns None when the recording lacks
 what it needs.
@@ -11,51 +11,60 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
+from dmp_cpg_ros.analysis import episodes, gait_in_force, motion
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import MOVING, gait_period
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.foot_motion import height_over_ground
 from dmp_cpg_ros.analysis.metrics.estimation import estimate_errors
 from dmp_cpg_ros.analysis.metrics.tracking import body_motion
-from dmp_cpg_ros.analysis.motion import integral, roll_pitch_yaw, smoothed
-from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG
+from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent, taken
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.suite_table import ROBOT
 
 SPEEDS = ('forward speed $v$ [m/s]', 'lateral speed [m/s]', 'turn rate $\\gamma$ [rad/s]')
 COMMANDED: Any = {'color': style.ORANGE, 'linestyle': (0, (1, 1.2))}
 FILTERED: Any = {'color': style.REFERENCE, 'linestyle': style.DASHED}
+ASKED_FOR: Any = {'color': style.INK, 'linestyle': style.DASHED}
+LIMIT: Any = {'color': style.GREY, 'linestyle': style.DASHED, 'linewidth': 0.9}
 COLOURS = (style.BLUE, style.ORANGE, style.VIOLET)
+MEDIAN, LATE = '#0072B2', '#D55E00'
+
+CYCLES, CYCLES_OF_TORQUE = 6, 3
+"""Gait cycles of steady walking that are drawn."""
 
 
 def target_kinematics(recording: Recording, context: RunContext) -> Figure | None:
     """Hip and knee targets across a stop and a start (paper, fig. 5, TargetKinematics)."""
-    targets, window = recording.targets, style.stop_window(recording)
-    rows = style.rows_in(targets.time, window)
-    if not rows.any():
-        return None
     joints = ('hip', 'knee')
-    figure, panels, shades = style.time_panels(
-        recording, 3.6, [f'{joint} target [rad]' for joint in joints], window)
-    for panel, joint in zip(panels, joints, strict=True):
-        angles = targets.position[rows, JOINTS_OF_LEG.index(joint)::3]
-        style.plot_legs(panel, targets.time[rows], angles)
-    style.leg_legend(figure, shades)
-    return figure
+    return _legs_across_stop(recording, recording.targets.time, {
+        f'{joint} target [rad]': recording.targets.position[:, JOINTS_OF_LEG.index(joint)::3]
+        for joint in joints})
 
 
 def canonical_states(recording: Recording, context: RunContext) -> Figure | None:
     """Canonical states across inhibition and release (paper, fig. 7, OscillatorStates)."""
-    canonical, window = recording.canonical, style.stop_window(recording)
-    rows = style.rows_in(canonical.time, window)
+    x = recording.canonical.x
+    return _legs_across_stop(
+        recording, recording.canonical.time,
+        {'$x_{i1}$ [–]': x[..., 0], '$x_{i2}$ [–]': x[..., 1]}, 1.25 * context.radius)
+
+
+def _legs_across_stop(recording: Recording, time: Array, values: dict[str, Array],
+                      reach: float | None = None) -> Figure | None:
+    """One panel for each of some values (n, 4) of the legs."""
+    window = style.stop_window(recording)
+    rows = style.rows_in(time, window)
     if not rows.any():
         return None
-    figure, panels, shades = style.time_panels(
-        recording, 3.6, ('$x_{i1}$ [–]', '$x_{i2}$ [–]'), window)
-    for component, panel in enumerate(panels):
-        style.plot_legs(panel, canonical.time[rows], canonical.x[rows, :, component])
-        panel.set_ylim(-1.25 * context.radius, 1.25 * context.radius)
+    figure, panels, shades = style.time_panels(recording, 3.6, list(values), window)
+    for panel, of_legs in zip(panels, values.values(), strict=True):
+        style.plot_legs(panel, time[rows], of_legs[rows])
+        if reach:
+            panel.set_ylim(-reach, reach)
     style.leg_legend(figure, shades)
     return figure
 
@@ -65,22 +74,21 @@ def speed_tracking(recording: Recording, context: RunContext) -> Figure | None:
     odometry, commands, reference = recording.odometry, recording.commands, recording.reference
     if odometry.time.size < 3:
         return None
-    motion = body_motion(recording)
-    mean = smoothed(odometry.time, motion, gait_period(recording) or 0.5)
-    lateral = reference.time.size and np.abs(reference.value[:, 1]).max() > MOVING
+    measured = body_motion(recording)
+    mean = motion.smoothed(odometry.time, measured, episodes.gait_period(recording) or 0.5)
+    lateral = reference.time.size and np.abs(reference.value[:, 1]).max() > episodes.MOVING
     columns = (0, 1, 2) if lateral else (0, 2)
     figure, panels, shades = style.time_panels(
         recording, 1.6 * len(columns) + 0.6, [SPEEDS[column] for column in columns])
-    for panel, column in zip(panels, columns, strict=True):
-        panel.plot(
-            odometry.time, motion[:, column], color=style.MEASURED, alpha=0.28, linewidth=0.6)
-        panel.plot(odometry.time, mean[:, column], color=style.MEASURED, linewidth=1.5)
-        panel.step(
-            commands.time, commands.value[:, column], where='post', linewidth=1.0, **COMMANDED)
-        panel.plot(reference.time, reference.value[:, column], linewidth=1.0, **FILTERED)
+    look: Any = {'color': style.MEASURED}
+    for panel, k in zip(panels, columns, strict=True):
+        panel.plot(odometry.time, measured[:, k], alpha=0.28, linewidth=0.6, **look)
+        panel.plot(odometry.time, mean[:, k], linewidth=1.5, **look)
+        panel.step(commands.time, commands.value[:, k], where='post', linewidth=1.0, **COMMANDED)
+        panel.plot(reference.time, reference.value[:, k], linewidth=1.0, **FILTERED)
     style.legend(figure, [
         style.key('command', **COMMANDED), style.key('reference', **FILTERED),
-        style.key('measured', color=style.MEASURED, linewidth=1.5), *shades])
+        style.key('measured', linewidth=1.5, **look), *shades])
     return figure
 
 
@@ -89,24 +97,23 @@ def attitude(recording: Recording, context: RunContext) -> Figure | None:
     odometry, reference = recording.odometry, recording.reference
     if odometry.time.size < 2:
         return None
-    roll, pitch, yaw = np.rad2deg(roll_pitch_yaw(odometry.quaternion)).T
+    roll, pitch, yaw = np.rad2deg(motion.roll_pitch_yaw(odometry.quaternion)).T
+    height = 100.0 * motion.height_over_ground(odometry, context)
     figure, (tilts, heights, yaws), shades = style.time_panels(
         recording, 4.6, ('tilt [°]', 'height [cm]', 'yaw [°]'))
-    asked_for: Any = {'color': style.INK, 'linewidth': 0.9, 'linestyle': style.DASHED}
-    tilts.plot(odometry.time, roll, color=style.BLUE, linewidth=0.9)
-    tilts.plot(odometry.time, pitch, color=style.ORANGE, linewidth=0.9)
-    heights.plot(odometry.time, 100.0 * height_over_ground(odometry, context),
-                 color=style.VIOLET, linewidth=0.9)
-    if context.robot is not None:
-        heights.axhline(100.0 * context.robot.stance_height, **asked_for)
+    for panel, values, colour in (
+            (tilts, roll, style.BLUE), (tilts, pitch, style.ORANGE),
+            (heights, height, style.VIOLET)):
+        panel.plot(odometry.time, values, color=colour, linewidth=0.9)
     yaws.plot(odometry.time, yaw, color=style.VIOLET)
+    if context.robot is not None:
+        heights.axhline(100.0 * context.robot.stance_height, linewidth=0.9, **ASKED_FOR)
     if reference.time.size > 1:
-        turned = np.rad2deg(integral(reference.time, reference.value[:, 2]))
-        yaws.plot(reference.time, turned + yaw[0], **asked_for)
+        turned = np.rad2deg(motion.integral(reference.time, reference.value[:, 2]))
+        yaws.plot(reference.time, turned + yaw[0], linewidth=0.9, **ASKED_FOR)
     style.legend(figure, [
-        style.key('roll', color=style.BLUE), style.key('pitch', color=style.ORANGE),
-        style.key('height, yaw', color=style.VIOLET),
-        style.key('asked for', color=style.INK, linestyle=style.DASHED), *shades])
+        *style.keys(('roll', 'pitch', 'height, yaw'), COLOURS),
+        style.key('asked for', **ASKED_FOR), *shades])
     return figure
 
 
@@ -123,6 +130,133 @@ def estimation(recording: Recording, context: RunContext) -> Figure | None:
     for axis, color in enumerate(COLOURS[:2]):
         tilts.plot(errors.time, np.rad2deg(errors.tilt[:, axis]), color=color, linewidth=0.9)
     yaws.plot(errors.time, np.rad2deg(errors.yaw), color=COLOURS[2])
-    style.legend(figure, [style.key(label, color=color) for label, color in zip(
-        ('x, roll', 'y, pitch', 'z, yaw'), COLOURS, strict=True)] + shades)
+    style.legend(figure, [*style.keys(('x, roll', 'y, pitch', 'z, yaw'), COLOURS), *shades])
     return figure
+
+
+def footfall(recording: Recording, context: RunContext) -> Figure | None:
+    """Feet on the ground in steady walking and across the first stop."""
+    feet = recording.feet
+    if not feet.time.size:
+        return None
+    steady, stop = _steady_window(recording, CYCLES), style.stop_window(recording)
+    windows = [stop] if steady is None else [steady, stop]
+    contact, planned = feet.force > context.contact_force, planned_stance(recording, context)
+    figure, axes = style.new_figure(1.75 * len(windows) + 0.5, len(windows))
+    for panel, window in zip(axes[:, 0], windows, strict=True):
+        if planned is not None:
+            style.leg_bars(panel, recording.canonical.time, planned, 0.8, alpha=0.28)
+        style.leg_bars(panel, feet.time, contact, 0.44)
+        style.leg_rows(panel)
+        style.limit_view(panel, window)
+    shades = style.shade_stops(axes[-1, 0], recording)
+    axes[-1, 0].set_xlabel('time [s]')
+    pale = [Patch(color='#BBBBBB', label='planned')] if context.gait is not None else []
+    style.legend(figure, [Patch(color='#555555', label='measured'), *pale, *shades])
+    return figure
+
+
+def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool_] | None:
+    """Feet that the gait plans on the ground at each canonical state, boolean (n, 4).
+
+    While a stop or a start is under way every foot is planned where it is, and nothing is drawn.
+    """
+    stance, duty = gait_in_force.planned_stance(recording, context)
+    if not duty.size or not recording.inhibition:
+        return stance if duty.size else None
+    running = episodes.running_intervals(recording)
+    return stance & episodes.within(recording.canonical.time, running)[:, None]
+
+
+def _steady_window(recording: Recording, cycles: int) -> tuple[float, float] | None:
+    """Last cycles of the first steady walking, None when there is none [s]."""
+    segments, period = episodes.steady_segments(recording), episodes.gait_period(recording)
+    if not segments or period is None:
+        return None
+    start, end = segments[0]
+    return max(start, end - cycles * period), end
+
+
+def torques(recording: Recording, context: RunContext) -> Figure | None:
+    """Joint torques of a few cycles, and how near the whole run came to the limits."""
+    joints, robot = recording.joints, context.robot
+    if not joints.time.size or not np.isfinite(joints.effort).any():
+        return None
+    window = _steady_window(recording, CYCLES_OF_TORQUE) or style.stop_window(recording)
+    shown = taken(joints, style.rows_in(joints.time, window))
+    figure, axes = style.new_figure(4.6, 3, 1 if robot is None else 2, sharex='col',
+                                    width_ratios=None if robot is None else (3.0, 1.0))
+    for k, joint in enumerate(JOINTS_OF_LEG):
+        panel = axes[k, 0]
+        style.plot_legs(panel, shown.time, shown.effort[:, k::3])
+        panel.set_ylabel(f'{joint} [N m]')
+        style.limit_view(panel, window)
+        if robot is not None:
+            limits = np.array([leg.torque_limit[k] for leg in robot.legs])
+            low, high = panel.get_ylim()
+            for value in (-limits.min(), limits.min()):
+                if low <= value <= high:
+                    panel.axhline(value, **LIMIT)
+            _shares(axes[k, 1], 100.0 * (np.abs(joints.effort[:, k::3]) / limits))
+    axes[-1, 0].set_xlabel('time [s]')
+    if robot is not None:
+        axes[-1, 1].set_xlabel('share of limit [%]')
+    style.leg_legend(figure)
+    figure.align_ylabels()
+    return figure
+
+
+def _shares(axes: Axes, share: Array) -> None:
+    """Bars of the legs up to the 99th percentiles of shares (n, 4) [%], ticks at the largest."""
+    rows = np.arange(len(LEGS))[::-1]
+    for leg, y, of in zip(LEGS, rows, share.T, strict=True):
+        axes.barh(y, np.nanpercentile(of, 99.0), height=0.62, color=style.LEG_COLOURS[leg],
+                  alpha=0.75)
+        axes.plot([np.nanmax(of)] * 2, [y - 0.31, y + 0.31], color=style.INK, linewidth=1.2)
+    axes.axvline(100.0, **LIMIT)
+    axes.set(xlim=(0.0, 108.0), yticks=rows, yticklabels=[leg.upper() for leg in LEGS])
+    axes.grid(visible=False, axis='y')
+
+
+def timing(recording: Recording, context: RunContext) -> Figure | None:
+    """Rate and latency as the robot measured them, and as the recorder saw the ticks arrive."""
+    arrivals = recording.arrivals
+    history = sorted((status for name, of in recording.statuses.items() if ROBOT in name
+                      for status in of if status.number('rate_hz') is not None),
+                     key=lambda status: status.time)
+    rows = bool(history) + arrivals.on_wall_clock
+    if not rows:
+        return None
+    figure, axes = style.new_figure(1.9 * rows + 0.2, rows, 2)
+    if history:
+        rate, latency = axes[0]
+        _plot(rate, history, 'rate_hz', color=MEDIAN)
+        rate.set(xlabel='time [s]', ylabel='control rate [Hz]', ylim=(0.0, None))
+        factor = [value for status in history if (value := status.number('real_time_factor'))]
+        if factor:
+            rate.set_title(f'real-time factor {factor[-1]:.3f}')
+        _plot(latency, history, 'latency_ms_p99', color=LATE, label='99%')
+        _plot(latency, history, 'latency_ms_p50', color=MEDIAN, label='median')
+        latency.set(xlabel='time [s]', ylabel='latency [ms]', ylim=(0.0, None))
+        latency.legend(loc='lower right', bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.0)
+    if arrivals.on_wall_clock:
+        _histogram(axes[-1, 0], 1e3 * np.diff(arrivals.state), 'interval between states [ms]')
+        answer = 1e3 * (arrivals.targets - arrivals.state)
+        _histogram(axes[-1, 1], answer[np.isfinite(answer)], 'state to last target [ms]')
+    return figure
+
+
+def _plot(axes: Axes, history: list[StatusEvent], key: str, **look: Any) -> None:
+    values = np.array([status.number(key) for status in history], dtype=float)
+    axes.plot([status.time for status in history], values, marker='.', markersize=3, **look)
+
+
+def _histogram(axes: Axes, values: Array, label: str) -> None:
+    if not values.size:
+        axes.set_axis_off()
+        return
+    largest = float(np.percentile(values, 99.9)) * 1.1 or 1.0
+    axes.hist(np.clip(values, 0.0, largest), bins=80, range=(0.0, largest), color=MEDIAN)
+    axes.set(xlabel=label, ylabel='ticks', yscale='log',
+             title=f'median {np.median(values):.2f} ms, 99% {np.percentile(values, 99):.2f} ms, '
+                   f'largest {values.max():.1f} ms')

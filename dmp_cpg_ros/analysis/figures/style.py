@@ -7,7 +7,7 @@ Figures are made without pyplot: nothing is global and nothing needs a screen.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -17,10 +17,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.episodes import STOPPING, episodes, requested_stops
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.motion import stretches
+from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
+
+Window = tuple[float, float]
+"""First and last time that are shown [s]."""
 
 WIDTH = 7.2
 """Width of every figure [inch], that of a page."""
@@ -41,37 +46,15 @@ BLUE, ORANGE, VIOLET, RED = '#56B4E9', '#E69F00', '#6A51A3', '#C00000'
 DASHED = (0, (5, 2))
 
 _PARAMETERS: Any = {
-    'font.family': 'sans-serif',
-    'font.size': 8.5,
-    'axes.labelsize': 8.5,
-    'axes.titlesize': 8.5,
-    'legend.fontsize': 8.0,
-    'xtick.labelsize': 8.0,
-    'ytick.labelsize': 8.0,
-    'mathtext.fontset': 'dejavusans',
-    'axes.spines.top': False,
-    'axes.spines.right': False,
-    'axes.edgecolor': '#555555',
-    'axes.linewidth': 0.7,
-    'axes.labelcolor': INK,
-    'text.color': INK,
-    'xtick.color': '#555555',
-    'ytick.color': '#555555',
-    'xtick.labelcolor': INK,
-    'ytick.labelcolor': INK,
-    'axes.grid': True,
-    'grid.color': '#E4E4E4',
-    'grid.linewidth': 0.6,
-    'axes.axisbelow': True,
-    'lines.linewidth': 1.2,
-    'legend.frameon': False,
-    'figure.facecolor': 'white',
-    'axes.facecolor': 'white',
-    'savefig.dpi': DPI,
-    'figure.dpi': DPI,
-    'axes.titlelocation': 'left',
-    'axes.titlepad': 4.0,
-    'agg.path.chunksize': 10_000,
+    'font.family': 'sans-serif', 'mathtext.fontset': 'dejavusans', 'font.size': 8.5,
+    'axes.labelsize': 8.5, 'axes.titlesize': 8.5, 'legend.fontsize': 8.0, 'xtick.labelsize': 8.0,
+    'ytick.labelsize': 8.0, 'axes.titlelocation': 'left', 'axes.titlepad': 4.0,
+    'text.color': INK, 'axes.labelcolor': INK, 'xtick.labelcolor': INK, 'ytick.labelcolor': INK,
+    'xtick.color': '#555555', 'ytick.color': '#555555', 'axes.edgecolor': '#555555',
+    'axes.linewidth': 0.7, 'axes.spines.top': False, 'axes.spines.right': False,
+    'axes.grid': True, 'grid.color': '#E4E4E4', 'grid.linewidth': 0.6, 'axes.axisbelow': True,
+    'lines.linewidth': 1.2, 'legend.frameon': False, 'agg.path.chunksize': 10_000,
+    'figure.facecolor': 'white', 'axes.facecolor': 'white', 'savefig.dpi': DPI, 'figure.dpi': DPI,
 }
 
 
@@ -101,10 +84,8 @@ def new_figure(
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def time_panels(
-    recording: Recording, height: float, labels: Sequence[str],
-    window: tuple[float, float] | None = None
-) -> tuple[Figure, list[Axes], list[Patch]]:
+def time_panels(recording: Recording, height: float, labels: Sequence[str],
+                window: Window | None = None) -> tuple[Figure, list[Axes], list[Patch]]:
     """Panels over one time axis, in which stops are shaded.
 
     Parameters
@@ -115,7 +96,7 @@ def time_panels(
         Of the figure [inch].
     labels : sequence of str
         One per panel, of its y axis.
-    window : tuple of float, optional
+    window : (float, float), optional
         Times that are shown [s]; all without.
 
     Returns
@@ -147,12 +128,14 @@ def leg_rows(axes: Axes) -> None:
     axes.grid(visible=False, axis='y')
 
 
-def leg_bars(
-    axes: Axes, leg: int, spans: Sequence[tuple[float, float]], height: float, **look: Any
-) -> None:
-    """Draw bars (start, length) of a height in the row of a leg."""
-    axes.broken_barh(spans, (len(LEGS) - 1 - leg - 0.5 * height, height),
-                     facecolor=LEG_COLOURS[LEGS[leg]], linewidth=0, **look)
+def leg_bars(axes: Axes, time: Array, masks: NDArray[np.bool_], height: float, **look: Any,
+             ) -> None:
+    """Draw a bar in the row of each leg while its mask (n, 4) holds at the times (n,)."""
+    for row, (leg, mask) in enumerate(zip(LEGS, masks.T, strict=True)):
+        spans = [(time[first], time[min(past, len(time) - 1)] - time[first])
+                 for first, past in stretches(mask)]
+        axes.broken_barh(spans, (len(LEGS) - 1 - row - 0.5 * height, height),
+                         facecolor=LEG_COLOURS[leg], linewidth=0, **look)
 
 
 def key(label: str, **look: Any) -> Line2D:
@@ -160,56 +143,55 @@ def key(label: str, **look: Any) -> Line2D:
     return Line2D([], [], label=label, **look)
 
 
+def keys(labels: Sequence[str], colours: Iterable[str]) -> list[Line2D]:
+    """Handles of a legend for lines of some colours."""
+    return [key(label, color=colour) for label, colour in zip(labels, colours, strict=True)]
+
+
 def legend(figure: Figure, handles: Sequence[Any]) -> None:
     """Put a legend in one row above the panels."""
     height = LEGEND_HEIGHT / figure.get_figheight()
     figure.set_layout_engine('constrained', rect=(0.0, 0.0, 1.0, 1.0 - height))
-    figure.legend(
-        handles=list(handles), loc='upper center', ncols=len(handles), columnspacing=1.3,
-        handlelength=1.6, handletextpad=0.5, borderaxespad=0.3)
+    figure.legend(handles=list(handles), loc='upper center', ncols=len(handles),
+                  columnspacing=1.3, handlelength=1.6, handletextpad=0.5, borderaxespad=0.3)
 
 
 def leg_legend(figure: Figure, extra: Sequence[Any] = ()) -> None:
     """Legend of the four legs, and more handles."""
-    legend(figure, [*(key(LEG_NAMES[leg], color=LEG_COLOURS[leg]) for leg in LEGS), *extra])
+    legend(figure, [*keys(tuple(LEG_NAMES.values()), LEG_COLOURS.values()), *extra])
 
 
 def shade_stops(axes: Axes, recording: Recording) -> list[Patch]:
     """Shade requested stops and inhibition; returns handles for the legend."""
-    waiting = inhibited = False
-    for episode in episodes(recording, STOPPING):
-        capture = episode.captured
-        if capture > episode.start:
-            axes.axvspan(episode.start, capture, color=WAITING, linewidth=0, zorder=0)
-            waiting = True
-        if episode.end > capture:
-            axes.axvspan(capture, episode.end, color=INHIBITED, linewidth=0, zorder=0)
-            inhibited = True
-    return [Patch(color=WAITING, label='stop requested')] * waiting + [
-        Patch(color=INHIBITED, label='inhibited')
-    ] * inhibited
+    stops, shown = episodes(recording, STOPPING), []
+    for label, colour, spans in (
+            ('stop requested', WAITING, [(stop.start, stop.captured) for stop in stops]),
+            ('inhibited', INHIBITED, [(stop.captured, stop.end) for stop in stops])):
+        spans = [(start, end) for start, end in spans if end > start]
+        for start, end in spans:
+            axes.axvspan(start, end, color=colour, linewidth=0, zorder=0)
+        shown += [Patch(color=colour, label=label)] if spans else []
+    return shown
 
 
-def limit_view(axes: Axes, window: tuple[float, float]) -> None:
+def limit_view(axes: Axes, window: Window) -> None:
     """Show a time window [s] without margins."""
     axes.set_xlim(*window)
     axes.margins(x=0.0)
 
 
-def stop_window(
-    recording: Recording, before: float = 2.5, after: float = 2.5, longest: float = 14.0
-) -> tuple[float, float]:
+def stop_window(recording: Recording, around: float = 2.5, longest: float = 14.0) -> Window:
     """Window around the first stop that was asked for, up to the walking after it [s].
 
     Without a stop it is the end of the recording.
     """
     first, last = recording.span
     for stop in requested_stops(recording):
-        start = max(first, stop.start - before)
-        return start, min(last, stop.end + after, start + longest)
-    return max(first, last - before - after), last
+        start = max(first, stop.start - around)
+        return start, min(last, stop.end + around, start + longest)
+    return max(first, last - 2 * around), last
 
 
-def rows_in(time: Any, window: tuple[float, float]) -> Any:
+def rows_in(time: Array, window: Window) -> NDArray[np.bool_]:
     """Rows of a time axis in a window, boolean ndarray."""
-    return (np.asarray(time) >= window[0]) & (np.asarray(time) <= window[1])
+    return (time >= window[0]) & (time <= window[1])

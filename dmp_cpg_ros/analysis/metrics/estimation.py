@@ -4,31 +4,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.analysis import motion
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.foot_motion import height_over_ground
-from dmp_cpg_ros.analysis.motion import (
-    common_rows,
-    roll_pitch_yaw,
-    root_mean_square,
-    rotations,
-)
-from dmp_cpg_ros.analysis.recording import Recording, taken
+from dmp_cpg_ros.analysis.metrics.robot import SHORTEST_DISTANCE
+from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.suite_table import POSTURE
 
-Array = NDArray[np.float64]
 
-SHORTEST_DISTANCE = 0.5
-"""Distance below which figures per metre are not given [m]."""
-
-
-@dataclass(frozen=True)
-class EstimateErrors:
+class EstimateErrors(NamedTuple):
     """Estimate minus truth where both were recorded with the same stamp.
 
     Attributes
@@ -57,17 +44,16 @@ class EstimateErrors:
 
 def estimate_errors(recording: Recording) -> EstimateErrors | None:
     """Errors of ``estimated_odom`` against ``odom``; None where one of them is missing."""
-    truth, estimate = recording.odometry, recording.estimate
-    rows = common_rows(truth.time, estimate.time)
-    if len(rows[0]) < 2:
+    both = motion.matched(recording.odometry, recording.estimate)
+    if len(both[0].time) < 2:
         return None
-    true, found = taken(truth, rows[0]), taken(estimate, rows[1])
-    angles = roll_pitch_yaw(found.quaternion) - roll_pitch_yaw(true.quaternion)
-    way, way_found = (each.position_in_world - each.position_in_world[0] for each in (true, found))
-    velocity = found.velocity_in_base - true.velocity_in_base
-    walked = float(np.hypot(*np.diff(way[:, :2], axis=0).T).sum())
-    yaw = angles[:, 2] - angles[0, 2]
-    return EstimateErrors(true.time, velocity, angles[:, :2], yaw, way_found - way, walked)
+    true, found = both
+    way, believed = (of.position_in_world - of.position_in_world[0] for of in both)
+    angles = motion.roll_pitch_yaw(found.quaternion) - motion.roll_pitch_yaw(true.quaternion)
+    return EstimateErrors(
+        true.time, found.velocity_in_base - true.velocity_in_base, angles[:, :2],
+        angles[:, 2] - angles[0, 2], believed - way,
+        float(np.hypot(*np.diff(way[:, :2], axis=0).T).sum()))
 
 
 def estimation_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
@@ -81,22 +67,19 @@ def estimation_metrics(recording: Recording, context: RunContext) -> dict[str, A
         ``position_error_share``, the horizontal error at the end over the distance, and
         ``z_error_share``; ``height_rmse_m`` over the ground.
     """
-    metrics: dict[str, Any] = dict.fromkeys((
-        'v_x_rmse', 'v_y_rmse', 'v_z_rmse', 'roll_rmse_deg', 'pitch_rmse_deg', 'yaw_error_deg',
-        'yaw_error_deg_per_10m', 'position_error_share', 'z_error_share', 'height_rmse_m'))
+    names = ('v_x_rmse', 'v_y_rmse', 'v_z_rmse', 'roll_rmse_deg', 'pitch_rmse_deg',
+             'yaw_error_deg', 'yaw_error_deg_per_10m', 'position_error_share', 'z_error_share',
+             'height_rmse_m')
     errors = estimate_errors(recording)
     if errors is None:
-        return metrics
-    rms = [*root_mean_square(errors.velocity_in_base), *root_mean_square(np.rad2deg(errors.tilt))]
-    yaw = float(np.rad2deg(errors.yaw[-1]))
-    metrics.update(zip(metrics, [*rms, yaw], strict=False))
-    metrics['height_rmse_m'] = _height_error(recording, context)
-    if errors.walked >= SHORTEST_DISTANCE:
-        x, y, z = errors.position_in_world[-1].tolist()
-        metrics['yaw_error_deg_per_10m'] = abs(yaw) * 10.0 / errors.walked
-        metrics['position_error_share'] = float(np.hypot(x, y)) / errors.walked
-        metrics['z_error_share'] = abs(z) / errors.walked
-    return metrics
+        return dict.fromkeys(names)
+    yaw, (x, y, z) = float(np.rad2deg(errors.yaw[-1])), errors.position_in_world[-1].tolist()
+    per_metre = [value / errors.walked if errors.walked >= SHORTEST_DISTANCE else None
+                 for value in (abs(yaw) * 10.0, float(np.hypot(x, y)), abs(z))]
+    return dict(zip(names, [
+        *motion.root_mean_square(errors.velocity_in_base),
+        *motion.root_mean_square(np.rad2deg(errors.tilt)), yaw, *per_metre,
+        _height_error(recording, context)], strict=True))
 
 
 def _height_error(recording: Recording, context: RunContext) -> float | None:
@@ -108,6 +91,6 @@ def _height_error(recording: Recording, context: RunContext) -> float | None:
         return None
     time, height = np.array(told, dtype=float).T
     # The height is along the ground's normal; on a slope that is shorter than the vertical one.
-    upward = rotations(odometry.quaternion)[:, 2, 2] if not context.world.is_flat else 1.0
-    true = np.interp(time, odometry.time, height_over_ground(odometry, context) * upward)
+    upward = 1.0 if context.world.is_flat else motion.rotations(odometry.quaternion)[:, 2, 2]
+    true = np.interp(time, odometry.time, motion.height_over_ground(odometry, context) * upward)
     return float(np.sqrt(((height - true) ** 2).mean()))

@@ -9,23 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.analysis import episodes
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import (
-    MOVING,
-    SETTLING,
-    changing_intervals,
-    gait_period,
-    running_intervals,
-    steady_segments,
-    within,
-)
 from dmp_cpg_ros.analysis.gait_in_force import gaits_walked, phase_offsets, planned_stance
 from dmp_cpg_ros.analysis.motion import held, mean_between
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.core.canonical.phase import phase, wrapped
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 
 def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
@@ -43,7 +33,8 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     time, errors = phase_errors(recording, context)
     settled = np.abs(errors[settled_rows(recording, time)])
     duty = duty_factors(recording, context)
-    changes = [{'start_s': start, 'end_s': end} for start, end in changing_intervals(recording)]
+    changes = [{'start_s': start, 'end_s': end}
+               for start, end in episodes.changing_intervals(recording)]
     return {
         'name': None if context.gait is None else context.gait.name,
         'names': gaits_walked(recording) or None,
@@ -53,7 +44,7 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         'duty_factor_of_leg':
             None if duty is None else dict(zip(LEGS, duty.tolist(), strict=True)),
         'duty_factor_planned': planned_duty_factor(recording, context),
-        'period_s': gait_period(recording),
+        'period_s': episodes.gait_period(recording),
     }
 
 
@@ -80,29 +71,29 @@ def phase_errors(recording: Recording, context: RunContext) -> tuple[Array, Arra
 
 def settled_rows(recording: Recording, time: Array) -> NDArray[np.bool_]:
     """Which times lie in settled, moving walking, boolean ndarray (n,)."""
-    inside = within(time, [(start + SETTLING, end) for start, end in running_intervals(recording)])
+    inside = episodes.within(time, [(start + episodes.SETTLING, end) for start, end
+                                    in episodes.running_intervals(recording)])
     if recording.reference.time.size and time.size:
         value = held(recording.reference.time, recording.reference.value, time)
-        inside &= (np.abs(value) > MOVING).any(axis=1)
+        inside &= (np.abs(value) > episodes.MOVING).any(axis=1)
     return inside
 
 
 def duty_factors(recording: Recording, context: RunContext) -> Array | None:
     """Measured share of time on the ground over whole cycles of steady walking, ndarray (4,)."""
-    segments = steady_segments(recording)
-    if not segments or not recording.feet.time.size:
+    segments, feet = episodes.steady_segments(recording), recording.feet
+    if not segments or not feet.time.size:
         return None
-    contact = (recording.feet.force > context.contact_force).astype(float)
-    shares = [mean_between(recording.feet.time, contact, start, end) for start, end in segments]
-    return np.average(shares, axis=0, weights=[end - start for start, end in segments])
+    contact = (feet.force > context.contact_force).astype(float)
+    shares = [mean_between(feet.time, contact, start, end) for start, end in segments]
+    return np.average(shares, axis=0, weights=np.diff(segments)[:, 0])
 
 
 def planned_duty_factor(recording: Recording, context: RunContext) -> float | None:
     """Duty factor that the gait plans, averaged over the same stretches."""
-    segments = steady_segments(recording)
+    segments, time = episodes.steady_segments(recording), recording.canonical.time
     _, duty = planned_stance(recording, context)
     if not duty.size or not segments:
         return None
-    time = recording.canonical.time
     planned = [duty[(time >= start) & (time <= end)].mean() for start, end in segments]
-    return float(np.average(planned, weights=[end - start for start, end in segments]))
+    return float(np.average(planned, weights=np.diff(segments)[:, 0]))

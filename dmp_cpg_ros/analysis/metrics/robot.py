@@ -8,16 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.analysis import episodes, motion
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import (
-    MOVING,
-    fall_noticed,
-    gait_period,
-    should_stand,
-    steady_segments,
-)
-from dmp_cpg_ros.analysis.foot_motion import foot_slip, height_over_ground
-from dmp_cpg_ros.analysis.motion import held, integral, roll_pitch_yaw, smoothed, tilt
 from dmp_cpg_ros.analysis.recording import Recording
 
 FALLEN_HEIGHT_SHARE = 0.5
@@ -48,8 +40,9 @@ def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         ``down_at_start``, whether the recording begins with a fall that was before it.
     """
     distance = distance_walked(recording)
-    slip = foot_slip(recording, context.robot, context.contact_force) if context.robot else None
-    total = None if slip is None else float(slip.sum())
+    slips = motion.foot_slip(
+        recording, context.robot, context.contact_force) if context.robot else None
+    slip = None if slips is None else float(slips.sum())
     far = distance if distance is not None and distance >= SHORTEST_DISTANCE else None
     cost, source = cost_of_transport(recording, context, far)
     return {
@@ -60,8 +53,8 @@ def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         'cost_of_transport': cost,
         'cost_of_transport_from': source,
         'peak_torque_share': peak_torque_share(recording, context),
-        'foot_slip_m': total,
-        'foot_slip_m_per_foot_and_m': total / 4.0 / far if far and total is not None else None,
+        'foot_slip_m': slip,
+        'foot_slip_m_per_foot_and_m': slip / 4.0 / far if far and slip is not None else None,
     }
 
 
@@ -72,11 +65,12 @@ def fell(recording: Recording, context: RunContext) -> bool | None:
     odometry = recording.odometry
     if not odometry.time.size:
         return None
-    height = height_over_ground(odometry, context)
+    height = motion.height_over_ground(odometry, context)
     standing = height[0] if context.robot is None else context.robot.stance_height
-    too_low = height < FALLEN_HEIGHT_SHARE * standing
-    down = too_low | (tilt(odometry.quaternion) > FALLEN_TILT)
-    return fall_noticed(recording) or bool(np.any(down & should_stand(recording, odometry.time)))
+    down = (height < FALLEN_HEIGHT_SHARE * standing) | (
+        motion.tilt(odometry.quaternion) > FALLEN_TILT)
+    return episodes.fall_noticed(recording) or bool(
+        np.any(down & episodes.should_stand(recording, odometry.time)))
 
 
 def down_at_start(recording: Recording) -> bool | None:
@@ -89,9 +83,9 @@ def distance_walked(recording: Recording) -> float | None:
     odometry = recording.odometry
     if not odometry.time.size:
         return None
-    period = gait_period(recording) or SWAY_WINDOW
-    window = period * np.ceil(SWAY_WINDOW / period)
-    path = smoothed(odometry.time, odometry.position_in_world[:, :2], window)
+    period = episodes.gait_period(recording) or SWAY_WINDOW
+    path = motion.smoothed(odometry.time, odometry.position_in_world[:, :2],
+                           period * np.ceil(SWAY_WINDOW / period))
     return float(np.hypot(*np.diff(path, axis=0).T).sum())
 
 
@@ -100,22 +94,20 @@ def yaw_drift(recording: Recording) -> float | None:
     odometry = recording.odometry
     if not odometry.time.size:
         return None
-    reference, yaw = recording.reference, roll_pitch_yaw(odometry.quaternion)[:, 2]
+    reference, yaw = recording.reference, motion.roll_pitch_yaw(odometry.quaternion)[:, 2]
     gained = walked = 0.0
-    for interval in steady_segments(recording):
-        v_x, v_y, gamma = held(reference.time, reference.value, np.array(interval[:1]))[0]
-        if abs(gamma) > MOVING or np.hypot(v_x, v_y) < MOVING:
-            continue
-        x, y, psi = (np.diff(np.interp(interval, odometry.time, column)).item()
-                     for column in (*odometry.position_in_world[:, :2].T, yaw))
-        walked += float(np.hypot(x, y))
-        gained += abs(psi)
+    for interval in episodes.steady_segments(recording):
+        v_x, v_y, gamma = motion.held(reference.time, reference.value, np.array(interval[:1]))[0]
+        if abs(gamma) <= episodes.MOVING <= np.hypot(v_x, v_y):
+            x, y, psi = (np.diff(np.interp(interval, odometry.time, column)).item()
+                         for column in (*odometry.position_in_world[:, :2].T, yaw))
+            walked += float(np.hypot(x, y))
+            gained += abs(psi)
     return float(np.rad2deg(gained)) * 10.0 / walked if walked >= SHORTEST_DISTANCE else None
 
 
-def cost_of_transport(
-    recording: Recording, context: RunContext, distance: float | None
-) -> tuple[float | None, str | None]:
+def cost_of_transport(recording: Recording, context: RunContext, distance: float | None,
+                      ) -> tuple[float | None, str | None]:
     """Positive mechanical work of all joints over m g d; no losses, no recuperation.
 
     Returns
@@ -126,16 +118,15 @@ def cost_of_transport(
         estimate, from torque times velocity at the stamps alone. It misses what a drive does
         between two stamps, such as correcting an error at once when a target comes.
     """
-    joints, work = recording.joints, recording.work
-    if context.robot is None or not distance:
+    joints, told = recording.joints, recording.work
+    if context.robot is None or not distance or not (told.time.size > 1 or joints.time.size):
         return None, None
-    weight = context.robot.mass * 9.81
-    if work.time.size > 1:
-        return float((work.work[-1] - work.work[0]).sum() / (weight * distance)), 'joint_work'
-    if not joints.time.size:
-        return None, None
-    power = np.maximum(joints.effort * joints.velocity, 0.0).sum(axis=1)
-    return float(integral(joints.time, power)[-1] / (weight * distance)), 'joint_states'
+    if told.time.size > 1:
+        work, source = (told.work[-1] - told.work[0]).sum(), 'joint_work'
+    else:
+        power = np.maximum(joints.effort * joints.velocity, 0.0).sum(axis=1)
+        work, source = motion.integral(joints.time, power)[-1], 'joint_states'
+    return float(work / (context.robot.mass * 9.81 * distance)), source
 
 
 def peak_torque_share(recording: Recording, context: RunContext) -> float | None:

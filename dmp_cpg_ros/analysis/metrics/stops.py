@@ -8,15 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.analysis import episodes
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import (
-    RUNNING,
-    STARTING,
-    Episode,
-    episodes,
-    requested_stops,
-    stands_until,
-)
+from dmp_cpg_ros.analysis.episodes import Episode
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 
 STILL_SPEED = 0.01
@@ -28,12 +22,14 @@ REST_SETTLING = 0.5
 
 def stop_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     """Group ``stop`` of ``metrics.json``: the slowest completed stop, and ``all``."""
-    return _summary([_stop(recording, context, stop) for stop in requested_stops(recording)])
+    return _summary([_stop(recording, context, stop)
+                     for stop in episodes.requested_stops(recording)])
 
 
 def start_metrics(recording: Recording) -> dict[str, Any]:
     """Group ``start`` of ``metrics.json``: the slowest completed start, and ``all``."""
-    return _summary([_start(recording, episode) for episode in episodes(recording, STARTING)])
+    return _summary([_start(recording, start)
+                     for start in episodes.episodes(recording, episodes.STARTING)])
 
 
 def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
@@ -49,19 +45,17 @@ def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[s
     entry = _times(episode, at_rest)
     if at_rest is None:
         return entry
-    end = stands_until(recording, at_rest.time, episode.end)
+    end = episodes.stands_until(recording, at_rest.time, episode.end)
     window = (min(at_rest.time + REST_SETTLING, end), end)
-    return {
-        **entry, 'rest_s': at_rest.time, 'rest_until_s': end,
-        **_body_at_rest(recording, entry['request_s'], window),
-        **_feet_at_rest(recording, context, window)}
+    return {**entry, 'rest_s': at_rest.time, 'rest_until_s': end,
+            **_body_at_rest(recording, entry['request_s'], window),
+            **_feet_at_rest(recording, context, window)}
 
 
-def _start(recording: Recording, episode: Episode) -> dict[str, Any]:
-    walking = next((event for event in recording.inhibition
-                    if event.time >= episode.end and event.message in RUNNING), None)
-    interrupted = walking is None or walking.time > episode.end
-    return _times(episode, None if interrupted else walking)
+def _start(recording: Recording, start: Episode) -> dict[str, Any]:
+    """Times of a start; one that another state than walking follows was interrupted."""
+    return _times(start, next((event for event in recording.inhibition if event.time == start.end
+                               and event.message in episodes.RUNNING), None))
 
 
 def _times(episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
@@ -70,10 +64,9 @@ def _times(episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
     stated = first.number('request_stamp')
     # a stamp far from the event that bears it belongs to another request
     request = stated if stated is not None and abs(stated - first.time) < 1.0 else first.time
-    measured = None
-    if done is not None:
-        measured = done.number('measured_s')
-        measured = done.time - request if measured is None else measured
+    measured = None if done is None else done.number('measured_s')
+    if done is not None and measured is None:
+        measured = done.time - request
     return {'request_s': request, 'predicted_s': _first(episode, 'predicted_s'),
             'bound_s': _first(episode, 'bound_s'), 'measured_s': measured}
 
@@ -86,11 +79,11 @@ def _first(episode: Episode, key: str) -> float | None:
 def _body_at_rest(
         recording: Recording, request: float, window: tuple[float, float]) -> dict[str, Any]:
     odometry = recording.odometry
-    rows = (odometry.time >= window[0]) & (odometry.time < window[1])
+    since, rows = (episodes.within(odometry.time, [(start, window[1])])
+                   for start in (request, window[0]))
     if not rows.any():
         return {'body_speed_at_rest_m_s': None, 'body_still_after_s': None, 'displacement_m': None}
     speed = np.linalg.norm(odometry.velocity_in_base, axis=1)
-    since = (odometry.time >= request) & (odometry.time < window[1])
     moving = odometry.time[since & (speed >= STILL_SPEED)]
     still_after = float(moving[-1]) - request if moving.size else 0.0
     start, end = (odometry.position_in_world[rows_of][0, :2] for rows_of in (since, rows))
@@ -102,10 +95,7 @@ def _body_at_rest(
 
 def _feet_at_rest(
         recording: Recording, context: RunContext, window: tuple[float, float]) -> dict[str, Any]:
-    feet = recording.feet
-    rows = (feet.time >= window[0]) & (feet.time < window[1])
-    if not rows.any():
-        return {'feet_down_at_rest': None, 'least_foot_force_n': None}
-    force = feet.force[rows]
-    return {'feet_down_at_rest': bool((force > context.contact_force).all()),
-            'least_foot_force_n': float(force.min())}
+    force = recording.feet.force[episodes.within(recording.feet.time, [window])]
+    least = float(force.min()) if force.size else None
+    return {'feet_down_at_rest': None if least is None else bool(least > context.contact_force),
+            'least_foot_force_n': least}

@@ -8,11 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.metrics.estimation import estimation_metrics
-from dmp_cpg_ros.analysis.metrics.gait import gait_metrics
-from dmp_cpg_ros.analysis.metrics.robot import robot_metrics
-from dmp_cpg_ros.analysis.metrics.stops import start_metrics, stop_metrics
-from dmp_cpg_ros.analysis.metrics.tracking import tracking_metrics
+from dmp_cpg_ros.analysis.metrics import estimation, gait, robot, stops, tracking
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.suite_table import ROBOT
 
@@ -40,12 +36,12 @@ def compute_metrics(
     """
     context = context or RunContext()
     return {
-        'robot': robot_metrics(recording, context),
-        'tracking': tracking_metrics(recording),
-        'estimation': estimation_metrics(recording, context),
-        'gait': gait_metrics(recording, context),
-        'stop': stop_metrics(recording, context),
-        'start': start_metrics(recording),
+        'robot': robot.robot_metrics(recording, context),
+        'tracking': tracking.tracking_metrics(recording),
+        'estimation': estimation.estimation_metrics(recording, context),
+        'gait': gait.gait_metrics(recording, context),
+        'stop': stops.stop_metrics(recording, context),
+        'start': stops.start_metrics(recording),
         'timing': timing_metrics(recording),
         'recording': {'undecodable_messages': sum(recording.undecodable.values())},
         'certificate': None if certificate is None else list(certificate),
@@ -55,11 +51,10 @@ def compute_metrics(
 def timing_metrics(recording: Recording) -> dict[str, Any]:
     """Group ``timing`` of ``metrics.json``, as the robot stated each key last."""
     metrics: dict[str, Any] = dict.fromkeys(TIMING)
-    for status in sorted(
-            (status for name, status in recording.diagnostics.items() if ROBOT in name),
-            key=lambda status: status.time):
-        stated = {key: status.number(key) for key in TIMING}
-        metrics.update({key: value for key, value in stated.items() if value is not None})
+    last = [status for name, status in recording.diagnostics.items() if ROBOT in name]
+    for status in sorted(last, key=lambda status: status.time):
+        metrics.update({key: value for key in TIMING
+                        if (value := status.number(key)) is not None})
     if metrics['deadline_misses'] is not None:
         metrics['deadline_misses'] = round(metrics['deadline_misses'])
     return metrics

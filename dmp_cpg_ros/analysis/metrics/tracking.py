@@ -4,23 +4,16 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.analysis import motion
 from dmp_cpg_ros.analysis.episodes import MOVING, cycle_count, gait_period, steady_segments
-from dmp_cpg_ros.analysis.motion import (
-    held,
-    mean_between,
-    root_mean_square,
-    smoothed,
-    velocity_in_heading,
-    yaw_rate,
-)
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.recording import Array, Recording
 
-Array = NDArray[np.float64]
+NAMES = ('v_rmse', 'v_y_rmse', 'gamma_rmse')
 
 
 def tracking_metrics(recording: Recording) -> dict[str, Any]:
@@ -35,27 +28,26 @@ def tracking_metrics(recording: Recording) -> dict[str, Any]:
         constant reference with means over whole gait cycles, and ``v_error_max``, the largest
         relative error of forward speed among them.
     """
-    names = ('v_rmse', 'v_y_rmse', 'gamma_rmse')
-    metrics: dict[str, Any] = dict.fromkeys([*names, *(f'{name}_cycle' for name in names)])
-    odometry, reference = recording.odometry, recording.reference
+    odometry, reference, steady = recording.odometry, recording.reference, steady_errors(recording)
+    found: list[float] = []
     if odometry.time.size and reference.time.size:
-        error = body_motion(recording) - held(reference.time, reference.value, odometry.time)
-        metrics.update(zip(names, root_mean_square(error), strict=True))
+        error = body_motion(recording) - motion.held(
+            reference.time, reference.value, odometry.time)
+        found = motion.root_mean_square(error)
         period = gait_period(recording)
         if period is not None:
-            averaged = root_mean_square(smoothed(odometry.time, error, period))
-            metrics.update(zip([f'{name}_cycle' for name in names], averaged, strict=True))
-    metrics['steady'] = steady = steady_errors(recording)
+            found += motion.root_mean_square(motion.smoothed(odometry.time, error, period))
+    names = [*NAMES, *(f'{name}_cycle' for name in NAMES)]
     errors = [abs(entry['v_error']) for entry in steady if entry['v_error'] is not None]
-    metrics['v_error_max'] = max(errors, default=None)
-    return metrics
+    return {**dict(zip_longest(names, found)), 'steady': steady,
+            'v_error_max': max(errors, default=None)}
 
 
 def body_motion(recording: Recording) -> Array:
     """Measured v_x, v_y, γ in the heading frame, ndarray (n, 3)."""
+    odometry = recording.odometry
     return np.column_stack(
-        [velocity_in_heading(recording.odometry)[:, :2], yaw_rate(recording.odometry)]
-    )
+        [motion.velocity_in_heading(odometry)[:, :2], motion.yaw_rate(odometry)])
 
 
 def steady_errors(recording: Recording) -> list[dict[str, Any]]:
@@ -68,21 +60,21 @@ def steady_errors(recording: Recording) -> list[dict[str, Any]]:
         when the reference does not go forward), ``v_y``, ``gamma``, ``gamma_reference``,
         ``gamma_error`` (relative, None when straight).
     """
-    if not recording.odometry.time.size:
+    odometry, reference, entries = recording.odometry, recording.reference, []
+    if not odometry.time.size:
         return []
-    motion, entries = body_motion(recording), []
+    measured = body_motion(recording)
     for start, end in steady_segments(recording):
-        v_x, v_y, gamma = mean_between(recording.odometry.time, motion, start, end)
-        reference = mean_between(recording.reference.time, recording.reference.value, start, end)
+        v, v_y, gamma = motion.mean_between(odometry.time, measured, start, end).tolist()
+        v_r, v_y_r, gamma_r = motion.mean_between(
+            reference.time, reference.value, start, end).tolist()
         entries.append({
             'start_s': start, 'end_s': end, 'cycles': round(cycle_count(recording, start, end)),
-            'v': float(v_x), 'v_reference': float(reference[0]),
-            'v_error': _relative(v_x, reference[0]),
-            'v_y': float(v_y), 'v_y_reference': float(reference[1]),
-            'gamma': float(gamma), 'gamma_reference': float(reference[2]),
-            'gamma_error': _relative(gamma, reference[2])})
+            'v': v, 'v_reference': v_r, 'v_error': _relative(v, v_r),
+            'v_y': v_y, 'v_y_reference': v_y_r,
+            'gamma': gamma, 'gamma_reference': gamma_r, 'gamma_error': _relative(gamma, gamma_r)})
     return entries
 
 
 def _relative(value: float, reference: float) -> float | None:
-    return float((value - reference) / abs(reference)) if abs(reference) > MOVING else None
+    return (value - reference) / abs(reference) if abs(reference) > MOVING else None
