@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from dmp_cpg_ros.analysis.metrics.stops import STILL_SPEED
 
@@ -23,8 +22,7 @@ COSTS = {
 """What a cost of transport was taken from, in words."""
 
 
-@dataclass(frozen=True)
-class Fact:
+class Fact(NamedTuple):
     """One statement.
 
     Attributes
@@ -58,57 +56,45 @@ def facts(metrics: Mapping[str, Any], lock_step: bool | None = None) -> list[Fac
     list of Fact
         In the order of importance.
     """
-    return [
-        *_decoding(metrics), *_walking(metrics), *_stops(metrics), *_timing(metrics, lock_step),
-        *_certificate(metrics)]
-
-
-def _decoding(metrics: Mapping[str, Any]) -> list[Fact]:
-    lost = metrics['recording']['undecodable_messages']
-    if not lost:
-        return []
-    return [Fact('Every message could be decoded', f'{lost} could not and were left out', False)]
+    return [*_walking(metrics), *_stops(metrics), *_timing(metrics['timing'], lock_step),
+            *_certificate(metrics)]
 
 
 def _walking(metrics: Mapping[str, Any]) -> list[Fact]:
-    robot, gait = metrics['robot'], metrics['gait']
-    error = metrics['tracking']['v_error_max']
-    fell = robot['fell']
+    robot, error = metrics['robot'], metrics['tracking']['v_error_max']
+    fell, lost = robot['fell'], metrics['recording']['undecodable_messages'] or None
     finding = 'not recorded' if fell is None else 'it fell' if fell else 'it did'
-    holds = None if fell is None else not fell
     if robot['down_at_start']:
-        again = ', and fell again' if fell else ''
-        finding, holds = f'it was down at the beginning{again}', False if fell else None
-    found = [
-        Fact('The robot stayed on its feet', finding, holds),
+        finding = f'it was down at the beginning{", and fell again" if fell else ""}'
+    return [
+        *_if_known(lost, 'Every message could be decoded', '{} could not and were left out',
+                   holds=False),
+        Fact('The robot stayed on its feet', finding,
+             False if fell else None if fell is None or robot['down_at_start'] else True),
         Fact('Distance walked', _number(robot['distance_m'], '{:.2f} m'), None),
         Fact(
             f'Mean speed within {SPEED_TOLERANCE:.0%} of the reference wherever that was constant',
             'no such stretch' if error is None else f'largest error {error:.1%}',
-            None if error is None else error <= SPEED_TOLERANCE),]
-    if robot['cost_of_transport'] is not None:
-        finding = f'{robot["cost_of_transport"]:.2f}, {COSTS[robot["cost_of_transport_from"]]}'
-        found.append(Fact('Cost of transport', finding, None))
-    drift, phase_error = robot['yaw_drift_deg_per_10m'], gait['phase_error_rad_max']
-    if drift is not None:
-        found.append(Fact('Yaw drift on straight stretches', f'{drift:.2f}° per 10 m', None))
-    if phase_error is not None:
-        finding = f'{phase_error:.2g} rad'
-        found.append(Fact('Largest phase error of a leg while walking', finding, None))
-    return found
+            None if error is None else error <= SPEED_TOLERANCE),
+        *_if_known(robot['cost_of_transport'], 'Cost of transport',
+                   f'{{:.2f}}, {COSTS.get(robot["cost_of_transport_from"])}'),
+        *_if_known(robot['yaw_drift_deg_per_10m'], 'Yaw drift on straight stretches',
+                   '{:.2f}° per 10 m'),
+        *_if_known(metrics['gait']['phase_error_rad_max'],
+                   'Largest phase error of a leg while walking', '{:.2g} rad')]
 
 
 def _stops(metrics: Mapping[str, Any]) -> list[Fact]:
     found = []
-    for word, end in (('stop', 'came to rest'), ('start', 'led to walking')):
-        entries = metrics[word]['all']
+    for word, end, aim in (
+            ('stop', 'came to rest', 'rest'), ('start', 'led to walking', 'walking')):
+        entries, done, count = (metrics[word][key] for key in ('all', 'completed', 'count'))
         if entries:
-            done, count = metrics[word]['completed'], metrics[word]['count']
-            found.append(Fact(f'Every {word} {end}', f'{done} of {count}', done == count))
-            found.extend(_predictions(entries, 'rest' if word == 'stop' else 'walking'))
+            found += [Fact(f'Every {word} {end}', f'{done} of {count}', done == count),
+                      *_predictions(entries, aim)]
     speeds = _known(metrics['stop']['all'], 'body_speed_at_rest_m_s')
     if speeds:
-        fastest = max(speed for speed, in speeds)
+        fastest, = max(speeds)
         finding = f'at most {1e3 * fastest:.2g} mm/s'
         found.append(Fact('The body stood still at rest', finding, fastest < STILL_SPEED))
     down = [loaded for loaded, in _known(metrics['stop']['all'], 'feet_down_at_rest')]
@@ -122,8 +108,8 @@ def _predictions(entries: list[dict[str, Any]], aim: str) -> list[Fact]:
     found = []
     pairs = _known(entries, 'measured_s', 'predicted_s')
     if pairs:
-        measured, predicted = max(pairs, key=lambda pair: float(abs(pair[0] - pair[1])))
-        finding = f'{measured:.3f} s measured, {predicted:.3f} s predicted (worst case)'
+        finding = '{:.3f} s measured, {:.3f} s predicted (worst case)'.format(
+            *max(pairs, key=lambda pair: float(abs(pair[0] - pair[1]))))
         found.append(Fact(f'Time to {aim} against its prediction', finding, None))
     pairs = _known(entries, 'measured_s', 'bound_s')
     if pairs:
@@ -133,37 +119,36 @@ def _predictions(entries: list[dict[str, Any]], aim: str) -> list[Fact]:
     return found
 
 
+def _timing(timing: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
+    factor = timing['real_time_factor']
+    rate = _number(timing['rate_hz'], '{:.0f} Hz')
+    if factor is None or lock_step:
+        return _if_known(factor, 'Speed of the lock-step run', f'{{:.2f}} × real time, {rate}')
+    kept = None if lock_step is None else factor >= REAL_TIME_FACTOR
+    latency = _number(timing['latency_ms_p50'], 'median {:.2f} ms')
+    late = _number(timing['latency_ms_p99'], '99% {:.2f} ms')
+    return [Fact('The suite kept wall time', f'real-time factor {factor:.3f}, {rate}', kept),
+            Fact('Latency from state to last target', f'{latency}, {late}', None)]
+
+
+def _certificate(metrics: Mapping[str, Any]) -> list[Fact]:
+    holds = [bool(entry['holds']) for entry in metrics['certificate'] or []
+             if isinstance(entry, dict) and 'holds' in entry and entry.get('required', True)]
+    finding = f'{sum(holds)} of {len(holds)} required inequalities'
+    return [Fact('The certificate of the running parameters holds', finding, all(holds))
+            ] if holds else []
+
+
 def _known(entries: list[dict[str, Any]], *keys: str) -> list[tuple[Any, ...]]:
     """Values of some keys of the entries that have all of them."""
     rows = [tuple(entry.get(key) for key in keys) for entry in entries]
     return [row for row in rows if None not in row]
 
 
-def _timing(metrics: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
-    timing = metrics['timing']
-    factor = timing['real_time_factor']
-    if factor is None:
-        return []
-    rate = _number(timing['rate_hz'], '{:.0f} Hz')
-    if lock_step:
-        return [Fact('Speed of the lock-step run', f'{factor:.2f} × real time, {rate}', None)]
-    kept = None if lock_step is None else factor >= REAL_TIME_FACTOR
-    latency = _number(timing['latency_ms_p50'], 'median {:.2f} ms')
-    late = _number(timing['latency_ms_p99'], '99% {:.2f} ms')
-    return [
-        Fact('The suite kept wall time', f'real-time factor {factor:.3f}, {rate}', kept),
-        Fact('Latency from state to last target', f'{latency}, {late}', None),
-    ]
-
-
-def _certificate(metrics: Mapping[str, Any]) -> list[Fact]:
-    holds = [bool(entry['holds']) for entry in metrics['certificate'] or []
-             if isinstance(entry, dict) and 'holds' in entry and entry.get('required', True)]
-    if not holds:
-        return []
-    finding = f'{sum(holds)} of {len(holds)} required inequalities'
-    return [Fact('The certificate of the running parameters holds', finding, all(holds))]
-
-
 def _number(value: float | None, form: str) -> str:
     return 'not recorded' if value is None else form.format(value)
+
+
+def _if_known(value: float | None, statement: str, form: str, holds: bool | None = None,
+              ) -> list[Fact]:
+    return [] if value is None else [Fact(statement, form.format(value), holds)]

@@ -8,6 +8,7 @@ import datetime
 import json
 import os
 import platform
+import re
 import subprocess
 from collections.abc import Mapping
 from contextlib import suppress
@@ -62,16 +63,16 @@ def versions() -> dict[str, str]:
 def host_facts() -> dict[str, Any]:
     """Facts that change how fast a run goes: processor, number of cores, load, system."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()
-    load = [round(value, 2) for value in os.getloadavg()] if hasattr(os, 'getloadavg') else None
+    model = None
+    with suppress(OSError):
+        text = Path('/proc/cpuinfo').read_text(encoding='utf-8')
+        model = re.search(r'^model name\s*:\s*(.*?)\s*$', text, re.MULTILINE)
     return {
-        'system': platform.system(),
-        'machine': platform.machine(),
-        'processor': _processor(),
-        'cores': os.cpu_count(),
-        'usable_cores': usable,
-        'load_average': load,
-        'rmw': os.environ.get('RMW_IMPLEMENTATION', 'default'),
-    }
+        'system': platform.system(), 'machine': platform.machine(),
+        'processor': model[1] if model else platform.processor() or 'unknown',
+        'cores': os.cpu_count(), 'usable_cores': usable,
+        'load_average': [round(value, 2) for value in os.getloadavg()],
+        'rmw': os.environ.get('RMW_IMPLEMENTATION', 'default')}
 
 
 def without_paths(value: Any) -> Any:
@@ -82,23 +83,12 @@ def without_paths(value: Any) -> Any:
         return [without_paths(entry) for entry in value]
     if isinstance(value, Path):
         value = str(value)
-    if isinstance(value, str) and (value.startswith(('/', '~/')) or value[1:3] in (':\\', ':/')):
+    if isinstance(value, str) and re.match(r'~?/|.:[\\/]', value):
+        path = Path(value).expanduser()
         # topic names begin with a slash too, but name no folder that exists
-        return value.replace('\\', '/').rsplit('/', 1)[-1] if _in_a_folder(value) else value
+        if path.exists() or (len(path.parts) > 2 and path.parent.exists()):
+            return re.split(r'[\\/]', value)[-1]
     return value
-
-
-def _in_a_folder(text: str) -> bool:
-    path = Path(text).expanduser()
-    return path.exists() or (len(path.parts) > 2 and path.parent.exists())
-
-
-def _processor() -> str:
-    with suppress(OSError):
-        for line in Path('/proc/cpuinfo').read_text(encoding='utf-8').splitlines():
-            if line.startswith('model name'):
-                return line.split(':', 1)[1].strip()
-    return platform.processor() or 'unknown'
 
 
 def source_commit() -> dict[str, Any] | None:
@@ -110,9 +100,9 @@ def source_commit() -> dict[str, Any] | None:
         ``hash`` and ``changed`` (whether tracked files differ from it); None outside a checkout,
         where the package's version has to do.
     """
-    package = Path(dmp_cpg_ros.__file__).resolve().parent
-    for folder in (package, _installed_from()):
-        if folder is not None and _tracks(folder):
+    for folder in (Path(dmp_cpg_ros.__file__).resolve().parent, _installed_from()):
+        # git has to track the package there, not just a folder around it
+        if folder is not None and _git(folder, 'ls-files', '--', '__init__.py'):
             commit = _git(folder, 'rev-parse', 'HEAD')
             changes = _git(folder, 'status', '--porcelain', '--untracked-files=no')
             if commit:
@@ -126,23 +116,13 @@ def _installed_from() -> Path | None:
         text = metadata.distribution('dmp_cpg_ros').read_text('direct_url.json')
     except metadata.PackageNotFoundError:
         return None
-    url = urlparse(json.loads(text).get('url', '')) if text else None
-    if url is None or url.scheme != 'file':
-        return None
-    folder = Path(unquote(url.path)) / 'dmp_cpg_ros'
-    return folder if folder.is_dir() else None
-
-
-def _tracks(folder: Path) -> bool:
-    """Whether git tracks the package there, not just a folder around it."""
-    return bool(_git(folder, 'ls-files', '--', '__init__.py'))
+    url = urlparse(json.loads(text or '{}').get('url', ''))
+    return Path(unquote(url.path)) / 'dmp_cpg_ros' if url.scheme == 'file' else None
 
 
 def _git(folder: Path, *arguments: str) -> str:
     """Output of a git command, empty when it fails or there is no git."""
-    try:
-        done = subprocess.run(['git', '-C', str(folder), *arguments], capture_output=True,
-                              text=True, timeout=10, check=False)
-    except (OSError, subprocess.TimeoutExpired):
-        return ''
-    return done.stdout.strip() if done.returncode == 0 else ''
+    with suppress(OSError, subprocess.SubprocessError):
+        return subprocess.run(['git', '-C', str(folder), *arguments], capture_output=True,
+                              text=True, timeout=10, check=True).stdout.strip()
+    return ''

@@ -8,8 +8,8 @@ Who draws is handed in: this layer knows poses, the robot's layer knows how the 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib import image
@@ -18,10 +18,8 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import MOVING, requested_stops, steady_segments
 from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 Draw = Callable[[Array, Array, Array], Sequence[NDArray[np.uint8]]]
 """From base positions (n, 3), quaternions (n, 4), joint positions (n, 12) to pictures, or none."""
@@ -33,8 +31,7 @@ FEWEST_SAMPLES = 3
 """Shorter losses of contact are no swings."""
 
 
-@dataclass(frozen=True)
-class Moment:
+class Moment(NamedTuple):
     """A time that is worth a picture.
 
     Attributes
@@ -54,31 +51,29 @@ class Moment:
 
 def moments(recording: Recording, context: RunContext) -> list[Moment]:
     """Walking straight on with a foot in the air, at rest, turning; those that happened."""
-    found = []
-    segments = steady_segments(recording)
-    for start, end in segments:
-        if abs(_reference(recording, start)[2]) < MOVING:
-            time = _foot_in_the_air(recording, context, start, end)
-            v = _reference(recording, start)[0]
-            found.append(Moment('walking', f'Walking at {v:.2f} m/s (t = {time:.2f} s)', time))
-            break
-    for stop in requested_stops(recording):
-        if stop.events[-1].message == 'at_rest':
-            time = 0.5 * (stop.events[-1].time + stop.end)
-            found.append(Moment('at_rest', f'At rest under inhibition (t = {time:.2f} s)', time))
-            break
-    rates = [_reference(recording, start)[2] for start, _ in segments]
-    fastest = int(np.argmax(np.abs(rates))) if rates else 0
-    if rates and abs(rates[fastest]) >= MOVING:
-        time = _foot_in_the_air(recording, context, *segments[fastest])
-        gamma = rates[fastest]
-        found.append(Moment('turning', f'Turning at {gamma:.2f} rad/s (t = {time:.2f} s)', time))
+    reference, found = recording.reference, []
+    steady = [(*held(reference.time, reference.value, np.array([start]))[0, [0, 2]], start, end)
+              for start, end in steady_segments(recording)]
+    straight = next((of for of in steady if abs(of[1]) < MOVING), None)
+    if straight:
+        time = _foot_in_the_air(recording, context, *straight[2:])
+        caption = f'Walking at {straight[0]:.2f} m/s (t = {time:.2f} s)'
+        found.append(Moment('walking', caption, time))
+    stop = next((stop for stop in requested_stops(recording)
+                 if stop.events[-1].message == 'at_rest'), None)
+    if stop:
+        time = 0.5 * (stop.events[-1].time + stop.end)
+        found.append(Moment('at_rest', f'At rest under inhibition (t = {time:.2f} s)', time))
+    fastest = max(steady, key=lambda of: abs(of[1]), default=None)
+    if fastest and abs(fastest[1]) >= MOVING:
+        time = _foot_in_the_air(recording, context, *fastest[2:])
+        caption = f'Turning at {fastest[1]:.2f} rad/s (t = {time:.2f} s)'
+        found.append(Moment('turning', caption, time))
     return found
 
 
-def write_pictures(
-    recording: Recording, context: RunContext, folder: Path, draw: Draw
-) -> dict[str, tuple[Path, str]]:
+def write_pictures(recording: Recording, context: RunContext, folder: Path, draw: Draw,
+                   ) -> dict[str, tuple[Path, str]]:
     """Draw the moments of a run and write ``NAME.png``.
 
     Parameters
@@ -97,12 +92,10 @@ def write_pictures(
     dict of str to (Path, str)
         File and caption by name; empty without pictures.
     """
-    if not (recording.joints.time.size and recording.odometry.time.size):
-        return {}
     chosen = moments(recording, context)
-    poses = [_pose(recording, moment.time, context.world.is_flat) for moment in chosen]
-    if not poses:
+    if not (recording.joints.time.size and recording.odometry.time.size and chosen):
         return {}
+    poses = [_pose(recording, moment.time, context.world.is_flat) for moment in chosen]
     pictures = draw(*(np.array(part) for part in zip(*poses, strict=True)))
     folder.mkdir(parents=True, exist_ok=True)
     written = {}
@@ -111,10 +104,6 @@ def write_pictures(
         image.imsave(path, picture)
         written[moment.name] = (path, moment.caption)
     return written
-
-
-def _reference(recording: Recording, time: float) -> Array:
-    return held(recording.reference.time, recording.reference.value, np.array([time]))[0]
 
 
 def _pose(recording: Recording, time: float, turn: bool) -> tuple[Array, Array, Array]:
@@ -137,10 +126,7 @@ def _pose(recording: Recording, time: float, turn: bool) -> tuple[Array, Array, 
 
 def _foot_in_the_air(recording: Recording, context: RunContext, start: float, end: float) -> float:
     """Middle of a swing of the near front foot, about the middle of an interval [s]."""
-    middle = 0.5 * (start + end)
-    feet = recording.feet
-    if not feet.time.size:
-        return middle
+    middle, feet = 0.5 * (start + end), recording.feet
     inside = (feet.time >= start) & (feet.time <= end)
     swings = stretches(inside & (feet.force[:, NEAR_FOOT] <= context.contact_force))
     middles = [float(feet.time[(first + past) // 2]) for first, past in swings

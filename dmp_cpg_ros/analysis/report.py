@@ -4,66 +4,114 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import base64
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.analysis import report_parts as parts
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.figures.catalogue import CATALOGUE
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
-from dmp_cpg_ros.analysis.report_style import CSS
 from dmp_cpg_ros.analysis.strict_json import to_json
 
 STEADY_NOTE = (
     '<p>Means over whole gait cycles of each stretch of constant reference, after settling; '
-    'speeds in m/s, turn rates in rad/s, errors relative to the reference.</p>'
-)
+    'speeds in m/s, turn rates in rad/s, errors relative to the reference.</p>')
+
+MARKS = {True: ('good', '✓ holds'), False: ('bad', '✗ does not hold'), None: ('none', '–')}
+"""Marks of facts are words too, not only colours."""
+
+UNITS = {'_m_s': 'm/s', '_s': 's', '_m': 'm', '_n': 'N'}
+"""Endings of keys that name a unit."""
+
+CSS = """
+:root { color-scheme: light dark;
+  --ink: #1c2127; --soft: #5b6570; --line: #dfe3e8; --page: #f6f7f9; --card: #ffffff;
+  --good: #11713a; --bad: #b3261e; --accent: #0a5ea8; --zebra: #f7f9fb;
+  --mono: ui-monospace, "SF Mono", Menlo, Consolas, "DejaVu Sans Mono", monospace; }
+@media (prefers-color-scheme: dark) { :root {
+  --ink: #e6e9ed; --soft: #9aa5b1; --line: #333b45; --page: #14181d; --card: #1c2229;
+  --good: #5fd08a; --bad: #ff8a80; --accent: #6db3f2; --zebra: #212830; } }
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--page); color: var(--ink);
+  font: 15px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", sans-serif; }
+main { max-width: 1000px; margin: 0 auto; padding: 32px 20px 64px; }
+h1 { font-size: 1.7em; line-height: 1.25; margin: 0 0 4px; letter-spacing: -0.01em; }
+h2 { font-size: 1.2em; margin: 44px 0 12px; padding-top: 14px; border-top: 1px solid var(--line); }
+h3 { font-size: 1.02em; margin: 0 0 10px; }
+.subtitle { color: var(--soft); margin: 0 0 20px; }
+nav { display: flex; flex-wrap: wrap; gap: 4px 18px; margin: 0 0 20px; font-size: 0.93em; }
+a { color: var(--accent); text-decoration: none; }
+a:hover { text-decoration: underline; }
+.scroll { overflow-x: auto; margin: 0 0 16px; background: var(--card);
+  border: 1px solid var(--line); border-radius: 8px; }
+table { border-collapse: collapse; width: 100%; font-size: 0.93em; }
+th, td { text-align: left; padding: 7px 12px; vertical-align: top;
+  border-bottom: 1px solid var(--line); }
+tr:last-child > td { border-bottom: 0; }
+thead th { color: var(--soft); font-weight: 600; vertical-align: bottom; }
+tbody tr:nth-child(even) { background: var(--zebra); }
+th.number, td.number { text-align: right; }
+td.number { font-variant-numeric: tabular-nums; white-space: nowrap; }
+.mark { white-space: nowrap; font-weight: 600; }
+.good { color: var(--good); }
+.bad { color: var(--bad); }
+.none { color: var(--soft); font-weight: 400; }
+code { font: 0.92em var(--mono); overflow-wrap: anywhere; }
+pre { margin: 0; padding: 14px; overflow: auto; max-height: 480px; font: 12.5px/1.5 var(--mono); }
+figure { margin: 0 0 22px; padding: 16px; background: var(--card);
+  border: 1px solid var(--line); border-radius: 8px; }
+figure img { display: block; width: 100%; height: auto; border-radius: 4px; background: #ffffff; }
+figcaption { margin-top: 10px; color: var(--soft); font-size: 0.93em; }
+figcaption b { color: var(--ink); }
+.pictures { display: grid; gap: 14px; margin: 20px 0 0;
+  grid-template-columns: repeat(auto-fit, minmax(260px, 1fr)); }
+.pictures figure { margin: 0; padding: 10px; }
+summary { cursor: pointer; color: var(--accent); margin: 0 0 8px; }
+footer { margin-top: 48px; color: var(--soft); font-size: 0.88em; }
+@media print {
+  body { background: #ffffff; }
+  figure, .scroll { break-inside: avoid; }
+  nav { display: none; }
+}
+"""
 
 
-@dataclass(frozen=True)
-class RunResults:
-    """What an analysis found and wrote.
+def render(title: str, subtitle: str, metrics: Mapping[str, Any], manifest: Mapping[str, Any],
+           figures: Mapping[str, Path], pictures: Mapping[str, tuple[Path, str]]) -> str:
+    """Return the report as HTML text; pictures are inside it.
 
-    Attributes
+    Parameters
     ----------
-    folder : Path
-        Where everything is.
-    metrics, manifest : dict
+    title, subtitle : str
+        Above everything.
+    metrics, manifest : mapping
         As in ``metrics.json`` and ``manifest.json``.
-    report : Path or None
-        None when no report was asked for.
-    figures : dict of str to Path
+    figures : mapping of str to Path
         PNG files by the names of the catalogue.
-    pictures : dict of str to (Path, str)
+    pictures : mapping of str to (Path, str)
         PNG files and captions by name.
     """
-
-    folder: Path
-    metrics: dict[str, Any]
-    manifest: dict[str, Any]
-    report: Path | None
-    figures: dict[str, Path] = field(default_factory=dict)
-    pictures: dict[str, tuple[Path, str]] = field(default_factory=dict)
-
-
-def render(title: str, subtitle: str, results: RunResults) -> str:
-    """Return the report as HTML text; pictures are inside it."""
-    metrics = results.metrics
-    sections = [
-        ('summary', 'Summary', _summary(results)),
-        ('figures', 'Figures', _figures(results)), ('stops', 'Stops and starts', _stops(metrics)),
-        ('speeds', 'Steady speeds', _speeds(metrics)), ('metrics', 'Metrics', _metrics(metrics)),
-        ('certificate', 'Certificate', _certificate(metrics)),
-        ('manifest', 'Manifest', _manifest(results.manifest))]
-    sections = [section for section in sections if section[2]]
-    links = ''.join(f'<a href="#{name}">{title}</a>' for name, title, _ in sections)
-    body = ''.join(
-        f'<section id="{name}"><h2>{title}</h2>{content}</section>\n' for name, title,
-        content in sections)
-    title, created = escape(title), escape(str(results.manifest.get('created', '')))
+    shown = ''.join(_figure(path, caption) for path, caption in pictures.values())
+    sections = {
+        'Summary': _summary(metrics, manifest) + (
+            f'<div class="pictures">{shown}</div>' if shown else ''),
+        'Figures': ''.join(_figure(figures[name], title, caption)
+                           for name, title, _, caption in CATALOGUE if name in figures),
+        'Stops and starts': ''.join(
+            f'<h3>{name}s</h3>{_records(entries)}' for name in ('Stop', 'Start')
+            if (entries := metrics[name.lower()]['all'])),
+        'Steady speeds': _records(metrics['tracking']['steady'], STEADY_NOTE),
+        'Metrics': _metrics(metrics),
+        'Certificate': _records([entry if isinstance(entry, Mapping) else {'inequality': entry}
+                                 for entry in metrics['certificate'] or ()]),
+        'Manifest': _manifest(manifest)}
+    ids = {name: name.lower().replace(' ', '_') for name, content in sections.items() if content}
+    links = ''.join(f'<a href="#{of}">{name}</a>' for name, of in ids.items())
+    body = ''.join(f'<section id="{of}"><h2>{name}</h2>{sections[name]}</section>\n'
+                   for name, of in ids.items())
+    title, created = escape(title), escape(str(manifest.get('created', '')))
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
@@ -73,54 +121,83 @@ def render(title: str, subtitle: str, results: RunResults) -> str:
         '</main></body></html>\n')
 
 
-def _summary(results: RunResults) -> str:
-    table = parts.fact_table(facts(results.metrics, results.manifest.get('lock_step')))
-    pictures = ''.join(parts.figure(path, title) for path, title in results.pictures.values())
-    return table + (f'<div class="pictures">{pictures}</div>' if pictures else '')
-
-
-def _figures(results: RunResults) -> str:
-    return ''.join(parts.figure(results.figures[entry.name], entry.title, entry.caption)
-                   for entry in CATALOGUE if entry.name in results.figures)
-
-
-def _metrics(metrics: dict[str, Any]) -> str:
-    numbers = {group: values for group, values in metrics.items() if group != 'certificate'}
+def _summary(metrics: Mapping[str, Any], manifest: Mapping[str, Any]) -> str:
     rows = []
-    for name, value in parts.flattened(numbers).items():
-        unit, meaning = DEFINITIONS.get(name, ('', ''))
-        rows.append(
-            [f'<code>{escape(name)}</code>', parts.text(value), escape(unit), escape(meaning)]
-        )
-    return parts.table(['Name', 'Value', 'Unit', 'Meaning'], rows, numbers=(1,))
+    for fact in facts(metrics, manifest.get('lock_step')):
+        kind, word = MARKS[fact.holds]
+        rows.append([escape(fact.statement), escape(fact.finding),
+                     f'<span class="mark {kind}">{word}</span>'])
+    return _table(('Statement', 'Found', ''), rows)
 
 
-def _stops(metrics: dict[str, Any]) -> str:
-    return ''.join(
-        f'<h3>{title}</h3>{parts.record_table(metrics[group]["all"])}'
-        for group, title in (('stop', 'Stops'), ('start', 'Starts'))
-        if metrics[group]['all'])
-
-
-def _speeds(metrics: dict[str, Any]) -> str:
-    steady = metrics['tracking']['steady']
-    return STEADY_NOTE + parts.record_table(steady) if steady else ''
-
-
-def _certificate(metrics: dict[str, Any]) -> str:
-    entries = metrics['certificate']
-    if not entries:
-        return ''
-    if all(isinstance(entry, dict) for entry in entries):
-        return parts.record_table(entries)
-    return parts.table(['Inequality'], [[parts.text(entry)] for entry in entries])
+def _metrics(metrics: Mapping[str, Any]) -> str:
+    numbers = flattened({name: of for name, of in metrics.items() if name != 'certificate'})
+    return _table(('Name', 'Value', 'Unit', 'Meaning'), (
+        [f'<code>{escape(name)}</code>', _text(value),
+         *map(escape, DEFINITIONS.get(name, ('', '')))] for name, value in numbers.items()), [1])
 
 
 def _manifest(manifest: Mapping[str, Any]) -> str:
-    listed = {key: value for key, value in manifest.items() if key != 'parameters'}
-    rows = [[f'<code>{escape(name)}</code>', parts.text(value)]
-            for name, value in parts.flattened(listed).items()]
-    parameters = escape(to_json(manifest.get('parameters', {})))
-    return (
-        parts.table(['Name', 'Value'], rows) + '<details><summary>Parameters</summary>'
-        f'<div class="scroll"><pre>{parameters}</pre></div></details>')
+    listed = flattened({name: of for name, of in manifest.items() if name != 'parameters'})
+    rows = ([f'<code>{escape(name)}</code>', _text(value)] for name, value in listed.items())
+    return (f'{_table(("Name", "Value"), rows)}<details><summary>Parameters</summary>'
+            f'<div class="scroll"><pre>{escape(to_json(manifest.get("parameters", {})))}</pre>'
+            '</div></details>')
+
+
+def _figure(png: Path, title: str, caption: str = '') -> str:
+    """Picture with title and caption; the URI carries the picture itself."""
+    data = base64.b64encode(png.read_bytes()).decode('ascii')
+    words = f'<b>{escape(title)}.</b> {escape(caption)}' if caption else escape(title)
+    return (f'<figure><img alt="{escape(title)}" src="data:image/png;base64,{data}">'
+            f'<figcaption>{words}</figcaption></figure>')
+
+
+def _records(records: Sequence[Mapping[str, Any]], note: str = '') -> str:
+    """Table of records under a note, with keys as columns as they first appear; '' without any."""
+    keys = list(dict.fromkeys(key for record in records for key in record))
+    numbers = [column for column, key in enumerate(keys) if all(
+        isinstance(record.get(key), (int, float, type(None)))
+        and not isinstance(record.get(key), bool) for record in records)]
+    rows = ([_text(record.get(key)) for key in keys] for record in records)
+    return note + _table([label(key) for key in keys], rows, numbers) if records else ''
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int] = ()) -> str:
+    """Table of cells that are HTML already; the columns ``numbers`` are set to the right."""
+    kinds = [' class="number"' if column in numbers else '' for column in range(len(head))]
+    heads = ''.join(f'<th scope="col"{kind}>{escape(name)}</th>'
+                    for kind, name in zip(kinds, head, strict=True))
+    body = ''.join('<tr>' + ''.join(f'<td{kind}>{cell}</td>' for kind, cell
+                                    in zip(kinds, cells, strict=True)) + '</tr>' for cells in rows)
+    return (f'<div class="scroll"><table><thead><tr>{heads}</tr></thead>'
+            f'<tbody>{body}</tbody></table></div>')
+
+
+def label(key: str) -> str:
+    """Name of a number as a heading: ``body_still_after_s`` is ``body still after [s]``."""
+    ending = next((ending for ending in UNITS if key.endswith(ending)), '')
+    words = key.removesuffix(ending).replace('_', ' ')
+    return f'{words} [{UNITS[ending]}]' if ending else words
+
+
+def _text(value: Any) -> str:
+    """Value as HTML: four significant digits, yes and no, a dash for nothing."""
+    if value is None or isinstance(value, bool):
+        return {None: '–', True: 'yes', False: 'no'}[value]
+    if isinstance(value, float):
+        return f'{value:.4g}'
+    if isinstance(value, (list, tuple)):
+        return ', '.join(_text(entry) for entry in value)
+    return escape(str(value))
+
+
+def flattened(values: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
+    """Nested values by dotted names; lists of mappings are left out."""
+    flat: dict[str, Any] = {}
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            flat.update(flattened(value, f'{prefix}{key}.'))
+        elif not (isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value)):
+            flat[f'{prefix}{key}'] = value
+    return flat

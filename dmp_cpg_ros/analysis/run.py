@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,34 @@ from dmp_cpg_ros.analysis.figures.catalogue import write_figures
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.pictures import Draw, write_pictures
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.analysis.report import RunResults, render
+from dmp_cpg_ros.analysis.report import render
 from dmp_cpg_ros.analysis.strict_json import plain, write_json
+
+
+@dataclass(frozen=True)
+class RunResults:
+    """What an analysis found and wrote.
+
+    Attributes
+    ----------
+    folder : Path
+        Where everything is.
+    metrics, manifest : dict
+        As in ``metrics.json`` and ``manifest.json``.
+    report : Path or None
+        None when no report was asked for.
+    figures : dict of str to Path
+        PNG files by the names of the catalogue.
+    pictures : dict of str to (Path, str)
+        PNG files and captions by name.
+    """
+
+    folder: Path
+    metrics: dict[str, Any]
+    manifest: dict[str, Any]
+    report: Path | None = None
+    figures: dict[str, Path] = field(default_factory=dict)
+    pictures: dict[str, tuple[Path, str]] = field(default_factory=dict)
 
 
 def write_results(
@@ -52,28 +79,25 @@ def write_results(
     write_json(folder / 'metrics.json', metrics)
     write_json(folder / 'manifest.json', facts)
     if not report:
-        return RunResults(folder, metrics, facts, None)
+        return RunResults(folder, metrics, facts)
     figures = write_figures(recording, context, folder / 'figures')
     pictures = {} if draw is None else write_pictures(recording, context, folder / 'figures', draw)
-    results = RunResults(folder, metrics, facts, folder / 'report.html', figures, pictures)
-    text = render(_title(context, facts), _subtitle(recording, context, facts), results)
-    (folder / 'report.html').write_text(text, encoding='utf-8')
-    return results
+    page = folder / 'report.html'
+    page.write_text(render(*_headings(recording, context, facts), metrics, facts, figures,
+                           pictures), encoding='utf-8')
+    return RunResults(folder, metrics, facts, page, figures, pictures)
 
 
-def _title(context: RunContext, manifest: Mapping[str, Any]) -> str:
-    scenario = manifest.get('scenario')
+def _headings(recording: Recording, context: RunContext, manifest: Mapping[str, Any],
+              ) -> tuple[str, str]:
+    """Title and subtitle of the report."""
+    scenario, (start, end) = manifest.get('scenario'), recording.span
     name = scenario.get('name') if isinstance(scenario, Mapping) else scenario
     gait = 'Walk' if context.gait is None else context.gait.name.capitalize()
-    return (
-        f'{gait}: {name}' if isinstance(name, str) and name else f'{gait} with sparse inhibition'
-    )
-
-
-def _subtitle(recording: Recording, context: RunContext, manifest: Mapping[str, Any]) -> str:
-    start, end = recording.span
-    words = [] if context.robot is None else [context.robot.name]
-    words.append(f'{end - start:.1f} s of robot time')
-    if manifest.get('lock_step') is not None:
-        words.append('lock-step' if manifest['lock_step'] else 'real time')
-    return ' · '.join([*words, f'{sum(recording.counts.values()):,} messages'])
+    title = f'{gait}: {name}' if isinstance(name, str) and name else (
+        f'{gait} with sparse inhibition')
+    lock_step = manifest.get('lock_step')
+    pace = [] if lock_step is None else ['lock-step' if lock_step else 'real time']
+    robot = [] if context.robot is None else [context.robot.name]
+    return title, ' · '.join([*robot, f'{end - start:.1f} s of robot time', *pace,
+                              f'{sum(recording.counts.values()):,} messages'])
