@@ -4,9 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
@@ -21,36 +22,42 @@ from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.transformation.foot_motion import Motion
 from dmp_cpg_ros.core.transformation.learned_motion import LearnedMotion
 
+Primitive = DiscretePrimitive | RhythmicPrimitive
+
+
+class _Kind(NamedTuple):
+    """What tells the two kinds of primitive apart, in memory and in files."""
+
+    primitive: Callable[..., Primitive]
+    bases: type[GaussianBases] | type[VonMisesBases]
+    scalars: tuple[str, ...]
+    vectors: tuple[str, ...]
+    head: str
+
+
 _FORMAT = 1
 
-_HEADER = {
-    'discrete': '# Discrete movement primitive, written by dmp_cpg_ros.\n'
-    '# phase_decay, goal_rate, tau_rate [1/s]; duration [s]; stiffness [1/s^2]; damping [1/s];\n'
-    '# weights: one row per basis, one column per degree of freedom.\n',
-    'rhythmic': '# Rhythmic movement primitive, written by dmp_cpg_ros.\n'
-    '# omega [rad/s]; rho, centre_rate, amplitude_rate, tau_rate [1/s]; stiffness [1/s^2];\n'
-    '# damping [1/s]; weights: per basis and degree of freedom, what multiplies x1 and x2.\n',
+_KINDS = {
+    'discrete': _Kind(
+        DiscretePrimitive, GaussianBases, ('phase_decay', 'duration', 'goal_rate', 'tau_rate'),
+        ('start', 'goal', 'start_velocity'), """\
+# Discrete movement primitive, written by dmp_cpg_ros.
+# phase_decay, goal_rate, tau_rate [1/s]; duration [s]; stiffness [1/s^2]; damping [1/s];
+# weights: one row per basis, one column per degree of freedom.
+"""),
+    'rhythmic': _Kind(
+        RhythmicPrimitive, VonMisesBases,
+        ('omega', 'rho', 'centre_rate', 'amplitude_rate', 'tau_rate'), ('centre',), """\
+# Rhythmic movement primitive, written by dmp_cpg_ros.
+# omega [rad/s]; rho, centre_rate, amplitude_rate, tau_rate [1/s]; stiffness [1/s^2];
+# damping [1/s]; weights: per basis and degree of freedom, what multiplies x1 and x2.
+"""),
 }
-
-_SCALARS = {
-    'discrete': ('phase_decay', 'duration', 'goal_rate', 'tau_rate'),
-    'rhythmic': ('omega', 'rho', 'centre_rate', 'amplitude_rate', 'tau_rate'),
-}
-_VECTORS = {'discrete': ('start', 'goal', 'start_velocity'), 'rhythmic': ('centre',)}
-_COMMON = (
-    'format',
-    'kind',
-    'names',
-    'form',
-    'stiffness',
-    'damping',
-    'basis_centres',
-    'basis_widths',
-    'weights',
-)
+_WORDS = ('format', 'kind', 'names', 'form')
+_SHARED = ('stiffness', 'damping', 'basis_centres', 'basis_widths', 'weights')
 
 
-def save_primitive(primitive: DiscretePrimitive | RhythmicPrimitive, path: str | Path) -> None:
+def save_primitive(primitive: Primitive, path: str | Path) -> None:
     """Write a primitive; :func:`load_primitive` gives the same numbers back, bit for bit.
 
     Parameters
@@ -65,27 +72,14 @@ def save_primitive(primitive: DiscretePrimitive | RhythmicPrimitive, path: str |
         If the file cannot be written.
     """
     kind = 'discrete' if isinstance(primitive, DiscretePrimitive) else 'rhythmic'
-    spring = primitive.transformation
+    of, spring, bases = _KINDS[kind], primitive.transformation, primitive.bases
     content: dict[str, Any] = {
-        'format': _FORMAT,
-        'kind': kind,
-        'names': list(primitive.names),
-        'form': spring.form,
-    }
-    content.update({name: float(getattr(primitive, name)) for name in _SCALARS[kind]})
-    content.update(
-        {name: np.asarray(getattr(primitive, name)).tolist() for name in _VECTORS[kind]}
-    )
-    content.update(
-        stiffness=spring.stiffness.tolist(),
-        damping=spring.damping.tolist(),
-        basis_centres=primitive.bases.centres.tolist(),
-        basis_widths=primitive.bases.widths.tolist(),
-        weights=primitive.weights.tolist(),
-    )
-    text = _HEADER[kind] + yaml.safe_dump(
-        content, sort_keys=False, default_flow_style=None, width=99
-    )
+        'format': _FORMAT, 'kind': kind, 'names': list(primitive.names), 'form': spring.form}
+    for name in (*of.scalars, *of.vectors):
+        content[name] = np.asarray(getattr(primitive, name), dtype=float).tolist()
+    arrays = (spring.stiffness, spring.damping, bases.centres, bases.widths, primitive.weights)
+    content.update({name: array.tolist() for name, array in zip(_SHARED, arrays, strict=True)})
+    text = of.head + yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=99)
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -94,7 +88,7 @@ def save_primitive(primitive: DiscretePrimitive | RhythmicPrimitive, path: str |
         raise MissingFileError(f'{path} cannot be written: {error.strerror}') from error
 
 
-def load_primitive(path: str | Path) -> DiscretePrimitive | RhythmicPrimitive:
+def load_primitive(path: str | Path) -> Primitive:
     """Read a primitive.
 
     Parameters
@@ -115,20 +109,36 @@ def load_primitive(path: str | Path) -> DiscretePrimitive | RhythmicPrimitive:
     ParameterError
         If a number is out of its range.
     """
-    path = Path(path)
     content = load_yaml(path)
     kind = content.get('kind')
-    if not isinstance(kind, str) or kind not in _SCALARS:
+    if not isinstance(kind, str) or kind not in _KINDS:
         raise DataError(
-            f"{path} is not a movement primitive: its 'kind' must be one of {', '.join(_SCALARS)}"
-        )
+            f"{path} is not a movement primitive: its 'kind' must be one of {', '.join(_KINDS)}")
     if content.get('format') != _FORMAT:
         raise DataError(
-            f'{path}: format {shown(content.get("format"))} is not known; valid is {_FORMAT}'
-        )
-    keys = (*_COMMON, *_SCALARS[kind], *_VECTORS[kind])
+            f'{path}: format {shown(content.get("format"))} is not known; valid is {_FORMAT}')
+    of = _KINDS[kind]
+    keys = (*_WORDS, *_SHARED, *of.scalars, *of.vectors)
     check_names(content, keys, keys, str(path))
-    return _built(content, path)
+    names = content['names']
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise DataError(f"{path}: 'names' must be a list of words")
+    numbers: dict[str, Any] = {key: _numbers(content, key, path) for key in keys[len(_WORDS):]}
+    for key in of.scalars:
+        if numbers[key].shape:
+            raise DataError(f"{path}: '{key}' must be one number")
+        numbers[key] = float(numbers[key])
+    stiffness, damping, centres, widths, weights = (numbers.pop(key) for key in _SHARED)
+    return of.primitive(
+        weights=weights, transformation=SpringDamper(stiffness, damping, content['form']),
+        bases=of.bases(centres, widths), names=tuple(names), **numbers)
+
+
+def _numbers(content: dict[str, Any], key: str, path: str | Path) -> Any:
+    try:
+        return np.array(content[key], dtype=float)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"{path}: '{key}' must hold numbers only") from error
 
 
 MOTIONS = 'dmp_cpg_ros.motions'
@@ -178,53 +188,3 @@ def motion_overrides(name: str) -> dict[str, Any]:
         return {}
     known = name if Path(name).suffix == '' and not Path(name).exists() else find_config(name)
     return {'motion': str(known), 'clearance': motion.clearance}
-
-
-def _built(content: dict[str, Any], path: Path) -> DiscretePrimitive | RhythmicPrimitive:
-    kind = content['kind']
-    numbers = {
-        key: _numbers(content, key, path)
-        for key in (
-            'stiffness',
-            'damping',
-            'basis_centres',
-            'basis_widths',
-            'weights',
-            *_VECTORS[kind],
-        )
-    }
-    vectors: dict[str, Any] = {key: numbers[key] for key in _VECTORS[kind]}
-    scalars: dict[str, Any] = {}
-    for key in _SCALARS[kind]:
-        value = _numbers(content, key, path)
-        if value.shape != ():
-            raise DataError(f"{path}: '{key}' must be one number")
-        scalars[key] = float(value)
-    names = content['names']
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise DataError(f"{path}: 'names' must be a list of words")
-    spring = SpringDamper(numbers['stiffness'], numbers['damping'], content['form'])
-    if kind == 'discrete':
-        return DiscretePrimitive(
-            weights=numbers['weights'],
-            transformation=spring,
-            names=tuple(names),
-            bases=GaussianBases(numbers['basis_centres'], numbers['basis_widths']),
-            **scalars,
-            **vectors,
-        )
-    return RhythmicPrimitive(
-        weights=numbers['weights'],
-        transformation=spring,
-        names=tuple(names),
-        bases=VonMisesBases(numbers['basis_centres'], numbers['basis_widths']),
-        **scalars,
-        **vectors,
-    )
-
-
-def _numbers(content: dict[str, Any], key: str, path: Path) -> Any:
-    try:
-        return np.array(content[key], dtype=float)
-    except (TypeError, ValueError) as error:
-        raise DataError(f"{path}: '{key}' must hold numbers only") from error
