@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The paper's figures, each from data to a Figure.
+"""Figures 1 to 4 and 6 of the paper, with what they show simulated.
 
 Figures 5 and 7 are those of the report, in :mod:`~dmp_cpg_ros.analysis.figures.over_time`.
 """
@@ -8,6 +8,8 @@ Figures 5 and 7 are those of the report, in :mod:`~dmp_cpg_ros.analysis.figures.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,8 +17,24 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
 
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.paper_data import LocalDynamics, VanDerPolData
+from dmp_cpg_ros.analysis.recording import Array
+from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.paper.coupling import EdgeCoupling
+from dmp_cpg_ros.paper.network import OscillatorNetwork
+from dmp_cpg_ros.paper.oscillators import HopfOscillators, VanDerPolOscillators
+
+VAN_DER_POL_OMEGA = (0.8, 1.0, 1.25, 1.5)
+VAN_DER_POL_MU = (0.5, 1.0, 1.5, 2.0)
+"""Frequencies [rad/s] and nonlinearities [1/s] of figure vdp; the paper does not print its own."""
+
+VAN_DER_POL_GAIN = np.diag((4.0, 4.0))
+"""K_ij of figure vdp, as in its caption [1/s]."""
+
+LOCAL_OMEGA, LOCAL_RHO, LOCAL_GAIN, LOCAL_REGION = 3.0, 2.0, 30.0, 0.3
+"""ω [rad/s], ρ [1/s], k_inh [1/s] and r0 of figure localDynamics; only r0 is the paper's."""
 
 COLOURS = tuple(style.LEG_COLOURS.values())
 
@@ -25,6 +43,94 @@ WIDTHS = (3.4, 2.4, 1.5, 0.8)
 
 SHOWN = 25.0
 """Time from the start that figure vdp shows [s]."""
+
+REGION: Any = {'facecolor': '#DCE8F5', 'edgecolor': '#3B6EA8'}
+CYCLE: Any = {'linestyle': (0, (4, 3)), 'color': '#777777'}
+
+
+class VanDerPolData(NamedTuple):
+    """Heterogeneous Van der Pol oscillators without and with coupling.
+
+    Attributes
+    ----------
+    time : ndarray (n,)
+        [s]
+    uncoupled, coupled : ndarray (n, N, 2)
+        States.
+    """
+
+    time: Array
+    uncoupled: Array
+    coupled: Array
+
+
+class LocalDynamics(NamedTuple):
+    """One Andronov-Hopf oscillator without or with switched inhibition.
+
+    Attributes
+    ----------
+    trajectories : ndarray (m, n, 2)
+        Trajectories from m initial states.
+    grid : ndarray (k,)
+        Where the field is given, along both axes.
+    field : ndarray (k, k, 2)
+        ẋ at (x₁, x₂) = (grid[j], grid[i]) [1/s].
+    target : ndarray (2,)
+        x_d.
+    region_radius : float
+        r0 of the region C, zero without inhibition.
+    """
+
+    trajectories: Array
+    grid: Array
+    field: Array
+    target: Array
+    region_radius: float
+
+
+def van_der_pol_data(duration: float = 60.0, dt: float = 0.01) -> VanDerPolData:
+    """Simulate the Van der Pol oscillators of figure vdp for a duration [s] with a step [s]."""
+    size, steps = len(VAN_DER_POL_OMEGA), round(duration / dt)
+    family = VanDerPolOscillators(size, VAN_DER_POL_OMEGA, VAN_DER_POL_MU)
+    graph = graph_from_edges(size, topology('all_to_all', size), VAN_DER_POL_GAIN)
+    start = np.array([[2.0, 0.0], [-2.0, 0.0], [0.5, -1.5], [-0.5, 2.5]])
+    free = Inhibition(False, np.zeros(size), 0.0)
+    return VanDerPolData(np.arange(steps + 1, dtype=float) * dt, *(
+        _simulated(OscillatorNetwork(family, coupling), free, start, steps, dt)
+        for coupling in (None, EdgeCoupling(graph))))
+
+
+def local_dynamics(inhibited: bool, duration: float = 6.0, dt: float = 0.005) -> LocalDynamics:
+    """Simulate the oscillator of figure localDynamics, each trajectory on its own."""
+    angles = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False) + 0.3
+    start = np.concatenate([state_at(angles, 1.55), state_at(angles[::2], 0.08)])
+    trajectories = _simulated(
+        *_alone(len(start), inhibited), start, round(duration / dt), dt).swapaxes(0, 1)
+    grid = np.linspace(-1.6, 1.6, 161)
+    states = np.stack(np.meshgrid(grid, grid), axis=-1)
+    x = states.reshape(-1, 2)
+    network, inhibition = _alone(len(x), inhibited)
+    field = network.field(x, inhibition.acting_gains(x, network.target))
+    return LocalDynamics(trajectories, grid, field.reshape(states.shape), network.target[0],
+                         LOCAL_REGION * inhibited)
+
+
+def _alone(count: int, inhibited: bool) -> tuple[OscillatorNetwork, Inhibition]:
+    """Some oscillators without coupling, each inhibited on its own: this is no stop of a network,
+    in which inhibited nodes act together.
+    """
+    network = OscillatorNetwork(HopfOscillators(count, LOCAL_OMEGA, LOCAL_RHO),
+                                target=state_at(np.zeros(count)))
+    return network, Inhibition(False, np.full(count, LOCAL_GAIN * inhibited), LOCAL_REGION)
+
+
+def _simulated(network: OscillatorNetwork, inhibition: Inhibition, x: Array, steps: int,
+               dt: float) -> Array:
+    """States (steps + 1, N, 2) from x on."""
+    rows = [x]
+    for _ in range(steps):
+        rows.append(network.step(rows[-1], dt, inhibition.acting_gains(rows[-1], network.target)))
+    return np.array(rows)
 
 
 def van_der_pol_figure(data: VanDerPolData, labels: Sequence[str]) -> Figure:
@@ -38,12 +144,10 @@ def van_der_pol_figure(data: VanDerPolData, labels: Sequence[str]) -> Figure:
         What tells each oscillator apart.
     """
     figure, axes = style.new_figure(4.6, 2, 2, height_ratios=(1.0, 1.5))
-    early = data.time <= SHOWN
-    late = data.time >= data.time[-1] - 0.4 * SHOWN
-    for column, (states, title) in enumerate(
-            ((data.uncoupled, 'uncoupled'), (data.coupled, r'coupled, $K_{ij}$ = diag(4, 4)'))):
-        over_time, plane = axes[:, column]
-        widths = WIDTHS if column else [1.2] * len(COLOURS)
+    early, late = data.time <= SHOWN, data.time >= data.time[-1] - 0.4 * SHOWN
+    for (over_time, plane), states, title, widths in (
+            (axes[:, 0], data.uncoupled, 'uncoupled', [1.2] * len(COLOURS)),
+            (axes[:, 1], data.coupled, r'coupled, $K_{ij}$ = diag(4, 4)', WIDTHS)):
         for i, (colour, width) in enumerate(zip(COLOURS, widths, strict=True)):
             over_time.plot(data.time[early], states[early, i, 0], color=colour, linewidth=width)
             plane.plot(*states[late, i].T, color=colour, linewidth=width)
@@ -52,23 +156,21 @@ def van_der_pol_figure(data: VanDerPolData, labels: Sequence[str]) -> Figure:
     axes[0, 0].set_ylabel('$x_{i1}$ [–]')
     axes[1, 0].set_ylabel('$x_{i2}$ [1/s]')
     figure.align_ylabels()
-    style.legend(figure, [style.key(label, color=colour)
-                          for colour, label in zip(COLOURS, labels, strict=True)])
+    style.legend(figure, style.keys(labels, COLOURS))
     return figure
 
 
 def local_dynamics_figure(free: LocalDynamics, inhibited: LocalDynamics) -> Figure:
     """Andronov-Hopf without and with switched inhibition (paper, figure localDynamics)."""
     figure, axes = style.new_figure(3.75, 1, 2, sharey=True)
-    for panel, data, title in zip(axes[0], (free, inhibited), (
-            'Andronov-Hopf', 'with switched inhibition'), strict=True):
+    titles = ('Andronov-Hopf', 'with switched inhibition')
+    for panel, data, title in zip(axes[0], (free, inhibited), titles, strict=True):
         panel.streamplot(data.grid, data.grid, data.field[..., 0], data.field[..., 1],
                          color='#C3C8CF', linewidth=0.6, arrowsize=0.6, density=1.3)
         if data.region_radius:
-            panel.add_patch(Circle(tuple(data.target), data.region_radius, facecolor='#DCE8F5',
-                                   edgecolor='#3B6EA8', linewidth=1.0, zorder=1.5))
-        panel.add_patch(Circle((0.0, 0.0), 1.0, fill=False, linestyle=(0, (4, 3)),
-                               linewidth=0.9, edgecolor='#777777', zorder=2))
+            panel.add_patch(Circle(
+                tuple(data.target), data.region_radius, linewidth=1.0, zorder=1.5, **REGION))
+        panel.add_patch(Circle((0.0, 0.0), 1.0, fill=False, linewidth=0.9, zorder=2, **CYCLE))
         for trajectory in data.trajectories:
             panel.plot(*trajectory.T, color=style.MEASURED, linewidth=0.9, zorder=3)
             panel.plot(*trajectory[0], marker='o', markersize=2.5, color=style.MEASURED, zorder=3)
@@ -77,12 +179,10 @@ def local_dynamics_figure(free: LocalDynamics, inhibited: LocalDynamics) -> Figu
         panel.set(title=title, xlabel='$x_1$ [–]', xlim=(-1.6, 1.6), ylim=(-1.6, 1.6))
         panel.set_aspect('equal')
     axes[0, 0].set_ylabel('$x_2$ [–]')
-    rest = style.key('at rest', color='#D55E00', marker='o', linestyle='')
     style.legend(figure, [
         style.key('trajectories', color=style.MEASURED, marker='o', markersize=2.5),
-        style.key('free limit cycle', color='#777777', linestyle=(0, (4, 3))),
-        Patch(facecolor='#DCE8F5', edgecolor='#3B6EA8', label='region C'),
-        rest])
+        style.key('free limit cycle', **CYCLE), Patch(label='region C', **REGION),
+        style.key('at rest', color='#D55E00', marker='o', linestyle='')])
     return figure
 
 
@@ -112,16 +212,15 @@ def hierarchy_figure() -> Figure:
     """Discrete and rhythmic primitives as hierarchies (paper, figure ContractionOfDMPs)."""
     figure, axes = style.new_figure(1.7)
     panel: Axes = _blank(axes[0, 0], (0.0, 10.0), (0.0, 2.6))
-    rows = ((1.9, 'discrete', 'contracting'), (0.7, 'rhythmic', 'transverse contracting'))
-    for y, kind, canonical in rows:
+    for y, kind, canonical, colour in (
+            (1.9, 'discrete', 'contracting', '#DCE8F5'),
+            (0.7, 'rhythmic', 'transverse contracting', '#F6E8B1')):
         panel.text(0.1, y, kind, va='center', fontweight='bold')
-        properties = ('contracting', canonical, 'contracting')
-        for i, (system, what) in enumerate(zip(
-                ('reference  r', 'canonical  x', 'transformation  y'), properties, strict=True)):
-            _box(panel, (2.6 + 2.7 * i, y), f'{system}\n{what}',
-                 '#F6E8B1' if what.startswith('transverse') else '#DCE8F5')
-            if i < 2:
-                _arrow(panel, (3.65 + 2.7 * i, y), (4.25 + 2.7 * i, y))
+        _box(panel, (2.6, y), 'reference  r\ncontracting', '#DCE8F5')
+        _arrow(panel, (3.65, y), (4.25, y))
+        _box(panel, (5.3, y), f'canonical  x\n{canonical}', colour)
+        _arrow(panel, (6.35, y), (6.95, y))
+        _box(panel, (8.0, y), 'transformation  y\ncontracting', '#DCE8F5')
     return figure
 
 
@@ -130,11 +229,9 @@ def network_figure() -> Figure:
     figure, axes = style.new_figure(2.9)
     panel: Axes = _blank(axes[0, 0], (-4.6, 4.6), (-1.9, 1.9))
     corners = {'fl': (-1.5, 1.2), 'fr': (1.5, 1.2), 'rl': (-1.5, -1.2), 'rr': (1.5, -1.2)}
-    places = list(corners.values())
-    for i, a in enumerate(places):
-        for b in places[i + 1:]:
-            diagonal = a[1] != b[1] and np.sign(b[0] - a[0])  # both bend below R
-            _arrow(panel, a, b, '<|-|>', 14.0, bend=0.32 * float(diagonal))
+    for a, b in combinations(corners.values(), 2):
+        diagonal = a[1] != b[1] and np.sign(b[0] - a[0])  # both bend below R
+        _arrow(panel, a, b, '<|-|>', 14.0, bend=0.32 * float(diagonal))
     for leg, (x, y) in corners.items():
         colour = style.LEG_COLOURS[leg]
         _arrow(panel, (0.0, 0.0), (x, y), '-|>', 14.0, style.GREY)

@@ -12,7 +12,7 @@ from pathlib import Path
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from dmp_cpg_ros.analysis import paper_data, paper_figures
+from dmp_cpg_ros.analysis import paper_figures
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import over_time, style
 from dmp_cpg_ros.analysis.recording import Recording
@@ -51,8 +51,8 @@ def figures(suite: Suite) -> Iterator[tuple[str, Figure]]:
     yield 'contraction_of_dmps', paper_figures.hierarchy_figure()
     yield 'coupled_dmps', paper_figures.network_figure()
     labels = [f'$\\omega$ = {omega:g}, $\\mu$ = {mu:g}' for omega, mu in zip(
-        paper_data.VAN_DER_POL_OMEGA, paper_data.VAN_DER_POL_MU, strict=True)]
-    yield 'van_der_pol', paper_figures.van_der_pol_figure(paper_data.van_der_pol_data(), labels)
+        paper_figures.VAN_DER_POL_OMEGA, paper_figures.VAN_DER_POL_MU, strict=True)]
+    yield 'van_der_pol', paper_figures.van_der_pol_figure(paper_figures.van_der_pol_data(), labels)
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
     scale = body_scale(robot.description)
     yield 'gait', paper_figures.gait_figure(suite.gait, suite.gait.duty(SPEED, scale))
@@ -64,7 +64,7 @@ def figures(suite: Suite) -> Iterator[tuple[str, Figure]]:
         if figure is not None:
             yield draw.__name__, figure
     yield 'local_dynamics', paper_figures.local_dynamics_figure(
-        paper_data.local_dynamics(False), paper_data.local_dynamics(True))
+        paper_figures.local_dynamics(False), paper_figures.local_dynamics(True))
 
 
 def experiment(suite: Suite, robot: MujocoRobot) -> Recording:

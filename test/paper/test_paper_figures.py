@@ -12,16 +12,16 @@ from core_examples import GAITS
 from matplotlib.collections import PolyCollection
 from PIL import Image
 
-from dmp_cpg_ros.analysis import paper_data, paper_figures
+from dmp_cpg_ros.analysis import paper_figures
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
-FREE = paper_data.local_dynamics(False)
-HELD = paper_data.local_dynamics(True)
+FREE = paper_figures.local_dynamics(False)
+HELD = paper_figures.local_dynamics(True)
 
 
 def test_coupling_brings_the_van_der_pol_oscillators_together() -> None:
-    data = paper_data.van_der_pol_data(duration=40.0)
+    data = paper_figures.van_der_pol_data(duration=40.0)
     late = data.time > 20.0
 
     def apart(states: np.ndarray) -> float:
