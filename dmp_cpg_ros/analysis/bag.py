@@ -73,7 +73,11 @@ def opened(bag: Path) -> Iterator[AnyReader]:
         try:
             reader = _reader([bag])
         except DataError as damage:
-            reader = _reader([_readable(file, bag, stack) for file in _parts(bag, damage)])
+            files = [rescue.closed(file, bag, stack) for file in _parts(bag, damage)]
+            try:
+                reader = _reader(files)
+            except DataError:
+                reader = _reader([rescue.ros_part(file, stack) for file in files])
         stack.callback(reader.close)
         try:
             yield reader
@@ -133,23 +137,6 @@ def _parts(bag: Path, damage: DataError) -> list[Path]:
             f"'{bag}' holds {len(files)} recordings and no usable metadata.yaml that makes them "
             f'one; name one of them: {", ".join(file.name for file in files)}')
     return files
-
-
-def _readable(file: Path, bag: Path, stack: ExitStack) -> Path:
-    """Return a file of a bag, or a copy of what is in it."""
-    try:
-        _reader([file]).close()
-        return file
-    except DataError:
-        if file.suffix != '.mcap':
-            raise
-    if not rescue.is_closed(file):
-        file = rescue.rescued(file, bag, stack)
-    try:
-        _reader([file]).close()
-        return file
-    except DataError:
-        return rescue.ros_part(file, stack)
 
 
 def _storage_files(folder: Path) -> list[Path]:

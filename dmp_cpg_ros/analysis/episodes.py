@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""When the robot walked, when its command was constant, when it was stopping and starting."""
+"""When the robot walked and in which gait, when it stopped, started, and kept its speed."""
 
 from __future__ import annotations
 
@@ -9,10 +9,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis.motion import stretches
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.motion import held, stretches
 from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits, shares_of
+from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.transformation.leg import body_scale
 
 STOPPING = ('waiting', 'captured', 'at_rest')
 RUNNING = ('free', 'walking')
@@ -91,9 +96,9 @@ def changing_intervals(recording: Recording) -> list[tuple[float, float]]:
             for first, past in stretches(changing)]
 
 
-def unwrapped_phases(recording: Recording) -> Array:
-    """Growing phases of the four oscillators, ndarray (n, 4) [rad]."""
-    return np.unwrap(phase(recording.canonical.x), axis=0)
+def _turns(recording: Recording) -> Array:
+    """Growing phase of oscillator fl, ndarray (n,) in cycles."""
+    return np.unwrap(phase(recording.canonical.x[:, 0])) / (2.0 * np.pi)
 
 
 def cycle_starts(recording: Recording, start: float, end: float) -> Array:
@@ -102,24 +107,24 @@ def cycle_starts(recording: Recording, start: float, end: float) -> Array:
     inside = (time >= start) & (time <= end)
     if np.count_nonzero(inside) < 2:
         return np.array([])
-    phi, time = unwrapped_phases(recording)[inside, 0] / (2.0 * np.pi), time[inside]
-    turns = np.arange(np.ceil(phi[0]), np.floor(phi[-1]) + 1.0)
-    return np.interp(turns, np.maximum.accumulate(phi), time)
+    turns, time = _turns(recording)[inside], time[inside]
+    whole = np.arange(np.ceil(turns[0]), np.floor(turns[-1]) + 1.0)
+    return np.interp(whole, np.maximum.accumulate(turns), time)
 
 
 def cycle_count(recording: Recording, start: float, end: float) -> float:
     """Gait cycles of oscillator fl between two times; 0 when no oscillators were recorded."""
-    if not recording.canonical.time.size:
+    time = recording.canonical.time
+    if not time.size:
         return 0.0
-    turns = unwrapped_phases(recording)[:, 0] / (2.0 * np.pi)
-    return float(np.diff(np.interp([start, end], recording.canonical.time, turns))[0])
+    return float(np.diff(np.interp([start, end], time, _turns(recording))).item())
 
 
 def gait_period(recording: Recording) -> float | None:
     """Median duration of a gait cycle while running [s], None where there is none."""
-    lengths = np.concatenate([np.array([]), *(
-        np.diff(cycle_starts(recording, *interval)) for interval in running_intervals(recording))])
-    return float(np.median(lengths)) if lengths.size else None
+    lengths = [length for interval in running_intervals(recording)
+               for length in np.diff(cycle_starts(recording, *interval))]
+    return float(np.median(lengths)) if lengths else None
 
 
 def steady_segments(recording: Recording) -> list[tuple[float, float]]:
@@ -152,9 +157,9 @@ def should_stand(recording: Recording, time: Array) -> NDArray[np.bool_]:
     """
     if not recording.modes:
         return np.ones(len(time), dtype=bool)
-    changes = np.array([event.time for event in recording.modes])
-    standing = np.array([event.message in BALANCED for event in recording.modes])
-    return np.asarray(standing[np.maximum(np.searchsorted(changes, time, 'right') - 1, 0)])
+    changes, standing = zip(*((event.time, event.message in BALANCED)
+                              for event in recording.modes), strict=True)
+    return held(np.array(changes), np.array(standing), time).astype(bool)
 
 
 def stands_until(recording: Recording, start: float, end: float) -> float:
@@ -163,6 +168,73 @@ def stands_until(recording: Recording, start: float, end: float) -> float:
     return min((time for time in down if start <= time < end), default=end)
 
 
-def fall_noticed(recording: Recording) -> bool:
-    """Whether the suite noticed a fall; a robot that was found fallen has not fallen since."""
-    return any(event.message == 'damped' for event in recording.modes[1:])
+class GaitRow(NamedTuple):
+    """Rows of the canonical states in one gait, or one row of a blend.
+
+    Attributes
+    ----------
+    rows : slice
+        Rows.
+    gait : Gait or BlendedGait
+        In force.
+    """
+
+    rows: slice
+    gait: GaitInForce
+
+
+def gait_rows(recording: Recording, context: RunContext) -> list[GaitRow] | None:
+    """Gaits in force, in order; None where the recording and its context do not tell.
+
+    A recording without names of gaits (from before gaits could change) was walked in the gait of
+    the context.
+    """
+    count = len(recording.canonical.time)
+    if context.gait is None or not count:
+        return None
+    shares = recording.canonical.gaits or (shares_of(context.gait),) * count
+    known = KnownGaits({**context.gaits, context.gait.name: context.gait})
+    borders = [0, *(k for k in range(1, count) if shares[k] != shares[k - 1]), count]
+    try:
+        return [GaitRow(slice(first, past), known.in_force(shares[first]))
+                for first, past in zip(borders, borders[1:], strict=False)]
+    except DataError:
+        return None
+
+
+def phase_offsets(recording: Recording, context: RunContext) -> Array | None:
+    """Phases of the legs relative to fl that the gait in force plans, ndarray (n, 4) [rad]."""
+    found = gait_rows(recording, context)
+    if found is None:
+        return None
+    offsets = np.empty((len(recording.canonical.time), 4))
+    for rows, gait in found:
+        offsets[rows] = gait.phases
+    return offsets
+
+
+def planned_stance(recording: Recording, context: RunContext) -> tuple[NDArray[np.bool_], Array]:
+    """Feet that the gait in force plans on the ground, and its duty factor.
+
+    Returns
+    -------
+    stance : ndarray of bool (n, 4)
+        No rows where gait, robot or reference are not known.
+    duty : ndarray (n,)
+    """
+    found, reference = gait_rows(recording, context), recording.reference
+    if found is None or context.robot is None or not reference.time.size:
+        return np.zeros((0, 4), dtype=bool), np.zeros(0)
+    scale, phi = body_scale(context.robot), phase(recording.canonical.x)
+    r = held(reference.time, reference.value, recording.canonical.time)
+    duty, position = np.empty(len(phi)), np.empty(phi.shape)
+    for rows, gait in found:
+        duty[rows] = [gait.duty(scale.foot_speed(*value), scale) for value in r[rows]]
+        position[rows] = gait.cycle_position(phi[rows])
+    return np.abs(position) >= 0.5 * (1.0 - duty[:, None]), duty
+
+
+def gaits_walked(recording: Recording) -> list[str]:
+    """Names of the gaits in force, each time one takes over; empty in old recordings."""
+    names = [gait.before for gait in recording.canonical.gaits if not gait.after]
+    return [name for k, name in enumerate(names) if k == 0 or name != names[k - 1]]

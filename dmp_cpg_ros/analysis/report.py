@@ -97,8 +97,8 @@ def render(title: str, subtitle: str, metrics: Mapping[str, Any], manifest: Mapp
     sections = {
         'Summary': _summary(metrics, manifest) + (
             f'<div class="pictures">{shown}</div>' if shown else ''),
-        'Figures': ''.join(_figure(figures[name], title, caption)
-                           for name, title, _, caption in CATALOGUE if name in figures),
+        'Figures': ''.join(_figure(figures[entry.name], entry.title, entry.caption)
+                           for entry in CATALOGUE if entry.name in figures),
         'Stops and starts': ''.join(
             f'<h3>{name}s</h3>{_records(entries)}' for name in ('Stop', 'Start')
             if (entries := metrics[name.lower()]['all'])),

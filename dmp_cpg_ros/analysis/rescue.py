@@ -34,19 +34,12 @@ ROS_SCHEMAS = ('ros2msg', 'ros2idl', 'omgidl')
 """Encodings of definitions that readers of ROS know."""
 
 
-def is_closed(file: Path) -> bool:
-    """Whether an MCAP file ends as one that was closed."""
-    with file.open('rb') as stream:
-        size = stream.seek(0, os.SEEK_END)
-        stream.seek(max(0, size - len(MCAP0_MAGIC)))
-        return stream.read() == MCAP0_MAGIC
+def closed(file: Path, bag: Path, stack: ExitStack) -> Path:
+    """Return a file that was closed, or a copy of every complete record of one that was not.
 
-
-def rescued(file: Path, bag: Path, stack: ExitStack) -> Path:
-    """Copy every complete record of an MCAP file into ``BAG.rescued/``, beside the bag.
-
-    Where that cannot be written the copy is temporary. A copy that is there already is never
-    overwritten: when it differs, the next free name is taken.
+    The copy of an MCAP file lies in ``BAG.rescued/``, beside the bag. Where that cannot be written
+    the copy is temporary. A copy that is there already is never overwritten: when it differs, the
+    next free name is taken.
 
     Parameters
     ----------
@@ -57,16 +50,13 @@ def rescued(file: Path, bag: Path, stack: ExitStack) -> Path:
     stack : ExitStack
         Removes what is temporary.
 
-    Returns
-    -------
-    Path
-        The copy.
-
     Raises
     ------
     DataError
         If it holds no complete message, is still being recorded, or cannot be copied.
     """
+    if file.suffix != '.mcap' or _is_closed(file):
+        return file
     bag = bag.resolve()
     try:
         scratch, lasting = _scratch(bag.parent, stack), True
@@ -83,17 +73,28 @@ def rescued(file: Path, bag: Path, stack: ExitStack) -> Path:
 
 
 def ros_part(file: Path, stack: ExitStack) -> Path:
-    """Return a temporary copy of an MCAP file without the channels that are not ROS's.
+    """Return a temporary copy of an MCAP file without the channels that are not ROS's; other files
+    as they are.
 
     Raises
     ------
     DataError
         If it holds no message of ROS, or cannot be copied.
     """
+    if file.suffix != '.mcap':
+        return file
     copy = _scratch(None, stack) / file.name
     _copy(file, copy, ros_only=True)
     _LOG.warning("'%s': leaving out what is not of ROS", file)
     return copy
+
+
+def _is_closed(file: Path) -> bool:
+    """Whether an MCAP file ends as one that was closed."""
+    with file.open('rb') as stream:
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(0, size - len(MCAP0_MAGIC)))
+        return stream.read() == MCAP0_MAGIC
 
 
 def _scratch(folder: Path | None, stack: ExitStack) -> Path:

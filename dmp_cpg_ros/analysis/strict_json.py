@@ -16,14 +16,10 @@ import numpy as np
 
 def plain(value: Any) -> Any:
     """Value in types that JSON knows; numbers that are not finite become None."""
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, np.ndarray):
+    if isinstance(value, (np.generic, np.ndarray)):
         return plain(value.tolist())
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return plain(
-            {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-        )
+        return plain({of.name: getattr(value, of.name) for of in dataclasses.fields(value)})
     if isinstance(value, Mapping):
         return {str(key): plain(entry) for key, entry in value.items()}
     if isinstance(value, Set):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.bag import find_bag
 from dmp_cpg_ros.analysis.context import find_parameter
-from dmp_cpg_ros.analysis.gait_in_force import GaitRow, gait_rows
+from dmp_cpg_ros.analysis.episodes import GaitRow, gait_rows
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import common_rows, feet_in_base, held, rotations, stretches
 from dmp_cpg_ros.analysis.recording import Recording

@@ -11,9 +11,8 @@ import pytest
 from core_examples import GAITS, TICK, TICK_NS, quadruped, standing_state
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import steady_segments
+from dmp_cpg_ros.analysis.episodes import gait_rows, gaits_walked, steady_segments
 from dmp_cpg_ros.analysis.figures.over_time import planned_stance
-from dmp_cpg_ros.analysis.gait_in_force import gait_rows, gaits_walked
 from dmp_cpg_ros.analysis.metrics.gait import gait_metrics, phase_errors
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters

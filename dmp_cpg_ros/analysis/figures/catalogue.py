@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,8 +21,6 @@ class FigureEntry(NamedTuple):
 
     Attributes
     ----------
-    name : str
-        Of its file, without ending.
     title : str
         What it is.
     draw : callable
@@ -31,59 +29,53 @@ class FigureEntry(NamedTuple):
         What there is to see.
     """
 
-    name: str
     title: str
     draw: Callable[[Recording, RunContext], Figure | None]
     caption: str
 
+    @property
+    def name(self) -> str:
+        """That of its file, without ending."""
+        return self.draw.__name__
+
 
 CATALOGUE = (
-    FigureEntry(
-        'target_kinematics', 'Target kinematics', over_time.target_kinematics,
+    FigureEntry('Target kinematics', over_time.target_kinematics,
         'Targets of the hips and the knees across a stop by sparse inhibition and the start '
         'after it. One oscillator is inhibited; the targets of all legs should come to rest and '
         'resume without a kick.'),
-    FigureEntry(
-        'canonical_states', 'Canonical states', over_time.canonical_states,
+    FigureEntry('Canonical states', over_time.canonical_states,
         'The four oscillators across the addition and the removal of sparse inhibition. Only the '
         'inhibited leg feels it; the coupling brings the other three to rest near their places.'),
-    FigureEntry(
-        'phase_portrait', 'Phase portrait', plane.phase_portrait,
+    FigureEntry('Phase portrait', plane.phase_portrait,
         'The first stop in the plane of the oscillators. Left: the inhibited oscillator runs on '
         'its limit cycle until inhibition is armed and it enters the region C, where it is held '
         'near its target. Middle: close-up of C; the small distance at which it rests is the '
         'pull of the other oscillators over the gain. Right: all four legs; dots mark where they '
         'rest, rings their places in the gait.'),
-    FigureEntry(
-        'footfall', 'Footfall', over_time.footfall,
+    FigureEntry('Footfall', over_time.footfall,
         'Bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles '
         'of steady walking. Bottom: the first stop and the start after it; at rest all four bars '
         'should be unbroken.'),
-    FigureEntry(
-        'path', 'Path', plane.path,
+    FigureEntry('Path', plane.path,
         'The base from above. Small dots are footholds, one for each stance; squares mark where '
         'the robot stood still, arrows its heading every two seconds.'),
-    FigureEntry(
-        'speed_tracking', 'Speed tracking', over_time.speed_tracking,
+    FigureEntry('Speed tracking', over_time.speed_tracking,
         'As commanded, as filtered by the reference system, and as measured; the pale line is '
         'every sample, the bold one the mean over a gait cycle. While a stop is requested the '
         'reference goes to zero whatever the command.'),
-    FigureEntry(
-        'attitude', 'Body attitude', over_time.attitude,
+    FigureEntry('Body attitude', over_time.attitude,
         'Roll and pitch, height over the ground and yaw of the base. The dashed lines are what '
         'is asked for: the standing height, and the integral of the reference turn rate.'),
-    FigureEntry(
-        'estimation', 'Estimate of the body', over_time.estimation,
+    FigureEntry('Estimate of the body', over_time.estimation,
         'What the robot believes of its motion, from gyroscope, accelerometer, joints and '
         "contacts, minus the simulator's truth: velocity in the base, tilt, and yaw, which "
         'nothing it has can correct.'),
-    FigureEntry(
-        'torques', 'Joint torques', over_time.torques,
+    FigureEntry('Joint torques', over_time.torques,
         'Left: three cycles of steady walking; grey lines are the limits where they are in view. '
         'Right: the whole run as share of the limit; bars reach to the 99th percentile, ticks '
         'mark the largest value.'),
-    FigureEntry(
-        'timing', 'Timing', over_time.timing,
+    FigureEntry('Timing', over_time.timing,
         'Top: what the robot measured of itself, control rate and latency from a state to the '
         'last of the four targets that answer it. Bottom, where the recording bears wall time: '
         'how far apart the states reached the recorder, and how long after a state the last '
@@ -91,9 +83,7 @@ CATALOGUE = (
 )
 
 
-def write_figures(
-        recording: Recording, context: RunContext, folder: Path,
-        entries: Sequence[FigureEntry] = CATALOGUE) -> dict[str, Path]:
+def write_figures(recording: Recording, context: RunContext, folder: Path) -> dict[str, Path]:
     """Draw and write ``NAME.png`` for each figure that the recording allows.
 
     Returns
@@ -103,7 +93,7 @@ def write_figures(
     """
     folder.mkdir(parents=True, exist_ok=True)
     written = {}
-    for entry in entries:
+    for entry in CATALOGUE:
         with style.applied():
             figure = entry.draw(recording, context)
             if figure is not None:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis import episodes, gait_in_force, motion
+from dmp_cpg_ros.analysis import episodes, motion
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.metrics.estimation import estimate_errors
@@ -161,7 +161,7 @@ def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool
 
     While a stop or a start is under way every foot is planned where it is, and nothing is drawn.
     """
-    stance, duty = gait_in_force.planned_stance(recording, context)
+    stance, duty = episodes.planned_stance(recording, context)
     if not duty.size or not recording.inhibition:
         return stance if duty.size else None
     running = episodes.running_intervals(recording)

@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Patch
 
-from dmp_cpg_ros.analysis import gait_in_force, motion
+from dmp_cpg_ros.analysis import motion
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import Episode, requested_stops
+from dmp_cpg_ros.analysis.episodes import Episode, phase_offsets, requested_stops
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.core.canonical.phase import state_at
@@ -121,7 +121,7 @@ def phase_portrait(recording: Recording, context: RunContext) -> Figure | None:
 
 def _places(recording: Recording, context: RunContext, time: float) -> Array:
     """Targets x_d of the legs (4, 2) in the gait in force at a time."""
-    offsets = gait_in_force.phase_offsets(recording, context)
+    offsets = phase_offsets(recording, context)
     if offsets is not None:
         phases = motion.held(recording.canonical.time, offsets, np.array([time]))[0]
     else:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis import episodes
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.gait_in_force import gaits_walked, phase_offsets, planned_stance
 from dmp_cpg_ros.analysis.motion import held, mean_between
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.core.canonical.phase import phase, wrapped
@@ -37,7 +36,7 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
                for start, end in episodes.changing_intervals(recording)]
     return {
         'name': None if context.gait is None else context.gait.name,
-        'names': gaits_walked(recording) or None,
+        'names': episodes.gaits_walked(recording) or None,
         'changes': changes or None,
         'phase_error_rad_max': float(settled.max()) if settled.size else None,
         'duty_factor': None if duty is None else float(duty.mean()),
@@ -60,7 +59,7 @@ def phase_errors(recording: Recording, context: RunContext) -> tuple[Array, Arra
         is not known its offsets are the circular means of the settled walk.
     """
     time, phi = recording.canonical.time, phase(recording.canonical.x)
-    offsets = phase_offsets(recording, context)
+    offsets = episodes.phase_offsets(recording, context)
     if offsets is None:
         relative = (phi - phi[:, :1])[settled_rows(recording, time)]
         offsets = np.arctan2(np.sin(relative).sum(axis=0), np.cos(relative).sum(axis=0))
@@ -92,7 +91,7 @@ def duty_factors(recording: Recording, context: RunContext) -> Array | None:
 def planned_duty_factor(recording: Recording, context: RunContext) -> float | None:
     """Duty factor that the gait plans, averaged over the same stretches."""
     segments, time = episodes.steady_segments(recording), recording.canonical.time
-    _, duty = planned_stance(recording, context)
+    _, duty = episodes.planned_stance(recording, context)
     if not duty.size or not segments:
         return None
     planned = [duty[(time >= start) & (time <= end)].mean() for start, end in segments]

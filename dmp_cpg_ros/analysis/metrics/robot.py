@@ -47,7 +47,7 @@ def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
     cost, source = cost_of_transport(recording, context, far)
     return {
         'fell': fell(recording, context),
-        'down_at_start': down_at_start(recording),
+        'down_at_start': recording.modes[0].message == 'damped' if recording.modes else None,
         'distance_m': distance,
         'yaw_drift_deg_per_10m': yaw_drift(recording),
         'cost_of_transport': cost,
@@ -69,13 +69,9 @@ def fell(recording: Recording, context: RunContext) -> bool | None:
     standing = height[0] if context.robot is None else context.robot.stance_height
     down = (height < FALLEN_HEIGHT_SHARE * standing) | (
         motion.tilt(odometry.quaternion) > FALLEN_TILT)
-    return episodes.fall_noticed(recording) or bool(
-        np.any(down & episodes.should_stand(recording, odometry.time)))
-
-
-def down_at_start(recording: Recording) -> bool | None:
-    """Whether the robot lay fallen when the recording began; None where nothing tells."""
-    return recording.modes[0].message == 'damped' if recording.modes else None
+    # a robot that was found fallen has not fallen since
+    noticed = any(event.message == 'damped' for event in recording.modes[1:])
+    return noticed or bool(np.any(down & episodes.should_stand(recording, odometry.time)))
 
 
 def distance_walked(recording: Recording) -> float | None:
