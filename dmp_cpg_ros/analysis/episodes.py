@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.motion import held, stretches
+from dmp_cpg_ros.analysis.motion import held, spans, stretches
 from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.canonical.phase import phase
@@ -90,10 +90,8 @@ def within(time: Array, intervals: list[tuple[float, float]]) -> NDArray[np.bool
 
 def changing_intervals(recording: Recording) -> list[tuple[float, float]]:
     """Intervals in which gaits changed [s]."""
-    time = recording.canonical.time
     changing = np.array([gait.after != '' for gait in recording.canonical.gaits], dtype=bool)
-    return [(float(time[first]), float(time[min(past, len(time) - 1)]))
-            for first, past in stretches(changing)]
+    return spans(recording.canonical.time, changing)
 
 
 def _turns(recording: Recording) -> Array:

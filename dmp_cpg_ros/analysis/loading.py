@@ -21,8 +21,6 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
-FIELDS = ('position', 'velocity', 'effort')
-
 JOINT_STATE, ODOMETRY = ('sensor_msgs/msg/JointState',), ('nav_msgs/msg/Odometry',)
 STATUSES = ('diagnostic_msgs/msg/DiagnosticArray',)
 TWIST, STAMPED_TWIST = 'geometry_msgs/msg/Twist', 'geometry_msgs/msg/TwistStamped'
@@ -81,10 +79,11 @@ def load_recording(path: Path | str) -> Recording:
             received = Received(bag_ns, _stamp_ns(message), message)
             messages[base_name(connection.topic)].append(received)
         counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}
-    time, work = _table(messages['joint_work'], JOINT_NAMES)
+    time, work, _, peak_effort = _table(messages['joint_work'], JOINT_NAMES)
     return Recording(
-        joints=_joints(messages['joint_states']), targets=_joints(messages['joint_targets']),
-        work=recording.WorkSeries(time, work['position'], work['effort']),
+        joints=recording.JointSeries(*_table(messages['joint_states'], JOINT_NAMES)),
+        targets=recording.JointSeries(*_table(messages['joint_targets'], JOINT_NAMES)),
+        work=recording.WorkSeries(time, work, peak_effort),
         canonical=_canonical(messages['canonical_state']),
         reference=recording.VelocitySeries(*_rows(messages['reference'], _velocity, (3,))),
         commands=recording.VelocitySeries(*_rows(_on_robot_clock(messages), _velocity, (3,))),
@@ -101,10 +100,6 @@ def _stamp_ns(message: Any) -> int:
     return 0 if stamp is None else int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
-def _xyz(vector: Any) -> tuple[float, float, float]:
-    return vector.x, vector.y, vector.z
-
-
 def _velocity(message: Any) -> tuple[float, ...]:
     twist = getattr(message, 'twist', message)
     return twist.linear.x, twist.linear.y, twist.angular.z
@@ -115,9 +110,10 @@ def _odometry(messages: Messages) -> recording.OdometrySeries:
 
 
 def _motion(message: Any) -> tuple[float, ...]:
-    pose, twist = message.pose.pose, message.twist.twist
-    return (*_xyz(pose.position), *_xyz(pose.orientation), pose.orientation.w,
-            *_xyz(twist.linear), *_xyz(twist.angular))
+    place, turn = message.pose.pose.position, message.pose.pose.orientation
+    v, omega = message.twist.twist.linear, message.twist.twist.angular
+    return (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w, v.x, v.y, v.z,
+            omega.x, omega.y, omega.z)
 
 
 def _on_robot_clock(messages: Mapping[str, Messages]) -> Messages:
@@ -145,8 +141,8 @@ def _rows(messages: Messages, row: Callable[[Any], tuple[float, ...]], widths: S
     return [stamps / 1e9, *np.split(values, np.cumsum(widths)[:-1], axis=1)]
 
 
-def _table(messages: Messages, names: Sequence[str]) -> tuple[Array, dict[str, Array]]:
-    """Increasing stamps (n,) [s], and the values (n, k) of each of ``FIELDS``.
+def _table(messages: Messages, names: Sequence[str]) -> list[Array]:
+    """Increasing stamps (n,) [s], and the positions, velocities and efforts (n, k).
 
     The columns are the k names; others in the messages are ignored. Messages of several publishers
     that each bear some of the names (the four legs on ``joint_targets``) are merged where their
@@ -158,29 +154,25 @@ def _table(messages: Messages, names: Sequence[str]) -> tuple[Array, dict[str, A
         groups[tuple(received.message.name)].append(received)
     groups = {held: group for held, group in groups.items() if set(names) & set(held)}
     stamps = np.unique(np.array([of.stamp for group in groups.values() for of in group], np.int64))
-    values = {field: np.full((len(stamps), len(names)), np.nan) for field in FIELDS}
+    table = {field: np.full((len(stamps), len(names)), np.nan)
+             for field in ('position', 'velocity', 'effort')}
     for held, group in groups.items():
         rows = np.searchsorted(stamps, [of.stamp for of in group])
         sources = [source for source, name in enumerate(held) if name in names]
         columns = [names.index(held[source]) for source in sources]
         missing = np.full(len(held), np.nan)  # a message may leave a field out
-        for field in FIELDS:
+        for field, values in table.items():
             arrays = (getattr(of.message, field) for of in group)
             block = np.array([a if len(a) == len(held) else missing for a in arrays], dtype=float)
-            values[field][rows[:, None], columns] = block[:, sources]
-    return stamps / 1e9, values
-
-
-def _joints(messages: Messages) -> recording.JointSeries:
-    time, values = _table(messages, JOINT_NAMES)
-    return recording.JointSeries(time, *values.values())
+            values[rows[:, None], columns] = block[:, sources]
+    return [stamps / 1e9, *table.values()]
 
 
 def _canonical(messages: Messages) -> recording.CanonicalSeries:
-    time, values = _table(messages, layouts.OSCILLATOR_ROWS)
-    x, x_dot = (values[field].reshape(-1, len(LEGS), 2) for field in FIELDS[:2])
-    gaits = _gaits(messages)
-    return recording.CanonicalSeries(time, x, x_dot, gaits if len(gaits) == len(time) else ())
+    time, x, x_dot, _ = _table(messages, layouts.OSCILLATOR_ROWS)
+    gaits, shape = _gaits(messages), (-1, len(LEGS), 2)
+    return recording.CanonicalSeries(
+        time, x.reshape(shape), x_dot.reshape(shape), gaits if len(gaits) == len(time) else ())
 
 
 def _gaits(messages: Messages) -> tuple[GaitShares, ...]:
@@ -191,9 +183,9 @@ def _gaits(messages: Messages) -> tuple[GaitShares, ...]:
         texts = {of.stamp: of.message.header.frame_id for of in messages}
         return tuple(_former_gait(texts[stamp]) for stamp in sorted(texts)) if all(
             texts.values()) else ()
-    _, values = _table(messages, [*rows, layouts.CADENCE_ROW])
-    shares_and_rates = zip(*(values[field].tolist() for field in FIELDS[:2]), strict=True)
-    return tuple(layouts.read_gait_rows(rows, *row) for row in shares_and_rates)
+    _, shares, rates, _ = _table(messages, [*rows, layouts.CADENCE_ROW])
+    return tuple(layouts.read_gait_rows(rows, *of)
+                 for of in zip(shares.tolist(), rates.tolist(), strict=True))
 
 
 @cache
@@ -212,10 +204,10 @@ def _former_gait(text: str) -> GaitShares:
 
 
 def _feet(messages: Messages) -> recording.FootForceSeries:
-    time, values = _table(messages, LEGS)
+    time, *_, force = _table(messages, LEGS)
     if not time.size:
-        time, values = _table(messages, [f'{leg}_foot' for leg in LEGS])
-    return recording.FootForceSeries(time, values['effort'])
+        time, *_, force = _table(messages, [f'{leg}_foot' for leg in LEGS])
+    return recording.FootForceSeries(time, force)
 
 
 def _arrivals(states: Messages, targets: Messages) -> recording.ArrivalSeries:
@@ -248,10 +240,10 @@ def _changes(messages: Messages, what: Callable[[StatusEvent], Any]) -> tuple[St
 
 def _modes(messages: Mapping[str, Messages]) -> tuple[StatusEvent, ...]:
     """When which mode of the body began."""
-    time, values = _table(messages['posture_feedback'], layouts.MODE_ROWS)
+    time, position, *_ = _table(messages['posture_feedback'], layouts.MODE_ROWS)
     if not time.size:  # a recording from before modes were states
         return _changes(messages['body_mode'], lambda event: event.message)
-    modes = values['position'].argmax(axis=1)
+    modes = position.argmax(axis=1)
     first = np.flatnonzero(np.diff(modes, prepend=-1))
     return tuple(StatusEvent(float(time[k]), 0, layouts.MODE_ROWS[modes[k]].partition('/')[2], {})
                  for k in first)

@@ -114,6 +114,12 @@ def stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(first), int(past)) for first, past in zip(edges[::2], edges[1::2], strict=True)]
 
 
+def spans(time: Array, mask: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """Times (n,) at which the stretches of a mask (n,) begin, and those at which they are over."""
+    return [(float(time[first]), float(time[min(past, len(time) - 1)]))
+            for first, past in stretches(mask)]
+
+
 def foot_slip(recording: Recording, robot: RobotDescription, contact_force: float) -> Array | None:
     """Distance that each foot's contact point slid horizontally while it carried load.
 

@@ -42,8 +42,7 @@ h2 { font-size: 1.2em; margin: 44px 0 12px; padding-top: 14px; border-top: 1px s
 h3 { font-size: 1.02em; margin: 0 0 10px; }
 .subtitle { color: var(--soft); margin: 0 0 20px; }
 nav { display: flex; flex-wrap: wrap; gap: 4px 18px; margin: 0 0 20px; font-size: 0.93em; }
-a { color: var(--accent); text-decoration: none; }
-a:hover { text-decoration: underline; }
+a { color: var(--accent); text-decoration: none; } a:hover { text-decoration: underline; }
 .scroll { overflow-x: auto; margin: 0 0 16px; background: var(--card);
   border: 1px solid var(--line); border-radius: 8px; }
 table { border-collapse: collapse; width: 100%; font-size: 0.93em; }
@@ -54,27 +53,21 @@ thead th { color: var(--soft); font-weight: 600; vertical-align: bottom; }
 tbody tr:nth-child(even) { background: var(--zebra); }
 th.number, td.number { text-align: right; }
 td.number { font-variant-numeric: tabular-nums; white-space: nowrap; }
-.mark { white-space: nowrap; font-weight: 600; }
-.good { color: var(--good); }
-.bad { color: var(--bad); }
-.none { color: var(--soft); font-weight: 400; }
+.mark { white-space: nowrap; font-weight: 600; } .mark.none { font-weight: 400; }
+.good { color: var(--good); } .bad { color: var(--bad); } .none { color: var(--soft); }
 code { font: 0.92em var(--mono); overflow-wrap: anywhere; }
 pre { margin: 0; padding: 14px; overflow: auto; max-height: 480px; font: 12.5px/1.5 var(--mono); }
 figure { margin: 0 0 22px; padding: 16px; background: var(--card);
   border: 1px solid var(--line); border-radius: 8px; }
 figure img { display: block; width: 100%; height: auto; border-radius: 4px; background: #ffffff; }
-figcaption { margin-top: 10px; color: var(--soft); font-size: 0.93em; }
-figcaption b { color: var(--ink); }
+figcaption { margin-top: 10px; color: var(--soft); font-size: 0.93em; } b { color: var(--ink); }
 .pictures { display: grid; gap: 14px; margin: 20px 0 0;
   grid-template-columns: repeat(auto-fit, minmax(260px, 1fr)); }
 .pictures figure { margin: 0; padding: 10px; }
 summary { cursor: pointer; color: var(--accent); margin: 0 0 8px; }
 footer { margin-top: 48px; color: var(--soft); font-size: 0.88em; }
-@media print {
-  body { background: #ffffff; }
-  figure, .scroll { break-inside: avoid; }
-  nav { display: none; }
-}
+@media print { nav { display: none; } figure, .scroll { break-inside: avoid; }
+  body { background: #ffffff; } }
 """
 
 

@@ -62,7 +62,7 @@ def _legs_across_stop(recording: Recording, time: Array, values: dict[str, Array
         return None
     figure, panels, shades = style.time_panels(recording, 3.6, list(values), window)
     for panel, of_legs in zip(panels, values.values(), strict=True):
-        style.plot_legs(panel, time[rows], of_legs[rows])
+        style.plot_lines(panel, time[rows], of_legs[rows])
         if reach:
             panel.set_ylim(-reach, reach)
     style.leg_legend(figure, shades)
@@ -97,14 +97,12 @@ def attitude(recording: Recording, context: RunContext) -> Figure | None:
     odometry, reference = recording.odometry, recording.reference
     if odometry.time.size < 2:
         return None
-    roll, pitch, yaw = np.rad2deg(motion.roll_pitch_yaw(odometry.quaternion)).T
-    height = 100.0 * motion.height_over_ground(odometry, context)
+    angles = np.rad2deg(motion.roll_pitch_yaw(odometry.quaternion))
+    height, yaw = 100.0 * motion.height_over_ground(odometry, context), angles[:, 2]
     figure, (tilts, heights, yaws), shades = style.time_panels(
         recording, 4.6, ('tilt [°]', 'height [cm]', 'yaw [°]'))
-    for panel, values, colour in (
-            (tilts, roll, style.BLUE), (tilts, pitch, style.ORANGE),
-            (heights, height, style.VIOLET)):
-        panel.plot(odometry.time, values, color=colour, linewidth=0.9)
+    style.plot_lines(tilts, odometry.time, angles[:, :2], COLOURS, linewidth=0.9)
+    heights.plot(odometry.time, height, color=style.VIOLET, linewidth=0.9)
     yaws.plot(odometry.time, yaw, color=style.VIOLET)
     if context.robot is not None:
         heights.axhline(100.0 * context.robot.stance_height, linewidth=0.9, **ASKED_FOR)
@@ -124,11 +122,9 @@ def estimation(recording: Recording, context: RunContext) -> Figure | None:
         return None
     figure, (velocities, tilts, yaws), shades = style.time_panels(
         recording, 4.6, ('velocity [mm/s]', 'tilt [°]', 'yaw [°]'))
-    for axis, color in enumerate(COLOURS):
-        velocities.plot(
-            errors.time, 1e3 * errors.velocity_in_base[:, axis], color=color, linewidth=0.7)
-    for axis, color in enumerate(COLOURS[:2]):
-        tilts.plot(errors.time, np.rad2deg(errors.tilt[:, axis]), color=color, linewidth=0.9)
+    style.plot_lines(
+        velocities, errors.time, 1e3 * errors.velocity_in_base, COLOURS, linewidth=0.7)
+    style.plot_lines(tilts, errors.time, np.rad2deg(errors.tilt), COLOURS, linewidth=0.9)
     yaws.plot(errors.time, np.rad2deg(errors.yaw), color=COLOURS[2])
     style.legend(figure, [*style.keys(('x, roll', 'y, pitch', 'z, yaw'), COLOURS), *shades])
     return figure
@@ -188,7 +184,7 @@ def torques(recording: Recording, context: RunContext) -> Figure | None:
                                     width_ratios=None if robot is None else (3.0, 1.0))
     for k, joint in enumerate(JOINTS_OF_LEG):
         panel = axes[k, 0]
-        style.plot_legs(panel, shown.time, shown.effort[:, k::3])
+        style.plot_lines(panel, shown.time, shown.effort[:, k::3])
         panel.set_ylabel(f'{joint} [N m]')
         style.limit_view(panel, window)
         if robot is not None:

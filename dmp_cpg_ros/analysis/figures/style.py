@@ -20,7 +20,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.episodes import STOPPING, episodes, requested_stops
-from dmp_cpg_ros.analysis.motion import stretches
+from dmp_cpg_ros.analysis.motion import spans
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -115,10 +115,11 @@ def time_panels(recording: Recording, height: float, labels: Sequence[str],
     return figure, panels, shades
 
 
-def plot_legs(axes: Axes, time: Any, values: Any) -> None:
-    """Draw a line per leg, each in its colour: values (n, 4) over time (n,)."""
-    for leg, column in zip(LEGS, values.T, strict=True):
-        axes.plot(time, column, color=LEG_COLOURS[leg])
+def plot_lines(axes: Axes, time: Array, values: Array,
+               colours: Iterable[str] = LEG_COLOURS.values(), **look: Any) -> None:
+    """Draw a line per column of values (n, k) over time (n,), in the colours of the legs."""
+    for colour, column in zip(colours, values.T, strict=False):
+        axes.plot(time, column, color=colour, **look)
 
 
 def leg_rows(axes: Axes) -> None:
@@ -132,9 +133,8 @@ def leg_bars(axes: Axes, time: Array, masks: NDArray[np.bool_], height: float, *
              ) -> None:
     """Draw a bar in the row of each leg while its mask (n, 4) holds at the times (n,)."""
     for row, (leg, mask) in enumerate(zip(LEGS, masks.T, strict=True)):
-        spans = [(time[first], time[min(past, len(time) - 1)] - time[first])
-                 for first, past in stretches(mask)]
-        axes.broken_barh(spans, (len(LEGS) - 1 - row - 0.5 * height, height),
+        bars = [(start, end - start) for start, end in spans(time, mask)]
+        axes.broken_barh(bars, (len(LEGS) - 1 - row - 0.5 * height, height),
                          facecolor=LEG_COLOURS[leg], linewidth=0, **look)
 
 
@@ -163,15 +163,14 @@ def leg_legend(figure: Figure, extra: Sequence[Any] = ()) -> None:
 
 def shade_stops(axes: Axes, recording: Recording) -> list[Patch]:
     """Shade requested stops and inhibition; returns handles for the legend."""
-    stops, shown = episodes(recording, STOPPING), []
-    for label, colour, spans in (
-            ('stop requested', WAITING, [(stop.start, stop.captured) for stop in stops]),
-            ('inhibited', INHIBITED, [(stop.captured, stop.end) for stop in stops])):
-        spans = [(start, end) for start, end in spans if end > start]
-        for start, end in spans:
-            axes.axvspan(start, end, color=colour, linewidth=0, zorder=0)
-        shown += [Patch(color=colour, label=label)] if spans else []
-    return shown
+    shown: dict[str, str] = {}
+    for stop in episodes(recording, STOPPING):
+        for start, end, colour, label in ((stop.start, stop.captured, WAITING, 'stop requested'),
+                                          (stop.captured, stop.end, INHIBITED, 'inhibited')):
+            if end > start:
+                axes.axvspan(start, end, color=colour, linewidth=0, zorder=0)
+                shown[label] = colour
+    return [Patch(color=colour, label=label) for label, colour in shown.items()]
 
 
 def limit_view(axes: Axes, window: Window) -> None:
