@@ -15,10 +15,8 @@ SPEED_TOLERANCE = 0.10
 REAL_TIME_FACTOR = 0.98
 """Least real-time factor of a run that was to keep wall time."""
 
-COSTS = {
-    'joint_work': 'from the work of every physics step',
-    'joint_states': 'estimated from torque and speed at the stamps alone',
-}
+COSTS = {'joint_work': 'from the work of every physics step',
+         'joint_states': 'estimated from torque and speed at the stamps alone'}
 """What a cost of transport was taken from, in words."""
 
 

@@ -21,19 +21,16 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
-JOINT_STATE, ODOMETRY = ('sensor_msgs/msg/JointState',), ('nav_msgs/msg/Odometry',)
-STATUSES = ('diagnostic_msgs/msg/DiagnosticArray',)
-TWIST, STAMPED_TWIST = 'geometry_msgs/msg/Twist', 'geometry_msgs/msg/TwistStamped'
-
-TYPES = {
-    'joint_states': JOINT_STATE, 'joint_targets': JOINT_STATE, 'joint_work': JOINT_STATE,
-    'canonical_state': JOINT_STATE, 'foot_contacts': JOINT_STATE, 'posture_feedback': JOINT_STATE,
-    'odom': ODOMETRY, 'estimated_odom': ODOMETRY,
-    'reference': (STAMPED_TWIST,), 'cmd_vel': (STAMPED_TWIST, TWIST),
-    'inhibition_state': STATUSES, 'body_mode': STATUSES, 'diagnostics': STATUSES,
-    'clock': ('rosgraph_msgs/msg/Clock',),
+TOPICS = {
+    'sensor_msgs/msg/JointState': ('joint_states', 'joint_targets', 'joint_work',
+                                   'canonical_state', 'foot_contacts', 'posture_feedback'),
+    'nav_msgs/msg/Odometry': ('odom', 'estimated_odom'),
+    'geometry_msgs/msg/TwistStamped': ('reference', 'cmd_vel'),
+    'geometry_msgs/msg/Twist': ('cmd_vel',),
+    'diagnostic_msgs/msg/DiagnosticArray': ('inhibition_state', 'body_mode', 'diagnostics'),
+    'rosgraph_msgs/msg/Clock': ('clock',),
 }
-"""Topics without namespace that are read, and the types of message that they may have."""
+"""Topics without namespace that are read, by their types of message."""
 
 
 class Received(NamedTuple):
@@ -67,14 +64,14 @@ def load_recording(path: Path | str) -> Recording:
         If it is not a readable bag, or holds the topics of more than one robot. Single messages
         that cannot be decoded are no error: they are left out, counted and warned of.
     """
-    messages: dict[str, list[Received]] = {topic: [] for topic in TYPES}
+    messages: dict[str, list[Received]] = defaultdict(list)
     skipped = Counter[str]()
     with opened(find_bag(path)) as reader:
         robots = sorted(topic for topic in reader.topics if base_name(topic) == 'joint_states')
         if len(robots) > 1:
             raise DataError(f'the bag holds {len(robots)} robots ({", ".join(robots)}); '
                             'record one robot per bag')
-        used = [c for c in reader.connections if c.msgtype in TYPES.get(base_name(c.topic), ())]
+        used = [c for c in reader.connections if base_name(c.topic) in TOPICS.get(c.msgtype, ())]
         for connection, bag_ns, message in decoded(reader, used, skipped):
             received = Received(bag_ns, _stamp_ns(message), message)
             messages[base_name(connection.topic)].append(received)

@@ -8,7 +8,7 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.recording import Array, OdometrySeries, Recording, Series, taken
@@ -61,8 +61,8 @@ def yaw_rate(odometry: OdometrySeries) -> Array:
     return np.einsum('nj,nj->n', rotations(odometry.quaternion)[:, 2], odometry.rate_in_base)
 
 
-def held(time: Array, values: Array, at: Array) -> Array:
-    """Values at other times: each sample holds until the next; before the first, the first."""
+def held(time: Array, values: Array, at: ArrayLike) -> Array:
+    """Values at another time or others: each holds until the next; before the first, the first."""
     return values[np.clip(np.searchsorted(time, at, side='right') - 1, 0, None)]
 
 

@@ -156,8 +156,7 @@ def van_der_pol_figure(data: VanDerPolData, labels: Sequence[str]) -> Figure:
     axes[0, 0].set_ylabel('$x_{i1}$ [–]')
     axes[1, 0].set_ylabel('$x_{i2}$ [1/s]')
     figure.align_ylabels()
-    style.legend(figure, style.keys(labels, COLOURS))
-    return figure
+    return style.legend(figure, style.keys(labels, COLOURS))
 
 
 def local_dynamics_figure(free: LocalDynamics, inhibited: LocalDynamics) -> Figure:
@@ -179,11 +178,10 @@ def local_dynamics_figure(free: LocalDynamics, inhibited: LocalDynamics) -> Figu
         panel.set(title=title, xlabel='$x_1$ [–]', xlim=(-1.6, 1.6), ylim=(-1.6, 1.6))
         panel.set_aspect('equal')
     axes[0, 0].set_ylabel('$x_2$ [–]')
-    style.legend(figure, [
+    return style.legend(figure, [
         style.key('trajectories', color=style.MEASURED, marker='o', markersize=2.5),
         style.key('free limit cycle', **CYCLE), Patch(label='region C', **REGION),
         style.key('at rest', color='#D55E00', marker='o', linestyle='')])
-    return figure
 
 
 def gait_figure(gait: Gait, duty: float) -> Figure:
@@ -196,8 +194,7 @@ def gait_figure(gait: Gait, duty: float) -> Figure:
     duty : float
         Duty factor β at the speed that is drawn.
     """
-    figure, axes = style.new_figure(1.9)
-    panel: Axes = axes[0, 0]
+    figure, [[panel]] = style.new_figure(1.9)
     cycle = np.linspace(0.0, 2.0, 2001)
     swing = 0.5 * (1.0 - duty)
     position = (cycle[:, None] - np.array(gait.lag) + swing + 0.5) % 1.0 - 0.5  # fl lands at 0
@@ -210,8 +207,8 @@ def gait_figure(gait: Gait, duty: float) -> Figure:
 
 def hierarchy_figure() -> Figure:
     """Discrete and rhythmic primitives as hierarchies (paper, figure ContractionOfDMPs)."""
-    figure, axes = style.new_figure(1.7)
-    panel: Axes = _blank(axes[0, 0], (0.0, 10.0), (0.0, 2.6))
+    figure, [[panel]] = style.new_figure(1.7)
+    _blank(panel, (0.0, 10.0), (0.0, 2.6))
     for y, kind, canonical, colour in (
             (1.9, 'discrete', 'contracting', '#DCE8F5'),
             (0.7, 'rhythmic', 'transverse contracting', '#F6E8B1')):
@@ -226,8 +223,8 @@ def hierarchy_figure() -> Figure:
 
 def network_figure() -> Figure:
     """Four coupled rhythmic primitives with a common reference (paper, figure coupledDMPS)."""
-    figure, axes = style.new_figure(2.9)
-    panel: Axes = _blank(axes[0, 0], (-4.6, 4.6), (-1.9, 1.9))
+    figure, [[panel]] = style.new_figure(2.9)
+    _blank(panel, (-4.6, 4.6), (-1.9, 1.9))
     corners = {'fl': (-1.5, 1.2), 'fr': (1.5, 1.2), 'rl': (-1.5, -1.2), 'rr': (1.5, -1.2)}
     for a, b in combinations(corners.values(), 2):
         diagonal = a[1] != b[1] and np.sign(b[0] - a[0])  # both bend below R
@@ -243,10 +240,9 @@ def network_figure() -> Figure:
     return figure
 
 
-def _blank(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> Axes:
+def _blank(axes: Axes, x: tuple[float, float], y: tuple[float, float]) -> None:
     axes.set(xlim=x, ylim=y)
     axes.set_axis_off()
-    return axes
 
 
 def _box(axes: Axes, centre: tuple[float, float], text: str, colour: str) -> None:

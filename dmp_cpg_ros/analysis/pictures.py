@@ -52,7 +52,7 @@ class Moment(NamedTuple):
 def moments(recording: Recording, context: RunContext) -> list[Moment]:
     """Walking straight on with a foot in the air, at rest, turning; those that happened."""
     reference, found = recording.reference, []
-    steady = [(*held(reference.time, reference.value, np.array([start]))[0, [0, 2]], start, end)
+    steady = [(*held(reference.time, reference.value, start)[[0, 2]], start, end)
               for start, end in steady_segments(recording)]
     straight = next((of for of in steady if abs(of[1]) < MOVING), None)
     if straight:
@@ -113,7 +113,7 @@ def _pose(recording: Recording, time: float, turn: bool) -> tuple[Array, Array, 
     odometry, joints = recording.odometry, recording.joints
     row = min(int(np.searchsorted(odometry.time, time)), len(odometry.time) - 1)
     position = odometry.position_in_world[row]
-    angles = held(joints.time, joints.position, np.array([time]))[0]
+    angles = held(joints.time, joints.position, time)
     if not turn:
         return position, odometry.quaternion[row], angles
     quaternion = odometry.quaternion[row : row + 1]

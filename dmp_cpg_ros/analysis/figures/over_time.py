@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis import episodes, motion
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import style
-from dmp_cpg_ros.analysis.metrics.estimation import estimate_errors
-from dmp_cpg_ros.analysis.metrics.tracking import body_motion
+from dmp_cpg_ros.analysis.metrics.robot import body_motion, estimate_errors
 from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent, taken
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.suite_table import ROBOT
@@ -65,8 +64,7 @@ def _legs_across_stop(recording: Recording, time: Array, values: dict[str, Array
         style.plot_lines(panel, time[rows], of_legs[rows])
         if reach:
             panel.set_ylim(-reach, reach)
-    style.leg_legend(figure, shades)
-    return figure
+    return style.leg_legend(figure, shades)
 
 
 def speed_tracking(recording: Recording, context: RunContext) -> Figure | None:
@@ -86,10 +84,9 @@ def speed_tracking(recording: Recording, context: RunContext) -> Figure | None:
         panel.plot(odometry.time, mean[:, k], linewidth=1.5, **look)
         panel.step(commands.time, commands.value[:, k], where='post', linewidth=1.0, **COMMANDED)
         panel.plot(reference.time, reference.value[:, k], linewidth=1.0, **FILTERED)
-    style.legend(figure, [
+    return style.legend(figure, [
         style.key('command', **COMMANDED), style.key('reference', **FILTERED),
         style.key('measured', linewidth=1.5, **look), *shades])
-    return figure
 
 
 def attitude(recording: Recording, context: RunContext) -> Figure | None:
@@ -109,10 +106,9 @@ def attitude(recording: Recording, context: RunContext) -> Figure | None:
     if reference.time.size > 1:
         turned = np.rad2deg(motion.integral(reference.time, reference.value[:, 2]))
         yaws.plot(reference.time, turned + yaw[0], linewidth=0.9, **ASKED_FOR)
-    style.legend(figure, [
+    return style.legend(figure, [
         *style.keys(('roll', 'pitch', 'height, yaw'), COLOURS),
         style.key('asked for', **ASKED_FOR), *shades])
-    return figure
 
 
 def estimation(recording: Recording, context: RunContext) -> Figure | None:
@@ -126,8 +122,7 @@ def estimation(recording: Recording, context: RunContext) -> Figure | None:
         velocities, errors.time, 1e3 * errors.velocity_in_base, COLOURS, linewidth=0.7)
     style.plot_lines(tilts, errors.time, np.rad2deg(errors.tilt), COLOURS, linewidth=0.9)
     yaws.plot(errors.time, np.rad2deg(errors.yaw), color=COLOURS[2])
-    style.legend(figure, [*style.keys(('x, roll', 'y, pitch', 'z, yaw'), COLOURS), *shades])
-    return figure
+    return style.legend(figure, [*style.keys(('x, roll', 'y, pitch', 'z, yaw'), COLOURS), *shades])
 
 
 def footfall(recording: Recording, context: RunContext) -> Figure | None:
@@ -148,8 +143,7 @@ def footfall(recording: Recording, context: RunContext) -> Figure | None:
     shades = style.shade_stops(axes[-1, 0], recording)
     axes[-1, 0].set_xlabel('time [s]')
     pale = [Patch(color='#BBBBBB', label='planned')] if context.gait is not None else []
-    style.legend(figure, [Patch(color='#555555', label='measured'), *pale, *shades])
-    return figure
+    return style.legend(figure, [Patch(color='#555555', label='measured'), *pale, *shades])
 
 
 def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool_] | None:
@@ -197,9 +191,8 @@ def torques(recording: Recording, context: RunContext) -> Figure | None:
     axes[-1, 0].set_xlabel('time [s]')
     if robot is not None:
         axes[-1, 1].set_xlabel('share of limit [%]')
-    style.leg_legend(figure)
     figure.align_ylabels()
-    return figure
+    return style.leg_legend(figure)
 
 
 def _shares(axes: Axes, share: Array) -> None:
@@ -227,10 +220,9 @@ def timing(recording: Recording, context: RunContext) -> Figure | None:
     if history:
         rate, latency = axes[0]
         _plot(rate, history, 'rate_hz', color=MEDIAN)
-        rate.set(xlabel='time [s]', ylabel='control rate [Hz]', ylim=(0.0, None))
         factor = [value for status in history if (value := status.number('real_time_factor'))]
-        if factor:
-            rate.set_title(f'real-time factor {factor[-1]:.3f}')
+        rate.set(xlabel='time [s]', ylabel='control rate [Hz]', ylim=(0.0, None),
+                 title=f'real-time factor {factor[-1]:.3f}' if factor else '')
         _plot(latency, history, 'latency_ms_p99', color=LATE, label='99%')
         _plot(latency, history, 'latency_ms_p50', color=MEDIAN, label='median')
         latency.set(xlabel='time [s]', ylabel='latency [ms]', ylim=(0.0, None))

@@ -49,9 +49,8 @@ def path(recording: Recording, context: RunContext) -> Figure | None:
     xy = odometry.position_in_world[:, :2]
     low, high = xy.min(axis=0) - MARGIN, xy.max(axis=0) + MARGIN
     width, height = high - low
-    figure, axes = style.new_figure(
+    figure, [[panel]] = style.new_figure(
         float(np.clip((style.WIDTH - 0.7) * height / width + 0.9, 2.0, 7.0)))
-    panel = axes[0, 0]
     handles = [style.key('base', color=style.INK)]
     if context.robot is not None and _footholds(panel, recording, context):
         handles += [style.key(style.LEG_NAMES[leg], color=style.LEG_COLOURS[leg], **FOOTHOLD)
@@ -68,8 +67,7 @@ def path(recording: Recording, context: RunContext) -> Figure | None:
         panel.plot(*place, markersize=5, zorder=5, **STOP)
     panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel='x [m]', ylabel='y [m]')
     panel.set_aspect('equal')
-    style.legend(figure, [*handles, style.key('begin', **BEGIN), style.key('stop', **STOP)])
-    return figure
+    return style.legend(figure, [*handles, style.key('begin', **BEGIN), style.key('stop', **STOP)])
 
 
 def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
@@ -96,12 +94,12 @@ def phase_portrait(recording: Recording, context: RunContext) -> Figure | None:
         return None
     inhibited, radius = context.inhibition, context.radius
     held = LEGS.index(inhibited.inhibited_legs[0])
-    figure, axes = style.new_figure(2.85, 1, 3)
-    whole, close_up, all_legs = axes[0]
+    figure, [panels] = style.new_figure(2.85, 1, 3)
+    whole, close_up, all_legs = panels
     places = _places(recording, context, stops[0].end)
     reach = radius + inhibited.region_radius + 0.1
     titles = (style.LEG_NAMES[LEGS[held]], 'close-up of C', 'all legs')
-    for panel, title in zip(axes[0], titles, strict=True):
+    for panel, title in zip(panels, titles, strict=True):
         panel.add_patch(Circle((0.0, 0.0), radius, fill=False, linestyle=(0, (4, 3)),
                                linewidth=0.8, edgecolor='#AAAAAA', zorder=1))
         panel.set(xlim=(-reach, reach), ylim=(-reach, reach), xlabel='$x_{i1}$ [–]', title=title)
@@ -112,18 +110,17 @@ def phase_portrait(recording: Recording, context: RunContext) -> Figure | None:
     close_up.set(xlim=(x_1 - r0, x_1 + r0), ylim=(x_2 - r0, x_2 + r0))
     _all_legs(all_legs, recording, stops[0], places)
     whole.set_ylabel('$x_{i2}$ [–]')
-    style.legend(figure, [
+    return style.legend(figure, [
         style.key('free', color=FREE, linewidth=3.2),
         *style.keys(('stop requested', 'inhibited'), (REQUESTED, style.INK)),
         Patch(label='region C', **REGION), style.key('target $x_d$', **TARGET)])
-    return figure
 
 
 def _places(recording: Recording, context: RunContext, time: float) -> Array:
     """Targets x_d of the legs (4, 2) in the gait in force at a time."""
     offsets = phase_offsets(recording, context)
     if offsets is not None:
-        phases = motion.held(recording.canonical.time, offsets, np.array([time]))[0]
+        phases = motion.held(recording.canonical.time, offsets, time)
     else:
         phases = np.zeros(len(LEGS)) if context.gait is None else context.gait.phases
     return state_at(phases, context.radius)

@@ -41,7 +41,7 @@ LEG_COLOURS = dict(zip(LEGS, ('#0072B2', '#D55E00', '#009E73', '#CC79A7'), stric
 LEG_NAMES = dict(zip(LEGS, ('front left', 'front right', 'rear left', 'rear right'), strict=True))
 
 INK, GREY, MEASURED, REFERENCE = '#222222', '#8A8A8A', '#0072B2', '#222222'
-WAITING, INHIBITED = '#F6E8B1', '#D9DEE4'
+SHADES = {'stop requested': '#F6E8B1', 'inhibited': '#D9DEE4'}
 BLUE, ORANGE, VIOLET, RED = '#56B4E9', '#E69F00', '#6A51A3', '#C00000'
 DASHED = (0, (5, 2))
 
@@ -148,29 +148,30 @@ def keys(labels: Sequence[str], colours: Iterable[str]) -> list[Line2D]:
     return [key(label, color=colour) for label, colour in zip(labels, colours, strict=True)]
 
 
-def legend(figure: Figure, handles: Sequence[Any]) -> None:
-    """Put a legend in one row above the panels."""
+def legend(figure: Figure, handles: Sequence[Any]) -> Figure:
+    """Put a legend in one row above the panels; returns the figure."""
     height = LEGEND_HEIGHT / figure.get_figheight()
     figure.set_layout_engine('constrained', rect=(0.0, 0.0, 1.0, 1.0 - height))
     figure.legend(handles=list(handles), loc='upper center', ncols=len(handles),
                   columnspacing=1.3, handlelength=1.6, handletextpad=0.5, borderaxespad=0.3)
+    return figure
 
 
-def leg_legend(figure: Figure, extra: Sequence[Any] = ()) -> None:
-    """Legend of the four legs, and more handles."""
-    legend(figure, [*keys(tuple(LEG_NAMES.values()), LEG_COLOURS.values()), *extra])
+def leg_legend(figure: Figure, extra: Sequence[Any] = ()) -> Figure:
+    """Put a legend of the four legs, and more handles, above the panels; returns the figure."""
+    return legend(figure, [*keys(tuple(LEG_NAMES.values()), LEG_COLOURS.values()), *extra])
 
 
 def shade_stops(axes: Axes, recording: Recording) -> list[Patch]:
     """Shade requested stops and inhibition; returns handles for the legend."""
-    shown: dict[str, str] = {}
+    shown = set()
     for stop in episodes(recording, STOPPING):
-        for start, end, colour, label in ((stop.start, stop.captured, WAITING, 'stop requested'),
-                                          (stop.captured, stop.end, INHIBITED, 'inhibited')):
+        times = (stop.start, stop.captured, stop.end)
+        for label, start, end in zip(SHADES, times, times[1:], strict=False):
             if end > start:
-                axes.axvspan(start, end, color=colour, linewidth=0, zorder=0)
-                shown[label] = colour
-    return [Patch(color=colour, label=label) for label, colour in shown.items()]
+                axes.axvspan(start, end, color=SHADES[label], linewidth=0, zorder=0)
+                shown.add(label)
+    return [Patch(color=SHADES[label], label=label) for label in SHADES if label in shown]
 
 
 def limit_view(axes: Axes, window: Window) -> None:

@@ -36,15 +36,13 @@ def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
                for start, end in episodes.changing_intervals(recording)]
     return {
         'name': None if context.gait is None else context.gait.name,
-        'names': episodes.gaits_walked(recording) or None,
-        'changes': changes or None,
+        'names': episodes.gaits_walked(recording) or None, 'changes': changes or None,
         'phase_error_rad_max': float(settled.max()) if settled.size else None,
         'duty_factor': None if duty is None else float(duty.mean()),
         'duty_factor_of_leg':
             None if duty is None else dict(zip(LEGS, duty.tolist(), strict=True)),
         'duty_factor_planned': planned_duty_factor(recording, context),
-        'period_s': episodes.gait_period(recording),
-    }
+        'period_s': episodes.gait_period(recording)}
 
 
 def phase_errors(recording: Recording, context: RunContext) -> tuple[Array, Array]:

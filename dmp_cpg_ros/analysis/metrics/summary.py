@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.metrics import estimation, gait, robot, stops, tracking
+from dmp_cpg_ros.analysis.metrics import gait, robot, stops
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.suite_table import ROBOT
 
@@ -37,15 +37,13 @@ def compute_metrics(
     context = context or RunContext()
     return {
         'robot': robot.robot_metrics(recording, context),
-        'tracking': tracking.tracking_metrics(recording),
-        'estimation': estimation.estimation_metrics(recording, context),
+        'tracking': robot.tracking_metrics(recording),
+        'estimation': robot.estimation_metrics(recording, context),
         'gait': gait.gait_metrics(recording, context),
-        'stop': stops.stop_metrics(recording, context),
-        'start': stops.start_metrics(recording),
+        'stop': stops.stop_metrics(recording, context), 'start': stops.start_metrics(recording),
         'timing': timing_metrics(recording),
         'recording': {'undecodable_messages': sum(recording.undecodable.values())},
-        'certificate': None if certificate is None else list(certificate),
-    }
+        'certificate': None if certificate is None else list(certificate)}
 
 
 def timing_metrics(recording: Recording) -> dict[str, Any]:
