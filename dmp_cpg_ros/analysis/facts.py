@@ -132,9 +132,8 @@ def _timing(timing: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
 def _certificate(metrics: Mapping[str, Any]) -> list[Fact]:
     holds = [bool(entry['holds']) for entry in metrics['certificate'] or []
              if isinstance(entry, dict) and 'holds' in entry and entry.get('required', True)]
-    finding = f'{sum(holds)} of {len(holds)} required inequalities'
-    return [Fact('The certificate of the running parameters holds', finding, all(holds))
-            ] if holds else []
+    return _if_known(sum(holds) if holds else None, 'The certificate of the running parameters '
+                     'holds', f'{{}} of {len(holds)} required inequalities', all(holds))
 
 
 def _known(entries: list[dict[str, Any]], *keys: str) -> list[tuple[Any, ...]]:

@@ -103,9 +103,8 @@ def _scratch(folder: Path | None, stack: ExitStack) -> Path:
 
 def _settled(copy: Path, folder: Path) -> Path:
     """Move a copy into the first of the numbered folders where it or nothing of its name is."""
-    target = next(place / copy.name for place in numbered(folder)
-                  if not (place / copy.name).exists()
-                  or filecmp.cmp(copy, place / copy.name, shallow=False))
+    target = next(of for of in (place / copy.name for place in numbered(folder))
+                  if not of.exists() or filecmp.cmp(copy, of, shallow=False))
     target.parent.mkdir(exist_ok=True)
     return copy.replace(target)
 
@@ -116,7 +115,7 @@ def _copy(source: Path, target: Path, *, ros_only: bool) -> int:
     schemas, channels = {0: 0}, dict[int, int]()  # numbers in the copy by those in the file
     try:
         with source.open('rb') as file, target.open('wb') as copy:
-            _refuse_recording(file, source)
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
             writer = Writer(copy)
             for record in _complete_records(file):
                 match record:
@@ -142,6 +141,8 @@ def _copy(source: Path, target: Path, *, ros_only: bool) -> int:
                     case Metadata():
                         writer.add_metadata(record.name, record.metadata)
             writer.finish()
+    except BlockingIOError:
+        raise DataError(f"'{source}' is still being recorded; stop its recorder first") from None
     except OSError as error:
         raise DataError(f"'{source}' cannot be rescued: {error}") from error
     if count == 0:
@@ -155,11 +156,3 @@ def _complete_records(file: BinaryIO) -> Iterator[McapRecord]:
         yield from StreamReader(file).records
     except (McapError, EOFError, struct.error, UnicodeDecodeError):
         return
-
-
-def _refuse_recording(file: BinaryIO, path: Path) -> None:
-    """Raise DataError when somebody is recording into a file."""
-    try:
-        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise DataError(f"'{path}' is still being recorded; stop its recorder first") from None

@@ -18,9 +18,9 @@ from synthetic_bag import write_bag
 from synthetic_walk import SyntheticWalk, robot
 
 from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.episodes import planned_stance
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.figures.catalogue import CATALOGUE, write_figures
-from dmp_cpg_ros.analysis.figures.over_time import planned_stance
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
@@ -98,8 +98,7 @@ def test_a_missing_topic_costs_no_more_than_its_figures(
 
 
 def test_the_planned_stance_is_that_of_the_walk(walked: Recording, context: RunContext) -> None:
-    planned = planned_stance(walked, context)
-    assert planned is not None
+    planned, _ = planned_stance(walked, context)
     running = (WALK.time >= WALK.walk_s) & (WALK.time < WALK.stop_s)
     np.testing.assert_array_equal(planned[running], WALK.stance()[running])
 

@@ -11,8 +11,12 @@ import pytest
 from core_examples import GAITS, TICK, TICK_NS, quadruped, standing_state
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.episodes import gait_rows, gaits_walked, steady_segments
-from dmp_cpg_ros.analysis.figures.over_time import planned_stance
+from dmp_cpg_ros.analysis.episodes import (
+    gait_rows,
+    gaits_walked,
+    planned_stance,
+    steady_segments,
+)
 from dmp_cpg_ros.analysis.metrics.gait import gait_metrics, phase_errors
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
@@ -69,8 +73,7 @@ def test_gaits_are_found_in_order_with_their_blends(recording: Recording) -> Non
 
 
 def test_planned_feet_and_steady_walking_know_of_the_change(recording: Recording) -> None:
-    stance = planned_stance(recording, context())
-    assert stance is not None
+    stance, _ = planned_stance(recording, context())
     late = slice(-200, None)
     trot = GAITS['trot']
     position = np.abs(trot.cycle_position(phase(recording.canonical.x[late])))

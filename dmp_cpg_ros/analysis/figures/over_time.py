@@ -14,7 +14,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis import episodes, motion
 from dmp_cpg_ros.analysis.context import RunContext
@@ -132,10 +131,15 @@ def footfall(recording: Recording, context: RunContext) -> Figure | None:
         return None
     steady, stop = _steady_window(recording, CYCLES), style.stop_window(recording)
     windows = [stop] if steady is None else [steady, stop]
-    contact, planned = feet.force > context.contact_force, planned_stance(recording, context)
+    contact = feet.force > context.contact_force
+    planned, duty = episodes.planned_stance(recording, context)
+    if duty.size and recording.inhibition:
+        # while a stop or a start is under way every foot is planned where it is
+        running = episodes.running_intervals(recording)
+        planned &= episodes.within(recording.canonical.time, running)[:, None]
     figure, axes = style.new_figure(1.75 * len(windows) + 0.5, len(windows))
     for panel, window in zip(axes[:, 0], windows, strict=True):
-        if planned is not None:
+        if duty.size:
             style.leg_bars(panel, recording.canonical.time, planned, 0.8, alpha=0.28)
         style.leg_bars(panel, feet.time, contact, 0.44)
         style.leg_rows(panel)
@@ -144,18 +148,6 @@ def footfall(recording: Recording, context: RunContext) -> Figure | None:
     axes[-1, 0].set_xlabel('time [s]')
     pale = [Patch(color='#BBBBBB', label='planned')] if context.gait is not None else []
     return style.legend(figure, [Patch(color='#555555', label='measured'), *pale, *shades])
-
-
-def planned_stance(recording: Recording, context: RunContext) -> NDArray[np.bool_] | None:
-    """Feet that the gait plans on the ground at each canonical state, boolean (n, 4).
-
-    While a stop or a start is under way every foot is planned where it is, and nothing is drawn.
-    """
-    stance, duty = episodes.planned_stance(recording, context)
-    if not duty.size or not recording.inhibition:
-        return stance if duty.size else None
-    running = episodes.running_intervals(recording)
-    return stance & episodes.within(recording.canonical.time, running)[:, None]
 
 
 def _steady_window(recording: Recording, cycles: int) -> tuple[float, float] | None:
