@@ -30,8 +30,6 @@ class RunResults:
         As in ``metrics.json`` and ``manifest.json``.
     report : Path or None
         None when no report was asked for.
-    figures : dict of str to Path
-        PNG files by the names of the catalogue.
     pictures : dict of str to (Path, str)
         PNG files and captions by name.
     """
@@ -40,7 +38,6 @@ class RunResults:
     metrics: dict[str, Any]
     manifest: dict[str, Any]
     report: Path | None = None
-    figures: dict[str, Path] = field(default_factory=dict)
     pictures: dict[str, tuple[Path, str]] = field(default_factory=dict)
 
 
@@ -85,7 +82,7 @@ def write_results(
     page = folder / 'report.html'
     page.write_text(render(*_headings(recording, context, facts), metrics, facts, figures,
                            pictures), encoding='utf-8')
-    return RunResults(folder, metrics, facts, page, figures, pictures)
+    return RunResults(folder, metrics, facts, page, pictures)
 
 
 def _headings(recording: Recording, context: RunContext, manifest: Mapping[str, Any],
