@@ -38,9 +38,7 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters
 LEG, POSTURE, ROBOT, RECORDER = (
     'leg_transformation', 'posture_control', 'mujoco_robot', 'bag_recorder')
 
-CLOCK_TOPIC = '/clock'
-DIAGNOSTICS_TOPIC = '/diagnostics'
-ABSOLUTE_TOPICS = (CLOCK_TOPIC, DIAGNOSTICS_TOPIC)
+ABSOLUTE_TOPICS = ('/clock', '/diagnostics')
 """Topics that ROS names absolutely, once for all nodes of a domain."""
 
 

@@ -24,7 +24,6 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
@@ -32,6 +31,7 @@ from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, already_running, claim, claimed
 from dmp_cpg_ros.nodes.framework.execution import make_executor, prepare_middleware
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.scenario.lying_down import LyingDown
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, WALKING_NODES, instances
@@ -243,7 +243,10 @@ class _Watch:
             for name in (*WALKING_NODES, RECORDER)
         }
         self._recording = True
-        self._recorded = player.create_client(Trigger, f'{RECORDER}/recorded')
+        self._recorded: Any = None
+        topic = interface('~/recorded')
+        player.create_subscription(
+            topic.type, f'{RECORDER}/recorded', self._on_recorded, topic.reader_qos)
 
     def until(self, future: Future, patience_s: float) -> bool:
         """Spin until a future is done; returns whether it is."""
@@ -311,17 +314,19 @@ class _Watch:
         request = ChangeState.Request(transition=Transition(id=transition))
         self._ask(client, request, LAST_WORDS_S)
 
+    def _on_recorded(self, counts: Any) -> None:
+        self._recorded = counts
+
     def _until_recorded(self) -> None:
         """Wait until nothing more arrives at the recorder."""
-        client = self._recorded
-        client.wait_for_service(timeout_sec=LAST_WORDS_S)
-        deadline, before = time.monotonic() + LAST_WORDS_S, None
+        deadline, before = time.monotonic() + LAST_WORDS_S, self._recorded
         while time.monotonic() < deadline:
-            answer = self._ask(client, Trigger.Request())
-            if answer is not None and answer.message == before:
-                return
-            before = None if answer is None else answer.message
             self._pause(SETTLED_S)
+            counts = self._recorded
+            if before is not None and counts is not before and (
+                    counts.position == before.position):
+                return
+            before = counts
 
     def _pause(self, seconds: float) -> None:
         interrupted, self._interrupted = self._interrupted, []

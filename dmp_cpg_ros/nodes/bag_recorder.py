@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -16,6 +15,7 @@ from rclpy.clock import Clock as RclpyClock
 from rclpy.clock import ClockType
 from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.nodes.framework.execution import run_node
@@ -78,12 +78,12 @@ class BagRecorder(SuiteNode):
             self._record(self._offered(topic, parameters), topic.name in stamped,
                          topic.name in clocks)
             for topic in topics]
-        self.serve('~/recorded', self._answer_recorded)
+        self._recorded = self.publisher('~/recorded')
         self._started = time.monotonic()
         # The wall clock drives only how much a kill may cost.
         steady = RclpyClock(clock_type=ClockType.STEADY_TIME)
         self._flush_timer: Timer = self.create_timer(
-            parameters.flush_period, self._bag.flush, clock=steady)
+            parameters.flush_period, self._flush, clock=steady)
 
     def deactivate(self) -> None:
         """Take what has arrived."""
@@ -111,9 +111,10 @@ class BagRecorder(SuiteNode):
                    'wall_s': time.monotonic() - self._started}
         return values
 
-    def _answer_recorded(self, request: Any, response: Any) -> Any:
-        response.success, response.message = self.active, json.dumps(dict(self._bag.counts))
-        return response
+    def _flush(self) -> None:
+        self._bag.flush()
+        self._recorded.publish(JointState(
+            name=list(self._bag.counts), position=list(map(float, self._bag.counts.values()))))
 
     def _offered(self, topic: Interface, parameters: RecorderParameters) -> Interface:
         return STAMPED_CMD_VEL if parameters.stamped_cmd_vel and topic.name == 'cmd_vel' else topic

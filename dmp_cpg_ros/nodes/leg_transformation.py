@@ -63,9 +63,7 @@ class LegTransformation(SuiteNode):
         }
         if parameters.reading == 'torque':
             readers['joint_states'] = JointsReader().read
-        self.match(tuple(readers), 'canonical_state',
-                   lock_step=self.parameters_of(LockStepParameters).lock_step)
-        self.feed(readers)
+        self.match('canonical_state', readers)
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the leg to the stamp of the canonical state."""

@@ -55,17 +55,11 @@ class PostureControl(SuiteNode):
         self._state, self._told = self._control.initial_state(), ''
         self._mode_publisher = self.publisher('body_mode')
         self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
-        self.match(
-            (*self._body.inputs, 'reference', 'canonical_state'),
-            'canonical_state',
-            optional=self._body.optional,
-            lock_step=self.parameters_of(LockStepParameters).lock_step,
-        )
-        self.feed({
+        self.match('canonical_state', {
             **self._body.readers,
             'reference': read_reference,
             'canonical_state': canonical.read,
-        })
+        }, optional=self._body.optional)
         for what in REQUESTS:
             self.serve(what, self._answering(what))
 
@@ -92,10 +86,7 @@ class PostureControl(SuiteNode):
         """What the body does and why, and what the estimator found out."""
         condition = self._state.mode.condition
         measured = {} if condition is None else {
-            'tilt': condition.tilt,
-            'height': condition.height,
-            'support': condition.support,
-        }
+            name: getattr(condition, name) for name in ('tilt', 'height', 'support')}
         return {
             'body_mode': self._state.mode.mode,
             'reason': self._state.mode.reason,

@@ -14,48 +14,40 @@ from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import approached
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
-from dmp_cpg_ros.nodes.framework.certified import CertifiedNode
+from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified
 from dmp_cpg_ros.nodes.framework.execution import run_node
 from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, ReferenceWriter
 from dmp_cpg_ros.suite_table import KINDS
 
 
-class ReferenceFilter(CertifiedNode):
+class ReferenceFilter(SuiteNode):
     """Filters the commanded velocity; brings it to zero when cmd_vel falls silent or a stop is
     requested.
     """
 
     KIND = REFERENCE
     PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
+    CHANGEABLE = JUDGED
+    certified: Certified
 
     def configure(self) -> None:
         """Build the filter and its topics."""
-        self.prepare_certificate()
-        self._gate = self.new_gate()
+        self.certified = Certified(self, lambda: Acting(self._cadence))
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
         self._r, self._requested = np.zeros(3), False
         self._cadence = self.parameters_of(CanonicalParameters).cadence_scale
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
-        self.match(
-            ('joint_states',),
-            'joint_states',
-            delayed=('inhibition_gains',),
-            lock_step=self.parameters_of(LockStepParameters).lock_step,
-        )
         gains = InhibitionGainsReader()
-        self.feed({'joint_states': lambda _: None,
-                   'inhibition_gains': lambda message: gains.read(message).requested})
-        self.listen_to_commands(self._gate)
+        self.match('joint_states', {'joint_states': lambda _: None},
+                   delayed={'inhibition_gains': lambda message: gains.read(message).requested})
+        self._gate = self.certified.commands()
 
     def on_parameters(self) -> None:
         """Take over limits and rates."""
-        self.limit(self._gate)
+        self.certified.limit(self._gate)
         self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
-
-    def acting_cadence(self) -> float | None:
-        """Factor on the cadence as the oscillators let it approach the accepted one."""
-        return self._cadence
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
@@ -68,12 +60,8 @@ class ReferenceFilter(CertifiedNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Reference and whether a stop holds it at zero."""
-        return {
-            'v_x': self._r[0],
-            'v_y': self._r[1],
-            'gamma': self._r[2],
-            'stopping': self._requested,
-        }
+        return {**dict(zip(('v_x', 'v_y', 'gamma'), self._r, strict=True)),
+                'stopping': self._requested}
 
 
 def main() -> int:

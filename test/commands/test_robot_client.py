@@ -23,7 +23,6 @@ pytest.importorskip('rclpy')
 
 import yaml
 from ros_processes import NodeProcess, Processes, Ros, reserved_domain, wait_until
-from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
@@ -200,9 +199,11 @@ def test_it_lies_down_refuses_to_walk_and_stands_up(suite: Processes, ros: Ros) 
 
 
 def test_a_push_is_taken_once(suite: Processes, ros: Ros) -> None:
-    def pushes() -> int:
-        answer = ros.call(Trigger, 'mujoco_robot/commands_taken', Trigger.Request())
-        return int(re.findall(r'push (\d+)', answer.message)[0])
+    taken = interface('~/commands_taken')
+    told = ros.collect(taken.type, 'mujoco_robot/commands_taken', taken.reader_qos)
+
+    def pushes() -> float:
+        return dict(zip(told[-1].name, told[-1].position, strict=True))['push'] if told else 0.0
 
     before = pushes()
     said(suite, 'push', '0', '10', '0')

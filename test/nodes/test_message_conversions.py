@@ -42,14 +42,13 @@ from dmp_cpg_ros.nodes.messages.conversions import (
     read_reference,
     read_twist,
 )
-from dmp_cpg_ros.nodes.messages.inhibition_state import InhibitionStateWriter, read_state_word
+from dmp_cpg_ros.nodes.messages.inhibition_state import inhibition_state, read_state_word
 from dmp_cpg_ros.nodes.messages.robot_state import (
     FootContactsReader,
     JointsReader,
     RobotStateWriter,
     read_imu,
     read_odom,
-    robot_state,
 )
 from dmp_cpg_ros.nodes.messages.values import LARGEST, header_ns, set_stamp, stamp_ns, text
 from dmp_cpg_ros.suite import load_gait, load_gaits
@@ -156,8 +155,8 @@ def read_state(writer: RobotStateWriter) -> RobotState:
     stamps = {header_ns(message) for message in (
         writer.joint_states, writer.imu, writer.odom, writer.foot_contacts)}
     assert stamps == {stamp_ns(writer.clock.clock)}
-    return robot_state(stamps.pop(), joints, base,
-                       FootContactsReader().read(wire(writer.foot_contacts)), acceleration, rate)
+    return RobotState(stamps.pop(), *joints, *base, acceleration,
+                      FootContactsReader().read(wire(writer.foot_contacts)), rate)
 
 
 @given(STAMPS, numbers(59))
@@ -299,16 +298,14 @@ def test_commands(values: tuple[float, float, float]) -> None:
 
 @given(STAMPS, st.floats(allow_nan=False, allow_infinity=False), st.booleans())
 def test_inhibition_state(time_ns: int, number: float, flag: bool) -> None:
-    writer = InhibitionStateWriter()
-    writer.fill(0, 'free', {'gain': 1.0, 'requested': not flag})
-    message = wire(writer.fill(time_ns, 'at_rest', {'gain': number, 'requested': flag}))
+    message = wire(inhibition_state(time_ns, 'at_rest', {'gain': number, 'requested': flag}))
     assert (read_state_word(message), header_ns(message)) == ('at_rest', time_ns)
     told = {entry.key: entry.value for entry in message.status[0].values}
     assert bits(float(told['gain'])) == bits(number)
     assert told['requested'] == ('true' if flag else 'false')
-    writer.message.status[0].name = 'other'
+    message.status[0].name = 'other'
     with pytest.raises(DataError, match='inhibition'):
-        read_state_word(writer.message)
+        read_state_word(message)
 
 
 @given(STAMPS, numbers(4), st.booleans(), st.booleans())

@@ -18,29 +18,25 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.service import Service
 from rclpy.subscription import Subscription
+from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.certificates.gate import shown
 from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.suite_parameters import OWNER
+from dmp_cpg_ros.nodes.framework import parameters
+from dmp_cpg_ros.nodes.framework.certified import Certified, Sets
 from dmp_cpg_ros.nodes.framework.health import missing_connections
 from dmp_cpg_ros.nodes.framework.lifecycle import GuardedLifecycleNode
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePublisher
-from dmp_cpg_ros.nodes.framework.parameters import (
-    NodeParameters,
-    ParameterTable,
-    declare,
-    plain,
-    ros_value,
-)
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, partners
 from dmp_cpg_ros.nodes.messages.values import header_ns
 
 P = TypeVar('P', bound=Parameters)
-Sets = Mapping[type[Parameters], Parameters]
+Readers = Mapping[str, Callable[[Any], Any]]
 
 
 class SuiteNode(GuardedLifecycleNode):
@@ -64,6 +60,12 @@ class SuiteNode(GuardedLifecycleNode):
     CHANGEABLE : collection of str
         Parameters that may change while the node runs; all others are read-only. Those that
         another node owns are refused with its name, and change only by :meth:`follow`.
+    certified : Certified, optional
+        What judges changes, of a node that makes it in ``configure``.
+    accepted : mapping from class to instance
+        Parameters that were accepted last; they take effect at the next tick.
+    following : bool
+        Whether the change that is judged is one that its owner has accepted.
     elapsed : float
         Time since the tick before, 0 at the first one [s].
     local : LocalDelivery or None
@@ -73,15 +75,17 @@ class SuiteNode(GuardedLifecycleNode):
     KIND: ClassVar[str] = ''
     PARAMETER_SETS: ClassVar[tuple[type[Parameters], ...]] = ()
     CHANGEABLE: ClassVar[Collection[str]] = ()
+    certified: Certified | None = None
     local: LocalDelivery | None = None
+    following = False
     elapsed = 0.0
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
-        self._following = False
         super().__init__(name or self.KIND, **options)
         self._table = self.parameter_table()
-        self._sets = self._accepted = declare(self, self._table)
+        self.accepted: Sets = parameters.declare(self, self._table)
+        self._sets: Sets = self.accepted
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._accept_change)
         self._entities: list[Publisher | Subscription | Service] = []
@@ -113,18 +117,26 @@ class SuiteNode(GuardedLifecycleNode):
 
     def check_parameters(self, sets: Sets) -> None:
         """Raise ParameterError to refuse a change that every field by itself would allow."""
+        if self.certified is not None:
+            self.certified.check(sets)
 
     # Parameters ------------------------------------------------------------------------------
 
     @classmethod
-    def parameter_table(cls) -> ParameterTable:
+    def parameter_table(cls) -> parameters.ParameterTable:
         """All parameters of this kind of node."""
-        return ParameterTable((NodeParameters, *cls.PARAMETER_SETS), cls.CHANGEABLE)
+        return parameters.ParameterTable(
+            (parameters.NodeParameters, *cls.PARAMETER_SETS), cls.CHANGEABLE)
 
     @classmethod
     def default_name(cls, arguments: Sequence[str]) -> str:
         """Name of the node when the command line does not give one."""
         return cls.KIND
+
+    @property
+    def lock_step(self) -> bool:
+        """Whether ticks wait for all their inputs."""
+        return self.parameters_of(parameters.LockStepParameters).lock_step
 
     def parameters_of(self, parameter_set: type[P]) -> P:
         """Return the values in effect of one parameter set."""
@@ -132,14 +144,8 @@ class SuiteNode(GuardedLifecycleNode):
 
     def start(self) -> None:
         """Configure and activate, unless ``autostart`` is false; raises what made that fail."""
-        if self.parameters_of(NodeParameters).autostart:
+        if self.parameters_of(parameters.NodeParameters).autostart:
             super().start()
-
-    def take_changed_parameters(self) -> None:
-        """Let changes that were accepted since the last call take effect, all at once."""
-        if self._accepted is not self._sets:
-            self._sets = self._accepted
-            self.on_parameters()
 
     def follow(self, values: Mapping[str, Any]) -> None:
         """Take over what the owner of some parameters has accepted, where it is new.
@@ -149,17 +155,17 @@ class SuiteNode(GuardedLifecycleNode):
         DataError
             If it cannot be taken over; nothing is then changed.
         """
-        accepted = self._table.values(self._accepted)
+        known = self._table.values(self.accepted)
         news = {name: value for name, value in values.items()
-                if name in accepted and value != ros_value(accepted[name])}
+                if name in known and value != parameters.ros_value(known[name])}
         if not news:
             return
-        self._following = True
+        self.following = True
         try:
             result = self.set_parameters_atomically(
                 [Parameter(name, value=value) for name, value in news.items()])
         finally:
-            self._following = False
+            self.following = False
         if not result.successful:
             raise DataError(f'cannot follow {news}: {result.reason}')
 
@@ -168,47 +174,46 @@ class SuiteNode(GuardedLifecycleNode):
 
         So a file that ``ros2 param dump`` wrote can be loaded by the node that it describes.
         """
-        news = [entry for entry in parameter_list if not self._is_fixed(entry)]
+        news = [entry for entry in parameter_list if not (
+            self.has_parameter(entry.name) and self.describe_parameter(entry.name).read_only
+            and self.get_parameter(entry.name).get_parameter_value()
+            == entry.get_parameter_value())]
         if parameter_list and not news:
             return SetParametersResult(successful=True)
         return super().set_parameters_atomically(news)
 
-    def _is_fixed(self, entry: Parameter) -> bool:
-        """Whether a parameter is read-only and has this value."""
-        return (self.has_parameter(entry.name) and self.describe_parameter(entry.name).read_only
-                and self.get_parameter(entry.name).get_parameter_value()
-                == entry.get_parameter_value())
-
-    def _refuse_foreign(self, sets: Sets) -> None:
-        before, after = self._table.values(self._accepted), self._table.values(sets)
-        for name, value in after.items():
-            owner = OWNER.get(name, self.KIND)
-            if value != before[name] and owner != self.KIND:
-                raise ParameterError(
-                    f"'{name}' belongs to {owner}, which the other nodes follow; set it there: "
-                    f'ros2 param set /{owner} {name} {shown(value)}')
+    def changed_values(self, sets: Sets) -> dict[str, Any]:
+        """New values of the parameters in which sets differ from those accepted last."""
+        before = self._table.values(self.accepted)
+        return {name: value for name, value in self._table.values(sets).items()
+                if value != before[name]}
 
     def _check_change(self, changes: list[Parameter]) -> SetParametersResult:
         """Validate changes together with the values that were accepted last."""
         try:
             sets = self._changed(changes)
-            if not self._following:
-                self._refuse_foreign(sets)
+            for name, value in self.changed_values(sets).items() if not self.following else ():
+                owner = OWNER.get(name, self.KIND)
+                if owner != self.KIND:
+                    raise ParameterError(
+                        f"'{name}' belongs to {owner}, which the other nodes follow; set it "
+                        f'there: ros2 param set /{owner} {name} {shown(value)}')
             self.check_parameters(sets)
         except DmpCpgError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
     def _accept_change(self, changes: list[Parameter]) -> None:
-        self._accepted = self._changed(changes)
+        self.accepted = self._changed(changes)
         if not self.configured:
-            self._sets = self._accepted
+            self._sets = self.accepted
+        elif self.certified is not None:
+            self.certified.accept()
 
     def _changed(self, changes: list[Parameter]) -> dict[type[Parameters], Parameters]:
-        values = self._table.values(self._accepted)
-        values.update({change.name: plain(change.value) for change in changes
-                       if change.name in self._table.fields})
-        return self._table.build(values)
+        return self._table.build({**self._table.values(self.accepted), **{
+            change.name: parameters.plain(change.value) for change in changes
+            if change.name in self._table.fields}})
 
     # Topics and services -----------------------------------------------------------------------
 
@@ -239,7 +244,8 @@ class SuiteNode(GuardedLifecycleNode):
             that :mod:`~dmp_cpg_ros.nodes.messages.cdr` reads come as its classes from
             other processes, unless ``command``.
         command : bool
-            Whether the queue is emptied at the start of every tick.
+            Whether the queue is emptied at the start of every tick, and what was taken counted on
+            ``~/commands_taken``.
         raw : bool
             Whether the callback takes serialized bytes.
         qos : QoSProfile, optional
@@ -251,39 +257,38 @@ class SuiteNode(GuardedLifecycleNode):
             None when all publishers are in this process.
         """
         topic = topic if isinstance(topic, Interface) else interface(topic)
-        if self.local is not None and self.local.kinds.issuperset(topic.publishers):
-            receive = self.guarded(topic.name, self._while_active(topic, callback))
+        inside = self.local is not None and self.local.kinds.issuperset(topic.publishers)
+        latched, read = topic.latched, serialized_reader(topic.type, as_message=command)
+        as_it_is = raw or inside
+
+        def receive(message: Any) -> None:
+            if self.active or latched:
+                callback(message if as_it_is else read(message))
+
+        if self.local is not None and inside:
+            receive = self.guarded(topic.name, receive)
             self.local.attach(topic.name, receive)
             self._local_readers.append(receive)
             return None
-        take = callback
-        if not raw:
-            read = serialized_reader(topic.type, as_message=command)
-
-            def take(data: bytes) -> None:
-                callback(read(data))
-
-        receive = self._while_active(topic, take)
         subscription = self.create_subscription(
             topic.type, topic.name, self._counted(topic.name, receive) if command else receive,
             qos or topic.reader_qos, raw=True)
         self._entities.append(subscription)
         self._inputs.append((topic, subscription))
         if command:
-            if not self._commands:
-                self.serve('~/commands_taken', self._answer_commands_taken)
             self._commands.append(subscription)
         return subscription
 
-    def serve(self, name: str, callback: Callable[[Any, Any], Any]) -> Service:
+    def serve(self, name: str, callback: Callable[[Any, Any], Any]) -> None:
         """Create a service of the table; its callback runs in every state of the node."""
         service = interface(name)
-        entity = self.create_service(service.type, service.name, callback)
-        self._entities.append(entity)
-        return entity
+        self._entities.append(self.create_service(service.type, service.name, callback))
 
     def destroy_entities(self) -> None:
         """Destroy the publishers, subscriptions and services of :meth:`configure`."""
+        if self.certified is not None:
+            self.certified.end()
+            self.certified = None
         for entity in reversed(self._entities):
             if isinstance(entity, Publisher):
                 self.destroy_publisher(entity)
@@ -291,8 +296,9 @@ class SuiteNode(GuardedLifecycleNode):
                 self.destroy_subscription(entity)
             else:
                 self.destroy_service(entity)
-        for reader in self._local_readers if self.local is not None else ():
-            self.local.detach(reader)  # type: ignore[union-attr]
+        if self.local is not None:
+            for reader in self._local_readers:
+                self.local.detach(reader)
         self._entities, self._commands, self._inputs, self._local_readers = [], [], [], []
         self._outputs = self._outputs[:1]
 
@@ -300,32 +306,60 @@ class SuiteNode(GuardedLifecycleNode):
         """List connections with the expected nodes that do not stand yet; empty when all do."""
         outputs = [(topic, self.readers(topic), publisher) for topic, publisher in self._outputs]
         return missing_connections(self, self.KIND, outputs, self._inputs,
-                                   self.parameters_of(NodeParameters).expected_nodes)
+                                   self.parameters_of(parameters.NodeParameters).expected_nodes)
+
+    def _counted(self, topic: str, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Say how many commands have been taken: who has sent them may wait for it."""
+        counts = self._commands_taken
+        counts.setdefault(topic, 0)
+        if not self._commands:
+            self._taken = self.publisher('~/commands_taken')
+
+        def receive(message: Any) -> None:
+            try:
+                callback(message)
+            finally:
+                counts[topic] += 1
+                self._taken.publish(JointState(
+                    name=list(counts), position=list(map(float, counts.values()))))
+
+        return receive
 
     # Ticks -------------------------------------------------------------------------------------
 
-    def match(self, inputs: Sequence[str], trigger: str, **options: Any) -> TickInputs:
-        """Make :class:`~dmp_cpg_ros.nodes.framework.ticks.TickInputs` that run :meth:`on_tick`."""
+    def match(self, trigger: str, readers: Readers, *, delayed: Readers | None = None,
+              optional: Collection[str] = ()) -> None:
+        """Run :meth:`on_tick` for every tick with what readers make of the messages of topics.
+
+        Parameters
+        ----------
+        trigger : str
+            The topic without which there is no tick.
+        readers, delayed : mapping of str to callable
+            Topics of the tick, and those that act one tick later, with what reads their messages.
+        optional : collection of str
+            As for :class:`~dmp_cpg_ros.nodes.framework.ticks.TickInputs`.
+        """
+        delayed = delayed or {}
         self._clock_of_ticks = TickClock()
-        self._ticks = TickInputs(self._run_tick, inputs, trigger, **options)
-        return self._ticks
+        ticks = TickInputs(self._run_tick, tuple(readers), trigger, delayed=tuple(delayed),
+                           optional=tuple(optional), lock_step=self.lock_step)
 
-    def feed(self, readers: Mapping[str, Callable[[Any], Any]]) -> None:
-        """Let what readers make of the messages of topics fill the inputs of :meth:`match`."""
         def feeding(name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
-            return lambda message: self._ticks.add(name, header_ns(message), read(message))
+            return lambda message: ticks.add(name, header_ns(message), read(message))
 
-        for name, read in readers.items():
+        for name, read in {**readers, **delayed}.items():
             self.listen(name, feeding(name, read))
 
     def begin_tick(self, stamp_ns: int) -> None:
         """Start a tick: waiting commands are taken and changed parameters take effect."""
-        health = self.health
-        health.ticks += 1
-        health.stamp_ns = stamp_ns
+        self.health.ticks += 1
+        self.health.stamp_ns = stamp_ns
         for subscription in self._commands:
             drain(subscription)
-        self.take_changed_parameters()
+        if self.accepted is not self._sets:
+            self._sets = self.accepted
+            self.on_parameters()
 
     def end_tick(self) -> None:
         """End a tick: once a second of the robot's clock, look for commands of a wrong type, and
@@ -334,6 +368,11 @@ class SuiteNode(GuardedLifecycleNode):
         if self.health.due():
             self._watch_command_types()
             self.report(periodic=True)
+
+    def let_ticks_pass(self) -> None:
+        """Take waiting messages in the middle of something that takes long."""
+        for _, subscription in self._inputs if self.active else ():
+            drain(subscription)
 
     def _run_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         self.elapsed = self._clock_of_ticks.step(stamp_ns)
@@ -371,8 +410,6 @@ class SuiteNode(GuardedLifecycleNode):
         if self.health.clear_problem(key):
             self.report()
 
-    # Inside ------------------------------------------------------------------------------------
-
     def _watch_command_types(self) -> None:
         """Warn of publishers of commands whose type no reader can match: DDS says nothing."""
         for topic, subscription in self._inputs:
@@ -386,32 +423,6 @@ class SuiteNode(GuardedLifecycleNode):
                           f'reads {topic.type_name}{topic.other_type}')
             else:
                 self.clear(f'type of {name}')
-
-    def _while_active(self, topic: Interface, callback: Callable[[Any], None],
-                      ) -> Callable[[Any], None]:
-        latched = topic.latched
-
-        def receive(message: Any) -> None:
-            if self.active or latched:
-                callback(message)
-
-        return receive
-
-    def _counted(self, topic: str, callback: Callable[[Any], None]) -> Callable[[Any], None]:
-        self._commands_taken.setdefault(topic, 0)
-
-        def receive(message: Any) -> None:
-            try:
-                callback(message)
-            finally:
-                self._commands_taken[topic] += 1
-
-        return receive
-
-    def _answer_commands_taken(self, request: Any, response: Any) -> Any:
-        counts = (f'{topic} {count}' for topic, count in self._commands_taken.items())
-        response.success, response.message = True, ', '.join(counts)
-        return response
 
     def _answer_ready(self, request: Any, response: Any) -> Any:
         problems = [] if self.active else [f'{self.get_name()} is {self.state_label}']

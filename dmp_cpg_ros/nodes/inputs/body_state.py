@@ -24,12 +24,12 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS
 from dmp_cpg_ros.nodes.messages.robot_state import (
-    EstimatedOdometryWriter,
+    BaseMotion,
     FootContactsReader,
     JointsReader,
+    OdometryWriter,
     read_imu,
     read_odom,
-    robot_state,
 )
 from dmp_cpg_ros.nodes.messages.values import stamped
 
@@ -51,40 +51,32 @@ class BodyState:
 
     Attributes
     ----------
-    inputs : tuple of str
-        Topics, for :meth:`~dmp_cpg_ros.nodes.framework.suite_node.SuiteNode.match`.
     optional : tuple of str
-        Of these: those whose silence the estimator bears.
+        Topics whose silence the estimator bears.
     readers : mapping of str to callable
-        How to read each.
+        How to read each topic.
     estimate : BodyEstimate or None
         The last one.
     """
 
-    def __init__(
-        self, node: SuiteNode, description: RobotDescription, legs: RobotLegs | None = None
-    ) -> None:
+    def __init__(self, node: SuiteNode, description: RobotDescription,
+                 legs: RobotLegs | None = None) -> None:
         """Build the estimator, where there is one, and its publisher."""
         self._node = node
-        source = node.parameters_of(StateSourceParameters).state_source
-        self.inputs = ('joint_states', *BODY_TOPICS[source])
         self.estimate: BodyEstimate | None = None
         self._memory: EstimatorState | None = None
         self._estimator: BodyEstimator | None = None
+        self.optional: tuple[str, ...] = ()
         self.readers: dict[str, Callable[[Any], Any]] = {'joint_states': JointsReader().read}
-        if source != ESTIMATE:
-            self.optional: tuple[str, ...] = ()
+        if node.parameters_of(StateSourceParameters).state_source != ESTIMATE:
             self.readers['odom'] = read_odom
             return
         self.optional = BODY_TOPICS[ESTIMATE]
-        contacts = FootContactsReader(strict=False)
-        self.readers |= {'imu': stamped(read_imu), 'foot_contacts': stamped(contacts.read)}
+        self.readers |= {'imu': stamped(read_imu),
+                         'foot_contacts': stamped(FootContactsReader().read)}
         self._estimator = BodyEstimator(
             description, node.parameters_of(EstimationParameters), legs)
-        self._writer, self._publisher = (
-            EstimatedOdometryWriter(),
-            node.publisher('estimated_odom'),
-        )
+        self._writer, self._publisher = OdometryWriter(), node.publisher('estimated_odom')
         self._published, self._problem_ns = -1, 0
         self.on_parameters()
 
@@ -108,16 +100,17 @@ class BodyState:
             By topic, what its reader returned.
         """
         if self._estimator is None:
-            return robot_state(
-                stamp_ns, values['joint_states'], values['odom'], np.zeros(len(LEGS))
-            )
+            position, velocity, effort = values['joint_states']
+            base: BaseMotion = values['odom']
+            return RobotState(stamp_ns, position, velocity, effort, *base, np.zeros(3),
+                              np.zeros(len(LEGS)))
         readings = sensor_readings(stamp_ns, values)
         self._memory, estimate = self._estimator.step(self._memory, readings)
         self.estimate = estimate
         self._tell_problems(stamp_ns, estimate)
         if self._period_ns and stamp_ns // self._period_ns != self._published:
             self._published = stamp_ns // self._period_ns
-            self._publisher.publish(self._writer.fill(estimate))
+            self._publisher.publish(self._writer.fill_estimate(estimate))
         return estimated_state(readings, estimate)
 
     def diagnostic_values(self) -> Mapping[str, Any]:
@@ -139,11 +132,8 @@ class BodyState:
     def _tell_problems(self, stamp_ns: int, estimate: BodyEstimate) -> None:
         if estimate.problems:
             self._problem_ns = stamp_ns
-            self._node.warn(
-                'sensors',
-                f'the estimator does without {", ".join(estimate.problems)}: silent, not finite, '
-                'or impossible',
-            )
+            self._node.warn('sensors', 'the estimator does without '
+                            f'{", ".join(estimate.problems)}: silent, not finite, or impossible')
         elif stamp_ns > self._problem_ns + WELL_AGAIN_NS:
             self._node.clear('sensors')
 

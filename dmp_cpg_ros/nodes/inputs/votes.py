@@ -56,8 +56,8 @@ class NodeVotes:
         self._state = self.voting.initial_state(network)
         self.readers: dict[str, Callable[[Any], Any]] = {}
         if self.voting.voting.voting:
-            contacts = FootContactsReader(strict=False)
-            self.readers = {CONTACTS: stamped(contacts.read), IMU: stamped(read_imu)}
+            self.readers = {
+                CONTACTS: stamped(FootContactsReader().read), IMU: stamped(read_imu)}
             node.listen(
                 'votes', lambda message: self.inbox.accept(*read_votes(message)), command=True)
 
@@ -113,9 +113,6 @@ class NodeVotes:
         """Values of ``inhibition_state`` about the votes."""
         if not self.readers:
             return {}
-        tally = state.tally
-        values: dict[str, Any] = {
-            f'vote_{leg}': weight
-            for leg, weight in zip(LEGS, tally.weights.tolist(), strict=True)
-        }
-        return {**values, 'voted': state.voted, 'asked': state.asked, 'cause': tally.cause}
+        weights = zip(LEGS, state.tally.weights.tolist(), strict=True)
+        return {**{f'vote_{leg}': weight for leg, weight in weights}, 'voted': state.voted,
+                'asked': state.asked, 'cause': state.tally.cause}

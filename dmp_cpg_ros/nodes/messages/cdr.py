@@ -12,7 +12,7 @@ encoded otherwise is left to rclpy.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -35,8 +35,15 @@ BODY = 4
 """Where a message begins: behind the bytes that say how it is encoded."""
 
 
+FIELDS = ('position', 'velocity', 'effort')
+"""The arrays of a ``JointState``, in the order of its definition."""
+
+_STAMP, _HEADER, _COUNT = struct.Struct('<iI'), struct.Struct('<iII'), struct.Struct('<I')
+_TWIST, _IMU = struct.Struct('<6d'), struct.Struct('<104x3d72x3d')
+
+
 class Serialized:
-    """A message known by its bytes.
+    """A message known by its bytes; raises struct.error or ValueError when they are cut short.
 
     Attributes
     ----------
@@ -49,12 +56,14 @@ class Serialized:
     __slots__ = ('serialized', 'stamp_ns')
     KIND: ClassVar[type]
 
-    serialized: bytes
-    stamp_ns: int
+    def __init__(self, data: bytes) -> None:
+        """Read the bytes."""
+        seconds, rest, length = _HEADER.unpack_from(data, BODY)
+        self.serialized, self.stamp_ns = data, stamp_in_ns(seconds, rest)
+        self._read(BODY + _HEADER.size + length)
 
-
-_HEADER, _COUNT = struct.Struct('<iII'), struct.Struct('<I')
-_TWIST, _IMU = struct.Struct('<6d'), struct.Struct('<104x3d72x3d')
+    def _read(self, at: int) -> None:
+        """Read what follows the header."""
 
 
 class SerializedJointState(Serialized):
@@ -62,47 +71,35 @@ class SerializedJointState(Serialized):
 
     Attributes
     ----------
-    frame_id : str
-        Frame of the header.
     name : list of str
         Names; the same list object for the same names.
+    position, velocity, effort : ndarray
+        Made when they are asked for.
     """
 
-    __slots__ = ('_arrays', '_places', '_sound', 'frame_id', 'name')
+    __slots__ = ('_places', '_sound', 'effort', 'name', 'position', 'velocity')
     KIND = JointState
 
-    def __init__(self, data: bytes) -> None:
-        """Read the bytes; raises struct.error or ValueError when they are cut short."""
-        self.stamp_ns, self.frame_id, at = _header(data)
-        self.name, at = _names(data, at)
-        first = _doubles(data, at)
-        second = _doubles(data, first[1])
-        self.serialized, self._places = data, (first, second, _doubles(data, second[1]))
-        self._arrays: list[Array | None] = [None, None, None]
-        self._sound: set[str] = set()
+    def _read(self, at: int) -> None:
+        self.name, at = _names(self.serialized, at)
+        self._places, self._sound = {}, set[str]()
+        for field in FIELDS:
+            self._places[field] = _, at = _doubles(self.serialized, at)
 
     def refilled(self, data: bytes, stamp_ns: int) -> SerializedJointState:
         """Return a message of the same layout, without reading that again."""
         message = SerializedJointState.__new__(SerializedJointState)
         message.serialized, message.stamp_ns = data, stamp_ns
-        message.frame_id, message.name, message._places = self.frame_id, self.name, self._places
-        message._arrays, message._sound = [None, None, None], set()
+        message.name, message._places, message._sound = self.name, self._places, set()
         return message
 
-    @property
-    def position(self) -> Array:
-        """Positions."""
-        return self._array(0)
-
-    @property
-    def velocity(self) -> Array:
-        """Velocities."""
-        return self._array(1)
-
-    @property
-    def effort(self) -> Array:
-        """Efforts."""
-        return self._array(2)
+    def __getattr__(self, field: str) -> Array:
+        if field not in FIELDS:
+            raise AttributeError(field)
+        begin, end = self._places[field]
+        array = np.frombuffer(self.serialized[begin:end])
+        setattr(self, field, array)
+        return array
 
     def checked(self, field: str) -> Array:
         """An array whose numbers are finite, checked once for all readers; raises DataError."""
@@ -112,16 +109,9 @@ class SerializedJointState(Serialized):
             self._sound.add(field)
         return array
 
-    def _array(self, which: int) -> Array:
-        array = self._arrays[which]
-        if array is None:
-            begin, end = self._places[which]
-            array = self._arrays[which] = np.frombuffer(self.serialized[begin:end])
-        return array
-
 
 class SerializedTwist(Serialized):
-    """Stamp and numbers of a serialized ``TwistStamped``.
+    """A serialized ``TwistStamped``.
 
     Attributes
     ----------
@@ -132,32 +122,24 @@ class SerializedTwist(Serialized):
     __slots__ = ('numbers',)
     KIND = TwistStamped
 
-    def __init__(self, data: bytes) -> None:
-        """Read the bytes; raises struct.error when they are cut short."""
-        self.serialized = data
-        self.stamp_ns, _, at = _header(data)
-        self.numbers: tuple[float, ...] = _TWIST.unpack_from(data, aligned(at, 8))
+    def _read(self, at: int) -> None:
+        self.numbers: tuple[float, ...] = _TWIST.unpack_from(self.serialized, aligned(at, 8))
 
 
 class SerializedImu(Serialized):
-    """Stamp and measurements of a serialized ``Imu``.
+    """A serialized ``Imu``.
 
     Attributes
     ----------
-    rate : tuple of float
-        Angular velocity [rad/s].
-    force : tuple of float
-        Linear acceleration [m/s^2].
+    rate, force : tuple of float
+        Angular velocity [rad/s] and linear acceleration [m/s^2].
     """
 
     __slots__ = ('force', 'rate')
     KIND = Imu
 
-    def __init__(self, data: bytes) -> None:
-        """Read the bytes; raises struct.error when they are cut short."""
-        self.serialized = data
-        self.stamp_ns, _, at = _header(data)
-        numbers = _IMU.unpack_from(data, aligned(at, 8))
+    def _read(self, at: int) -> None:
+        numbers = _IMU.unpack_from(self.serialized, aligned(at, 8))
         self.rate, self.force = numbers[:3], numbers[3:]
 
 
@@ -166,11 +148,6 @@ class SerializedOdometry(Serialized):
 
     __slots__ = ()
     KIND = Odometry
-
-    def __init__(self, data: bytes) -> None:
-        """Read the stamp; raises struct.error when the bytes are cut short."""
-        self.serialized = data
-        self.stamp_ns = _header(data)[0]
 
 
 _READERS: dict[type, Callable[[bytes], Any]] = {
@@ -213,14 +190,6 @@ def serialized_reader(kind: type, *, as_message: bool = False) -> Callable[[byte
 def aligned(at: int, size: int) -> int:
     """Place of the next primitive of a size of 4 or 8 bytes, at or behind a place."""
     return at + (BODY - at) % size
-
-
-def _header(data: bytes) -> tuple[int, str, int]:
-    """Stamp [ns] and frame of the header, and where what follows it begins."""
-    seconds, rest, length = _HEADER.unpack_from(data, BODY)
-    begin = BODY + _HEADER.size
-    end = begin + length
-    return stamp_in_ns(seconds, rest), data[begin:end - 1].decode() if length else '', end
 
 
 _KEY = 16
@@ -274,15 +243,21 @@ def _doubles(data: bytes, at: int) -> tuple[int, int]:
     return at, end
 
 
-_STAMP, _COUNT = struct.Struct('<iI'), struct.Struct('<I')
+class RefilledMessage:
+    """Bytes of a message that is laid out once, in the order of its definition, and refilled.
 
+    Parameters
+    ----------
+    *texts : str
+        Texts that follow the stamp, the frame of the header first.
+    """
 
-class SerializedDraft:
-    """Bytes of a message under construction, in the order of its definition."""
-
-    def __init__(self) -> None:
-        """Begin with the encoding and a stamp of zero."""
+    def __init__(self, *texts: str) -> None:
+        """Begin with the encoding, a stamp of zero and the texts."""
         self.data = bytearray(CDR_LITTLE_ENDIAN + bytes(BODY - 2 + _STAMP.size))
+        self._places: list[tuple[str, slice]] = []
+        for value in texts:
+            self.text(value)
 
     def text(self, value: str) -> None:
         """Append a text."""
@@ -295,45 +270,36 @@ class SerializedDraft:
         self._align(4)
         self.data += _COUNT.pack(number)
 
-    def doubles(self, number: int) -> slice:
-        """Append zeros; returns where they are."""
+    def constant(self, *numbers: float) -> None:
+        """Append numbers that stay."""
         self._align(8)
-        begin = len(self.data)
-        self.data += bytes(8 * number)
-        return slice(begin, begin + 8 * number)
+        self.data += struct.pack(f'<{len(numbers)}d', *numbers)
+
+    def refilled(self, **sizes: int) -> None:
+        """Append runs of numbers that are refilled, by the names that errors give them."""
+        for name, size in sizes.items():
+            self._align(8)
+            self._places.append((name, slice(len(self.data), len(self.data) + 8 * size)))
+            self.data += bytes(8 * size)
 
     def _align(self, size: int) -> None:
         self.data += bytes(aligned(len(self.data), size) - len(self.data))
 
-
-class RefilledMessage:
-    """Bytes of a message of which the stamp and some runs of numbers are refilled.
-
-    Parameters
-    ----------
-    draft : SerializedDraft
-        The whole message.
-    places : sequence of slice
-        Where the runs of numbers are.
-    """
-
-    def __init__(self, draft: SerializedDraft, places: Sequence[slice]) -> None:
-        """Keep the bytes."""
-        self._data, self._places = draft.data, tuple(places)
-
-    def filled(self, time_ns: int, runs: Iterable[bytes]) -> bytes:
-        """Return the message with a stamp [ns] and the bytes of its runs of doubles.
+    def filled(self, time_ns: int, *runs: Array) -> bytes:
+        """Return the message with a stamp [ns] and an array for each run, of any shape.
 
         Raises
         ------
+        DataError
+            If a number is not finite: nothing of that kind leaves a node.
         ValueError
             If a run has another length than its place, or there are more or fewer runs.
         """
-        data = self._data
+        data = self.data
         _STAMP.pack_into(data, BODY, *divmod(time_ns, NS))
-        for place, run in zip(self._places, runs, strict=True):
-            if len(run) != place.stop - place.start:
-                raise ValueError(f'{len(run) // 8} numbers for '
+        for (name, place), run in zip(self._places, runs, strict=True):
+            if 8 * run.size != place.stop - place.start:
+                raise ValueError(f'{run.size} numbers of {name} for '
                                  f'{(place.stop - place.start) // 8} places')
-            data[place] = run
+            data[place] = checked(run.reshape(-1), name).tobytes()
         return bytes(data)

@@ -10,12 +10,14 @@ in :mod:`~dmp_cpg_ros.nodes.messages.robot_state`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from dmp_cpg_ros import layouts
 from dmp_cpg_ros.core.balance.body_command import MODES, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
@@ -26,39 +28,23 @@ from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import FRAMES, PushForce
-from dmp_cpg_ros.layouts import (
-    CORRECTION_ROWS,
-    GAIN_ROWS,
-    MODE_ROWS,
-    MOVEMENT_ROWS,
-    OSCILLATOR_ROWS,
-    POSTURE_ROWS,
-    SHIFT_ROWS,
-    canonical_rows,
-    command_rows,
-    gait_rows,
-    read_command_rows,
-    read_gait_rows,
-)
 from dmp_cpg_ros.nodes.messages.cdr import (
+    FIELDS,
     RefilledMessage,
-    SerializedDraft,
     SerializedJointState,
     SerializedTwist,
 )
-from dmp_cpg_ros.nodes.messages.joint_states import FIELDS, JointStateReader, JointStateWriter
+from dmp_cpg_ros.nodes.messages.joint_states import JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.robot_state import BASE_FRAME
-from dmp_cpg_ros.nodes.messages.values import (
-    Array,
-    checked,
-    checked_numbers,
-    header_ns,
-)
+from dmp_cpg_ros.nodes.messages.values import Array, checked_numbers, header_ns
 
-_OSCILLATORS, _GAITS = slice(0, len(OSCILLATOR_ROWS)), slice(len(OSCILLATOR_ROWS), None)
+AnyJointState: TypeAlias = JointState | SerializedJointState
+
+_OSCILLATORS = slice(0, len(layouts.OSCILLATOR_ROWS))
+_GAITS = slice(_OSCILLATORS.stop, None)
 _JOINTS = slice(0, len(JOINT_NAMES))
-_FEET = slice(_JOINTS.stop, _JOINTS.stop + len(SHIFT_ROWS))
-_BASE = slice(_FEET.stop, _FEET.stop + len(CORRECTION_ROWS))
+_FEET = slice(_JOINTS.stop, _JOINTS.stop + len(layouts.SHIFT_ROWS))
+_BASE = slice(_FEET.stop, _FEET.stop + len(layouts.CORRECTION_ROWS))
 _COMMAND = slice(_BASE.stop, None)
 
 
@@ -73,12 +59,10 @@ def read_twist(message: Twist) -> tuple[float, float, float]:
 def read_push_force(message: WrenchStamped) -> PushForce:
     """Force of a push with its time and frame; raises DataError."""
     force, torque = message.wrench.force, message.wrench.torque
-    numbers = checked_numbers((force.x, force.y, force.z), 'force of the push')
+    x, y, z = checked_numbers((force.x, force.y, force.z), 'force of the push')
     if (torque.x, torque.y, torque.z) != (0.0, 0.0, 0.0):
         raise DataError('push: only a force can act, the torque must be zero')
-    return PushForce(
-        header_ns(message), (numbers[0], numbers[1], numbers[2]),
-        message.header.frame_id or FRAMES[0])
+    return PushForce(header_ns(message), (x, y, z), message.header.frame_id or FRAMES[0])
 
 
 class ReferenceWriter:
@@ -86,17 +70,14 @@ class ReferenceWriter:
 
     def __init__(self) -> None:
         """Lay the message out."""
-        draft = SerializedDraft()
-        draft.text(BASE_FRAME)
-        self._message = RefilledMessage(draft, [draft.doubles(6)])
+        self._message = RefilledMessage(BASE_FRAME)
+        self._message.refilled(reference=6)
         self._numbers = np.zeros(6)
 
     def fill(self, time_ns: int, r: Array) -> SerializedTwist:
         """Refill with r = (v_x, v_y, γ), ndarray (3,); raises DataError when it is not finite."""
-        checked(r, 'reference')
-        numbers = self._numbers
-        numbers[:2], numbers[5] = r[:2], r[2]
-        return SerializedTwist(self._message.filled(time_ns, [numbers.tobytes()]))
+        self._numbers[:2], self._numbers[5] = r[:2], r[2]
+        return SerializedTwist(self._message.filled(time_ns, self._numbers))
 
 
 def read_reference(message: TwistStamped | SerializedTwist) -> Array:
@@ -118,9 +99,9 @@ class CanonicalStateWriter:
 
     def __init__(self, gaits: Sequence[str]) -> None:
         """Lay the message out."""
-        self._gaits, rows = tuple(gaits), canonical_rows(gaits)
+        self._gaits, rows = tuple(gaits), layouts.canonical_rows(gaits)
         self._writer = JointStateWriter(rows, FIELDS[:2])
-        self._position, self._velocity = (np.zeros(len(rows)) for _ in range(2))
+        self._position, self._velocity = np.zeros((2, len(rows)))
 
     def fill(self, time_ns: int, x: Array, x_dot: Array, gait: GaitInForce,
              cadence_rate: float = 0.0) -> SerializedJointState:
@@ -144,7 +125,7 @@ class CanonicalStateWriter:
         """
         self._position[_OSCILLATORS] = x.reshape(-1)
         self._velocity[_OSCILLATORS] = x_dot.reshape(-1)
-        self._position[_GAITS], self._velocity[_GAITS] = gait_rows(
+        self._position[_GAITS], self._velocity[_GAITS] = layouts.gait_rows(
             shares_of(gait), cadence_rate, self._gaits)
         return self._writer.fill(time_ns, self._position, self._velocity)
 
@@ -160,12 +141,12 @@ class CanonicalStateReader:
 
     def __init__(self, gaits: KnownGaits) -> None:
         """Prepare the order."""
-        rows = canonical_rows(gaits.gaits)
+        rows = layouts.canonical_rows(gaits.gaits)
         self._gaits, self._names = gaits, rows[_GAITS]
         self._reader = JointStateReader(rows, FIELDS[:2])
         self._last: tuple[bytes, GaitInForce] | None = None
 
-    def read(self, message: JointState | SerializedJointState) -> tuple[Array, Array, GaitInForce]:
+    def read(self, message: AnyJointState) -> tuple[Array, Array, GaitInForce]:
         """States x and rates ẋ [1/s], ndarrays (4, 2), and the gait in force, the same object
         while it stays; raises DataError.
         """
@@ -173,10 +154,14 @@ class CanonicalStateReader:
         shares, rates = position[_GAITS], velocity[_GAITS]
         content = shares.tobytes() + rates.tobytes()
         if self._last is None or content != self._last[0]:
-            given = read_gait_rows(self._names, shares.tolist(), rates.tolist())
+            given = layouts.read_gait_rows(self._names, shares.tolist(), rates.tolist())
             self._last = content, self._gaits.in_force(given)
         x, x_dot = (values[_OSCILLATORS].reshape(len(LEGS), 2) for values in (position, velocity))
         return x, x_dot, self._last[1]
+
+
+def _joints_of(leg: str) -> list[str]:
+    return [f'{leg}_{joint}' for joint in JOINTS_OF_LEG]
 
 
 class JointTargetsWriter:
@@ -184,7 +169,7 @@ class JointTargetsWriter:
 
     def __init__(self, leg: str) -> None:
         """Lay the message of a leg out."""
-        self._writer = JointStateWriter([f'{leg}_{joint}' for joint in JOINTS_OF_LEG], FIELDS)
+        self._writer = JointStateWriter(_joints_of(leg))
 
     def fill(self, time_ns: int, targets: JointTargets) -> SerializedJointState:
         """Refill with the targets of the leg's joints; raises DataError."""
@@ -196,11 +181,9 @@ class JointTargetsReader:
 
     def __init__(self) -> None:
         """Prepare the order of the joints of every leg."""
-        self._readers = {
-            leg: JointStateReader([f'{leg}_{joint}' for joint in JOINTS_OF_LEG], FIELDS)
-            for leg in LEGS}
+        self._readers = {leg: JointStateReader(_joints_of(leg)) for leg in LEGS}
 
-    def read(self, message: JointState | SerializedJointState) -> tuple[str, JointTargets]:
+    def read(self, message: AnyJointState) -> tuple[str, JointTargets]:
         """Name of the leg and its targets; raises DataError, also for names of no leg."""
         names = message.name
         leg = names[0].partition('_')[0] if names else ''
@@ -217,8 +200,8 @@ class PostureFeedbackWriter:
 
     def __init__(self) -> None:
         """Lay the message out."""
-        self._writer = JointStateWriter(POSTURE_ROWS, FIELDS)
-        self._position, self._velocity, self._effort = np.zeros((len(FIELDS), len(POSTURE_ROWS)))
+        self._writer = JointStateWriter(layouts.POSTURE_ROWS)
+        self._position, self._velocity, self._effort = np.zeros((3, len(layouts.POSTURE_ROWS)))
 
     def fill(self, time_ns: int, feedback: PostureFeedback) -> SerializedJointState:
         """Refill with a feedback; raises DataError when it is not finite."""
@@ -228,7 +211,7 @@ class PostureFeedbackWriter:
         self._velocity[_BASE] = feedback.correction
         self._effort[_JOINTS] = feedback.torque
         self._effort[_FEET].reshape(len(LEGS), 3)[:, 2] = feedback.foot_force
-        self._position[_COMMAND], self._velocity[_COMMAND] = command_rows(feedback.command)
+        self._position[_COMMAND], self._velocity[_COMMAND] = layouts.command_rows(feedback.command)
         return self._writer.fill(time_ns, self._position, self._velocity, self._effort)
 
 
@@ -237,9 +220,9 @@ class PostureFeedbackReader:
 
     def __init__(self) -> None:
         """Prepare the order."""
-        self._reader, self._command = JointStateReader(POSTURE_ROWS, FIELDS), CommandReader()
+        self._reader, self._command = JointStateReader(layouts.POSTURE_ROWS), CommandReader()
 
-    def read(self, message: JointState | SerializedJointState) -> PostureFeedback:
+    def read(self, message: AnyJointState) -> PostureFeedback:
         """Read the feedback; raises DataError."""
         position, velocity, effort = self._reader.read(message)
         return PostureFeedback(
@@ -254,10 +237,10 @@ class CommandReader:
 
     def __init__(self) -> None:
         """Prepare the order."""
-        self._reader = JointStateReader((*MODE_ROWS, *MOVEMENT_ROWS), FIELDS[:2])
+        self._reader = JointStateReader((*layouts.MODE_ROWS, *layouts.MOVEMENT_ROWS), FIELDS[:2])
         self._last: tuple[bytes, BodyCommand] | None = None
 
-    def read(self, message: JointState | SerializedJointState) -> BodyCommand:
+    def read(self, message: AnyJointState) -> BodyCommand:
         """Read the command only; raises DataError."""
         return self.of(*self._reader.read(message))
 
@@ -265,7 +248,7 @@ class CommandReader:
         """Command of its rows, the same object while they stay; raises DataError."""
         content = position.tobytes() + velocity.tobytes()
         if self._last is None or content != self._last[0]:
-            self._last = content, read_command_rows(position.tolist(), velocity.tolist())
+            self._last = content, layouts.read_command_rows(position.tolist(), velocity.tolist())
         return self._last[1]
 
 
@@ -274,7 +257,7 @@ class InhibitionGainsWriter:
 
     def __init__(self) -> None:
         """Lay the message out."""
-        self._writer = JointStateWriter(GAIN_ROWS, FIELDS[:1])
+        self._writer = JointStateWriter(layouts.GAIN_ROWS, FIELDS[:1])
 
     def fill(self, time_ns: int, inhibition: Inhibition) -> SerializedJointState:
         """Refill; raises DataError when a number is not finite."""
@@ -293,9 +276,9 @@ class InhibitionGainsReader:
 
     def __init__(self) -> None:
         """Prepare the order."""
-        self._reader = JointStateReader(GAIN_ROWS, FIELDS[:1])
+        self._reader = JointStateReader(layouts.GAIN_ROWS, FIELDS[:1])
 
-    def read(self, message: JointState | SerializedJointState) -> Inhibition:
+    def read(self, message: AnyJointState) -> Inhibition:
         """Inhibition that is announced; raises DataError for numbers that no parameters allow."""
         (values,) = self._reader.read(message)
         gains, (radius, *flags) = values[:len(LEGS)], values[len(LEGS):].tolist()

@@ -16,6 +16,7 @@ far a late node works through old ticks in real time.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,15 +32,7 @@ from std_srvs.srv import SetBool, Trigger
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE, GROUND_TRUTH
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION, REFERENCE
-from dmp_cpg_ros.suite_table import (
-    CLOCK_TOPIC,
-    DIAGNOSTICS_TOPIC,
-    KINDS,
-    LEG,
-    POSTURE,
-    RECORDER,
-    ROBOT,
-)
+from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, RECORDER, ROBOT
 
 PUBLISHER_DEPTH = 2000
 """Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the
@@ -53,6 +46,9 @@ RECORDER_DEPTH = 8000
 
 GATE_OWNER = ROBOT
 """The node that holds the gate; its private topics bear its name."""
+
+FEELING = (CANONICAL, LEG, INHIBITION, POSTURE)
+"""Kinds of nodes that can read the feet."""
 
 
 def _qos(depth: int, *, latched: bool = False) -> QoSProfile:
@@ -83,8 +79,6 @@ class Interface:
         Of both: those that write or read it with some parameters only.
     latched : bool
         Whether a late reader gets the last message (transient local, depth 1).
-    service : bool
-        Whether it is a service.
     recorded : bool
         Whether the recorder takes it: not what only keeps the pace of a run.
     """
@@ -95,22 +89,25 @@ class Interface:
     publishers: tuple[str, ...]
     subscribers: tuple[str, ...]
     latched: bool = False
-    service: bool = False
     sometimes: tuple[str, ...] = ()
     recorded: bool = True
     other_type: str = ''
 
     @property
+    def service(self) -> bool:
+        """Whether it is a service."""
+        return hasattr(self.type, 'Request')
+
+    @property
     def publisher_qos(self) -> QoSProfile:
         """Profile that publishers offer."""
-        return _qos(1, latched=True) if self.latched else _qos(PUBLISHER_DEPTH)
+        return _qos(1 if self.latched else PUBLISHER_DEPTH, latched=self.latched)
 
     @property
     def reader_qos(self) -> QoSProfile:
         """Profile with which the suite's nodes read; deep enough for all of its publishers."""
-        if self.latched:
-            return _qos(1, latched=True)
-        return _qos(READER_DEPTH * max(1, expected_count(self.publishers)))
+        depth = READER_DEPTH * max(1, expected_count(self.publishers))
+        return _qos(1 if self.latched else depth, latched=self.latched)
 
     @property
     def recorder_qos(self) -> QoSProfile:
@@ -124,7 +121,7 @@ class Interface:
         return f'{package}/{kind}/{self.type.__name__}'
 
 
-def expected_count(kinds: tuple[str, ...] | list[str]) -> int:
+def expected_count(kinds: Sequence[str]) -> int:
     """Number of nodes that some kinds of nodes stand for."""
     return sum(len(KINDS[kind].instances) for kind in kinds if kind in KINDS)
 
@@ -141,26 +138,22 @@ TOPICS: tuple[Interface, ...] = (
               (CANONICAL,), (LEG, INHIBITION, POSTURE)),
     Interface('posture_feedback', JointState,
               'balance: torques, measured angles, shift, drift and forces of the feet; '
-              "the body's mode and the phase of its movement",
-              (POSTURE,), (LEG, INHIBITION)),
+              "the body's mode and the phase of its movement", (POSTURE,), (LEG, INHIBITION)),
     Interface('joint_targets', JointState, 'targets of the three joints of one leg',
               (LEG,), (ROBOT,)),
     Interface('joint_states', JointState, 'measured joints; the tick of the suite',
               (ROBOT,), (REFERENCE, LEG, POSTURE), sometimes=(LEG,)),
-    Interface('votes', JointState,
-              'votes for a stop: names = voter/leg, effort = weights',
+    Interface('votes', JointState, 'votes for a stop: names = voter/leg, effort = weights',
               ('user',), (INHIBITION,), sometimes=(INHIBITION,)),
     Interface('push', WrenchStamped,
               'force on the base from its stamp on, for 0.1 s unless the next one comes before; '
-              'frame base_footprint (along the heading) or odom',
-              ('user',), (ROBOT,)),
+              'frame base_footprint (along the heading) or odom', ('user',), (ROBOT,)),
     Interface('imu', Imu, 'turn rate and specific force in base_link; no orientation',
               (ROBOT,), (POSTURE, INHIBITION), sometimes=(POSTURE, INHIBITION)),
     Interface('odom', Odometry, "true pose and twist of base_link in odom, the simulator's",
               (ROBOT,), (POSTURE,), sometimes=(POSTURE,)),
     Interface('foot_contacts', JointState, 'effort = normal force of each foot',
-              (ROBOT,), (CANONICAL, LEG, INHIBITION, POSTURE),
-              sometimes=(CANONICAL, LEG, INHIBITION, POSTURE)),
+              (ROBOT,), FEELING, sometimes=FEELING),
     Interface('joint_work', JointState,
               'position = positive work of each joint since time 0 [J], effort = largest torque '
               'since the last message [N m], over every physics step; at every tenth tick',
@@ -168,7 +161,7 @@ TOPICS: tuple[Interface, ...] = (
     Interface('estimated_odom', Odometry,
               "estimated pose and twist of base_link, at the parameter's rate",
               (POSTURE,), (), sometimes=(POSTURE,)),
-    Interface(CLOCK_TOPIC, Clock, 'the clock of the robot', (ROBOT,), ()),
+    Interface('/clock', Clock, 'the clock of the robot', (ROBOT,), ()),
     Interface('inhibition_state', DiagnosticArray,
               'stop and start for people: state word, gains, times, when they change',
               (INHIBITION,), ('user',), latched=True),
@@ -178,12 +171,18 @@ TOPICS: tuple[Interface, ...] = (
     Interface('body_mode', String,
               'standing, lying, moving between the two, or fallen, when it changes',
               (POSTURE,), (ROBOT,), latched=True),
-    Interface(DIAGNOSTICS_TOPIC, DiagnosticArray, 'health of every node', tuple(KINDS), ()),
+    Interface('/diagnostics', DiagnosticArray, 'health of every node', tuple(KINDS), ()),
     Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds',
               (ROBOT,), ('user',), latched=True, sometimes=(ROBOT,), recorded=False),
     Interface(f'{GATE_OWNER}/advance_until', Clock,
               'stamp up to which the gate lets ticks pass', ('user',), (ROBOT,),
               sometimes=(ROBOT,), recorded=False),
+    Interface('~/commands_taken', JointState,
+              'how many messages on cmd_vel, push and votes (names) the node has taken (position)',
+              (REFERENCE, INHIBITION, ROBOT), ('user',), latched=True, recorded=False),
+    Interface('~/recorded', JointState,
+              'how many messages (position) of each topic (names) are in the bag, at each flush',
+              (RECORDER,), ('user',), latched=True, recorded=False),
 )
 """Topics of the suite."""
 
@@ -192,21 +191,13 @@ RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 
 SERVICES: tuple[Interface, ...] = (
     Interface('inhibit', SetBool, 'true stops the gait, false resumes it',
-              (INHIBITION,), ('user',), service=True),
-    Interface('stand_up', Trigger, 'stand up from lying or lowering',
-              (POSTURE,), ('user',), service=True),
+              (INHIBITION,), ('user',)),
+    Interface('stand_up', Trigger, 'stand up from lying or lowering', (POSTURE,), ('user',)),
     Interface('lie_down', Trigger, 'stop the gait and lie down on the belly',
-              (POSTURE,), ('user',), service=True),
-    Interface('recover', Trigger, 'after a fall: roll over and stand up',
-              (POSTURE,), ('user',), service=True),
-    Interface('~/ready', Trigger,
-              'whether the node is active and connected with its neighbours',
-              tuple(KINDS), ('user',), service=True),
-    Interface('~/commands_taken', Trigger,
-              'how many messages on cmd_vel, push and votes the node has taken',
-              (REFERENCE, INHIBITION, ROBOT), ('user',), service=True),
-    Interface('~/recorded', Trigger, 'how many messages of each topic are in the bag, as JSON',
-              (RECORDER,), ('user',), service=True),
+              (POSTURE,), ('user',)),
+    Interface('recover', Trigger, 'after a fall: roll over and stand up', (POSTURE,), ('user',)),
+    Interface('~/ready', Trigger, 'whether the node is active and connected with its neighbours',
+              tuple(KINDS), ('user',)),
 )
 """Services of the suite."""
 
@@ -224,11 +215,10 @@ def interface(name: str) -> Interface:
     ParameterError
         If there is none of that name; the valid names are listed.
     """
-    try:
-        return INTERFACES[name]
-    except KeyError:
+    if name not in INTERFACES:
         raise ParameterError(
-            f"there is no interface '{name}'; valid are {', '.join(INTERFACES)}") from None
+            f"there is no interface '{name}'; valid are {', '.join(INTERFACES)}")
+    return INTERFACES[name]
 
 
 def published_by(kind: str) -> tuple[Interface, ...]:
@@ -238,9 +228,8 @@ def published_by(kind: str) -> tuple[Interface, ...]:
 
 def read_by(kind: str) -> tuple[Interface, ...]:
     """Topics that a kind of node reads."""
-    if kind == RECORDER:
-        return RECORDED
-    return tuple(topic for topic in TOPICS if kind in topic.subscribers)
+    return RECORDED if kind == RECORDER else tuple(
+        topic for topic in TOPICS if kind in topic.subscribers)
 
 
 def served_by(kind: str) -> tuple[Interface, ...]:

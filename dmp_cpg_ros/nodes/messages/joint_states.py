@@ -14,47 +14,8 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.nodes.messages.cdr import RefilledMessage, SerializedDraft, SerializedJointState
+from dmp_cpg_ros.nodes.messages.cdr import FIELDS, RefilledMessage, SerializedJointState
 from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed
-
-FIELDS = ('position', 'velocity', 'effort')
-"""The arrays of a ``JointState``."""
-
-
-class NameOrder:
-    """Puts the entries of messages into our order, by name.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names in our order; messages may hold more.
-    """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        """Remember the order; the last list of names that was seen is cached."""
-        self.names = list(names)
-        self._seen: list[str] = list(names)
-        self._index: NDArray[np.intp] | None = None
-
-    def index(self, names: list[str]) -> NDArray[np.intp] | None:
-        """Where our entries are in a message with these names; None when its order is ours.
-
-        Raises
-        ------
-        DataError
-            If a name is missing or doubled.
-        """
-        if names == self._seen:
-            return self._index
-        places = {name: place for place, name in enumerate(names)}
-        missing = [name for name in self.names if name not in places]
-        if missing or len(places) != len(names):
-            problem = f"lack {', '.join(missing)}" if missing else 'are not unique'
-            raise DataError(f"names {names} {problem}; needed are {', '.join(self.names)}")
-        self._index = None if names == self.names else np.array(
-            [places[name] for name in self.names], dtype=np.intp)
-        self._seen = list(names)
-        return self._index
 
 
 class JointStateReader:
@@ -63,7 +24,7 @@ class JointStateReader:
     Parameters
     ----------
     names : sequence of str
-        Names in our order.
+        Names in our order; messages may hold more.
     fields : sequence of str
         Which of ``position``, ``velocity``, ``effort`` are needed.
     strict : bool
@@ -71,16 +32,20 @@ class JointStateReader:
     """
 
     def __init__(
-        self, names: Sequence[str], fields: Sequence[str], *, strict: bool = True
+        self, names: Sequence[str], fields: Sequence[str] = FIELDS, *, strict: bool = True
     ) -> None:
-        """Remember what is needed."""
-        self._order, self._fields = NameOrder(names), tuple(fields)
-        self._strict = strict
+        """Remember what is needed; the order of the last list of names that was seen is cached."""
+        self._names, self._fields, self._strict = list(names), tuple(fields), strict
+        self._seen: list[str] = list(names)
+        self._index: NDArray[np.intp] | None = None
 
     def read(self, message: JointState | SerializedJointState) -> list[Array]:
         """Arrays (n,) of the needed fields in our order; raises DataError."""
         names = message.name
-        index, size = self._order.index(names), len(names)
+        size = len(names)
+        if names != self._seen:
+            self._index, self._seen = self._order_of(names), list(names)
+        index = self._index
         if index is None and self._strict and isinstance(message, SerializedJointState):
             found = [message.checked(field) for field in self._fields]
             if all(values.shape[0] == size for values in found):
@@ -90,10 +55,19 @@ class JointStateReader:
             values = np.frombuffer(getattr(message, field)) if size else np.empty(0)
             if values.shape[0] != size:
                 raise DataError(f'{field} has {values.shape[0]} entries for {size} names')
-            if index is not None:
-                values = values[index]
+            values = values if index is None else values[index]
             arrays.append(checked(values, field) if self._strict else sensed(values))
         return arrays
+
+    def _order_of(self, names: list[str]) -> NDArray[np.intp] | None:
+        """Where our entries are in a message with these names; None when its order is ours."""
+        places = {name: place for place, name in enumerate(names)}
+        missing = [name for name in self._names if name not in places]
+        if missing or len(places) != len(names):
+            problem = f"lack {', '.join(missing)}" if missing else 'are not unique'
+            raise DataError(f"names {names} {problem}; needed are {', '.join(self._names)}")
+        return None if names == self._names else np.array(
+            [places[name] for name in self._names], dtype=np.intp)
 
 
 class JointStateWriter:
@@ -109,12 +83,20 @@ class JointStateWriter:
         Frame of the header.
     """
 
-    def __init__(self, names: Sequence[str], fields: Sequence[str], frame: str = '') -> None:
+    def __init__(self, names: Sequence[str], fields: Sequence[str] = FIELDS, frame: str = ''
+                 ) -> None:
         """Lay the message out."""
-        self._names, self._fields = tuple(names), tuple(fields)
-        self._lay_out(frame)
+        self._message = RefilledMessage(frame)
+        self._message.count(len(names))
+        for name in names:
+            self._message.text(name)
+        for field in FIELDS:
+            self._message.count(len(names) if field in fields else 0)
+            if field in fields:
+                self._message.refilled(**{field: len(names)})
+        self._like = SerializedJointState(bytes(self._message.data))
 
-    def fill(self, time_ns: int, *values: Array, frame: str | None = None) -> SerializedJointState:
+    def fill(self, time_ns: int, *values: Array) -> SerializedJointState:
         """Refill the message.
 
         Parameters
@@ -123,34 +105,10 @@ class JointStateWriter:
             Stamp [ns].
         *values : ndarrays
             One per field, of any shape, entries in the order of the names.
-        frame : str, optional
-            Frame of the header from now on.
-
-        Returns
-        -------
-        SerializedJointState
 
         Raises
         ------
         DataError
-            If a number is not finite: nothing of that kind leaves a node.
+            If a number is not finite.
         """
-        if frame is not None and frame != self._frame:
-            self._lay_out(frame)
-        return self._like.refilled(self._message.filled(time_ns, [
-            checked(new.reshape(-1), field).tobytes()
-            for new, field in zip(values, self._fields, strict=True)]), time_ns)
-
-    def _lay_out(self, frame: str) -> None:
-        self._frame, draft, places = frame, SerializedDraft(), []
-        draft.text(frame)
-        draft.count(len(self._names))
-        for name in self._names:
-            draft.text(name)
-        for field in FIELDS:
-            number = len(self._names) if field in self._fields else 0
-            draft.count(number)
-            if number:
-                places.append(draft.doubles(number))
-        self._message = RefilledMessage(draft, places)
-        self._like = SerializedJointState(bytes(draft.data))
+        return self._like.refilled(self._message.filled(time_ns, *values), time_ns)

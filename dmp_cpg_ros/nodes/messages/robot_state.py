@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from nav_msgs.msg import Odometry
@@ -15,14 +14,8 @@ from sensor_msgs.msg import Imu, JointState
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
-from dmp_cpg_ros.nodes.messages.cdr import (
-    RefilledMessage,
-    SerializedDraft,
-    SerializedImu,
-    SerializedJointState,
-    SerializedOdometry,
-)
-from dmp_cpg_ros.nodes.messages.joint_states import FIELDS, JointStateReader, JointStateWriter
+from dmp_cpg_ros.nodes.messages import cdr
+from dmp_cpg_ros.nodes.messages.joint_states import JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed, set_stamp
 
 BASE_FRAME, WORLD_FRAME = 'base_link', 'odom'
@@ -47,17 +40,22 @@ class RobotStateWriter:
         Only of every tenth state, and of a robot that knows its work.
     """
 
-    imu: SerializedImu
-    odom: SerializedOdometry
-    foot_contacts: SerializedJointState
-    joint_states: SerializedJointState
-    joint_work: SerializedJointState | None
+    imu: cdr.SerializedImu
+    odom: cdr.SerializedOdometry
+    foot_contacts: cdr.SerializedJointState
+    joint_states: cdr.SerializedJointState
+    joint_work: cdr.SerializedJointState | None
 
     def __init__(self) -> None:
         """Lay the messages out."""
-        self.clock = Clock()
-        self._imu, self._odom = _imu_message(), OdometryMessage()
-        self._joints = JointStateWriter(JOINT_NAMES, FIELDS, BASE_FRAME)
+        self.clock, self._odom, self._imu = Clock(), OdometryWriter(), cdr.RefilledMessage(
+            BASE_FRAME)
+        self._imu.constant(*[0.0] * 4, -1.0, *[0.0] * 8)  # no orientation: its covariance says so
+        self._imu.refilled(measured_rate_in_base=3)
+        self._imu.constant(*[0.0] * 9)
+        self._imu.refilled(acceleration_in_base=3)
+        self._imu.constant(*[0.0] * 9)
+        self._joints = JointStateWriter(JOINT_NAMES, frame=BASE_FRAME)
         self._feet = JointStateWriter(FOOT_NAMES, ('effort',), BASE_FRAME)
         self._work = JointStateWriter(JOINT_NAMES, ('position', 'effort'), BASE_FRAME)
         self._peak, self._fills = np.zeros(len(JOINT_NAMES)), 0
@@ -69,18 +67,14 @@ class RobotStateWriter:
             time_ns, state.joint_position, state.joint_velocity, state.joint_effort)
         self.foot_contacts = self._feet.fill(time_ns, state.foot_force)
         set_stamp(self.clock.clock, time_ns)
-        self.imu = SerializedImu(self._imu.filled(time_ns, (
-            checked(state.measured_rate_in_base, 'measured_rate_in_base').tobytes(),
-            checked(state.acceleration_in_base, 'acceleration_in_base').tobytes())))
+        self.imu = cdr.SerializedImu(self._imu.filled(
+            time_ns, state.measured_rate_in_base, state.acceleration_in_base))
         self.odom = self._odom.fill(
-            time_ns,
-            checked(state.base_position_in_world, 'base_position_in_world'),
-            checked(state.base_quaternion, 'base_quaternion'),
-            checked(state.base_velocity_in_base, 'base_velocity_in_base'),
-            checked(state.base_rate_in_base, 'base_rate_in_base'))
+            time_ns, state.base_position_in_world, state.base_quaternion,
+            state.base_velocity_in_base, state.base_rate_in_base)
         self.joint_work = self._filled_work(state)
 
-    def _filled_work(self, state: RobotState) -> SerializedJointState | None:
+    def _filled_work(self, state: RobotState) -> cdr.SerializedJointState | None:
         if state.joint_work is None or state.joint_peak_effort is None:
             return None
         self._peak = np.maximum(self._peak, state.joint_peak_effort)
@@ -91,47 +85,31 @@ class RobotStateWriter:
         return self._work.fill(state.time_ns, state.joint_work, peak)
 
 
-def _imu_message() -> RefilledMessage:
-    """Lay an ``Imu`` out whose orientation is marked as unknown."""
-    draft = SerializedDraft()
-    draft.text(BASE_FRAME)
-    draft.doubles(4)
-    covariance = draft.doubles(9)
-    draft.data[covariance] = np.array((-1.0, *[0.0] * 8)).tobytes()
-    rate = draft.doubles(3)
-    draft.doubles(9)
-    force = draft.doubles(3)
-    draft.doubles(9)
-    return RefilledMessage(draft, [rate, force])
-
-
-class OdometryMessage:
-    """An ``Odometry`` of ``base_link`` in ``odom`` that is refilled."""
+class OdometryWriter:
+    """Writes an ``Odometry`` of ``base_link`` in ``odom``."""
 
     def __init__(self) -> None:
         """Lay the message out."""
-        draft = SerializedDraft()
-        draft.text(WORLD_FRAME)
-        draft.text(BASE_FRAME)
-        position, quaternion, _ = draft.doubles(3), draft.doubles(4), draft.doubles(36)
-        velocity, rate, self._covariance = draft.doubles(3), draft.doubles(3), draft.doubles(36)
-        self._message = RefilledMessage(
-            draft, [position, quaternion, velocity, rate, self._covariance])
-        self._no_covariance = bytes(8 * 36)
+        self._message = cdr.RefilledMessage(WORLD_FRAME, BASE_FRAME)
+        self._message.refilled(position=3, quaternion=4)
+        self._message.constant(*[0.0] * 36)
+        self._message.refilled(velocity=3, rate=3, covariance=36)
+        self._covariance = np.zeros(36)
 
     def fill(self, time_ns: int, position: Array, quaternion: Array, velocity: Array,
-             rate: Array, velocity_variance: Array | None = None) -> SerializedOdometry:
+             rate: Array, velocity_variance: Array | float = 0.0) -> cdr.SerializedOdometry:
         """Refill with position [m], quaternion x, y, z, w, velocity [m/s] and turn rate [rad/s] in
-        the base's frame, ndarrays of float64, and with the variances of the velocity [m²/s²].
+        the base's frame, and with the variances of the velocity [m²/s²].
         """
-        covariance = self._no_covariance
-        if velocity_variance is not None:
-            diagonal = np.zeros(36)
-            diagonal[:15:7] = velocity_variance
-            covariance = diagonal.tobytes()
-        return SerializedOdometry(self._message.filled(time_ns, (
-            position.tobytes(), quaternion.tobytes(), velocity.tobytes(), rate.tobytes(),
-            covariance)))
+        self._covariance[:15:7] = velocity_variance
+        return cdr.SerializedOdometry(self._message.filled(
+            time_ns, position, quaternion, velocity, rate, self._covariance))
+
+    def fill_estimate(self, estimate: BodyEstimate) -> cdr.SerializedOdometry:
+        """Refill with an estimate; of the covariances only the velocity's variances are known."""
+        return self.fill(
+            estimate.time_ns, estimate.position_in_world, estimate.quaternion,
+            estimate.velocity_in_base, estimate.rate_in_base, estimate.velocity_variance)
 
 
 class JointsReader:
@@ -139,39 +117,30 @@ class JointsReader:
 
     def __init__(self) -> None:
         """Prepare the order of the twelve joints; effort may be absent in others' messages."""
-        self._full = JointStateReader(JOINT_NAMES, FIELDS)
+        self._full = JointStateReader(JOINT_NAMES)
         self._without_effort = JointStateReader(JOINT_NAMES, ('position', 'velocity'))
 
-    def read(self, message: JointState | SerializedJointState) -> tuple[Array, Array, Array]:
+    def read(self, message: JointState | cdr.SerializedJointState) -> list[Array]:
         """Position [rad], velocity [rad/s] and effort [N m] (0 where absent), each (12,)."""
         if len(message.effort):
-            position, velocity, effort = self._full.read(message)
-            return position, velocity, effort
-        position, velocity = self._without_effort.read(message)
-        return position, velocity, np.zeros(len(JOINT_NAMES))
+            return self._full.read(message)
+        return [*self._without_effort.read(message), np.zeros(len(JOINT_NAMES))]
 
 
 class FootContactsReader:
-    """Reads ``foot_contacts``.
+    """Reads ``foot_contacts``; numbers that cannot be are NaN, and the caller judges them."""
 
-    Parameters
-    ----------
-    strict : bool
-        Whether forces that cannot be are refused; else they are NaN, and the caller judges them.
-    """
-
-    def __init__(self, *, strict: bool = True) -> None:
+    def __init__(self) -> None:
         """Prepare the order of the feet."""
-        self._reader = JointStateReader(FOOT_NAMES, ('effort',), strict=strict)
+        self._reader = JointStateReader(FOOT_NAMES, ('effort',), strict=False)
 
-    def read(self, message: JointState | SerializedJointState) -> Array:
+    def read(self, message: JointState | cdr.SerializedJointState) -> Array:
         """Normal forces, ndarray (4,) [N]."""
         return self._reader.read(message)[0]
 
 
-@dataclass(frozen=True)
-class BaseMotion:
-    """Motion of ``base_link``, as ``odom`` tells it.
+class BaseMotion(NamedTuple):
+    """Motion of ``base_link``, as ``odom`` tells it; in the order of :class:`RobotState`.
 
     Attributes
     ----------
@@ -192,59 +161,25 @@ class BaseMotion:
 def read_odom(message: Odometry) -> BaseMotion:
     """Read ``odom``; raises DataError, also for a quaternion that is no rotation."""
     pose, twist = message.pose.pose, message.twist.twist
-    return BaseMotion(_vector(pose.position, 'position'), _quaternion(pose.orientation),
-                      _vector(twist.linear, 'linear velocity'),
-                      _vector(twist.angular, 'angular velocity'))
+    q = pose.orientation
+    quaternion = np.array((q.x, q.y, q.z, q.w))
+    if not abs(quaternion.dot(quaternion) - 1.0) < 0.01:
+        raise DataError(f'quaternion {quaternion} must have length 1')
+    position, velocity, rate = (
+        checked(np.array((vector.x, vector.y, vector.z)), what) for vector, what in (
+            (pose.position, 'position'), (twist.linear, 'linear velocity'),
+            (twist.angular, 'angular velocity')))
+    return BaseMotion(position, quaternion, velocity, rate)
 
 
-def read_imu(message: Imu | SerializedImu) -> tuple[Array, Array]:
+def read_imu(message: Imu | cdr.SerializedImu) -> tuple[Array, Array]:
     """Turn rate (3,) [rad/s] and specific force (3,) [m/s^2].
 
     Numbers that cannot be are NaN: the estimator judges them together with silent sensors.
     """
-    if isinstance(message, SerializedImu):
+    if isinstance(message, cdr.SerializedImu):
         rate, force = message.rate, message.force
     else:
         of_rate, of_force = message.angular_velocity, message.linear_acceleration
         rate, force = (of_rate.x, of_rate.y, of_rate.z), (of_force.x, of_force.y, of_force.z)
     return sensed(np.array(rate)), sensed(np.array(force))
-
-
-class EstimatedOdometryWriter:
-    """Writes ``estimated_odom``."""
-
-    def __init__(self) -> None:
-        """Lay the message out."""
-        self._message = OdometryMessage()
-
-    def fill(self, estimate: BodyEstimate) -> SerializedOdometry:
-        """Refill with an estimate; of the covariances only the velocity's variances are known."""
-        return self._message.fill(
-            estimate.time_ns,
-            checked(estimate.position_in_world, 'position'),
-            checked(estimate.quaternion, 'quaternion'),
-            checked(estimate.velocity_in_base, 'velocity'),
-            checked(estimate.rate_in_base, 'rate'),
-            estimate.velocity_variance)
-
-
-def robot_state(time_ns: int, joints: tuple[Array, Array, Array], base: BaseMotion,
-                foot_force: Array, acceleration_in_base: Array | None = None,
-                gyro_in_base: Array | None = None) -> RobotState:
-    """Put a state together from what its messages told; acceleration zero where not given."""
-    return RobotState(
-        time_ns, joints[0], joints[1], joints[2], base.position_in_world,
-        base.quaternion, base.velocity_in_base, base.rate_in_base,
-        np.zeros(3) if acceleration_in_base is None else acceleration_in_base, foot_force,
-        gyro_in_base)
-
-
-def _vector(vector: Any, what: str) -> Array:
-    return checked(np.array((vector.x, vector.y, vector.z)), what)
-
-
-def _quaternion(q: Any) -> Array:
-    quaternion = np.array((q.x, q.y, q.z, q.w))
-    if not abs(quaternion.dot(quaternion) - 1.0) < 0.01:
-        raise DataError(f'quaternion {quaternion} must have length 1')
-    return quaternion

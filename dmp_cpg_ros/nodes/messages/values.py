@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
@@ -47,12 +48,6 @@ def stamped(read: Callable[[Any], Any]) -> Callable[[Any], tuple[int, Any]]:
     return lambda message: (header_ns(message), read(message))
 
 
-def frame_of(message: Any) -> str:
-    """Frame of a message's header."""
-    known: str | None = getattr(message, 'frame_id', None)
-    return str(message.header.frame_id) if known is None else known
-
-
 def set_stamp(stamp: Time, time_ns: int) -> None:
     """Write nanoseconds into a stamp."""
     stamp.sec, stamp.nanosec = divmod(time_ns, NS)
@@ -65,6 +60,16 @@ def text(value: Any) -> str:
     if isinstance(value, (float, np.floating)):
         return repr(float(value))
     return str(value)
+
+
+def status_message(name: str, time_ns: int, message: str, values: Mapping[str, Any], *,
+                   level: bytes = DiagnosticStatus.OK) -> DiagnosticArray:
+    """Status of a node at a time [ns]; numbers become text that reads back to the same float."""
+    array = DiagnosticArray(status=[DiagnosticStatus(
+        name=name, hardware_id='dmp_cpg_ros', level=level, message=message,
+        values=[KeyValue(key=key, value=text(value)) for key, value in values.items()])])
+    set_stamp(array.header.stamp, time_ns)
+    return array
 
 
 def checked(values: Array, what: str) -> Array:

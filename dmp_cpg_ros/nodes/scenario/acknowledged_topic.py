@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A topic whose sender asks its readers whether they have taken what it sent."""
+"""A topic whose readers tell how many of its messages they have taken."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.task import Future
-from std_srvs.srv import Trigger
+from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 
@@ -22,24 +21,24 @@ class AcknowledgedTopic:
     node : Node
         Who sends.
     name : str
-        Topic whose readers offer ``~/commands_taken`` for it.
+        Topic whose readers tell of it on ``~/commands_taken``.
     """
 
     def __init__(self, node: Node, name: str) -> None:
-        """Create the publisher, and a client for each reader."""
-        topic, self._name = interface(name), name
+        """Create the publisher, and a subscription for each reader."""
+        topic, taken, self._name = interface(name), interface('~/commands_taken'), name
         self._publisher = node.create_publisher(topic.type, topic.name, topic.publisher_qos)
-        self._readers = len(topic.subscribers)
-        self._clients = [
-            node.create_client(Trigger, f'{reader}/commands_taken') for reader in topic.subscribers
-        ]
-        self._sent = 0
+        self._sent, self._taken = 0, dict.fromkeys(topic.subscribers, 0.0)
+        self._then: Callable[[], None] | None = None
+        self._answers = [
+            node.create_subscription(taken.type, f'{reader}/commands_taken',
+                                     self._hearing(reader), taken.reader_qos)
+            for reader in topic.subscribers]
 
     def connected(self) -> bool:
         """Whether all readers are there."""
-        return bool(self._publisher.get_subscription_count() >= self._readers) and all(
-            client.service_is_ready() for client in self._clients
-        )
+        return bool(self._publisher.get_subscription_count() >= len(self._answers) and all(
+            answer.get_publisher_count() for answer in self._answers))
 
     def send(self, message: Any) -> None:
         """Publish."""
@@ -47,22 +46,19 @@ class AcknowledgedTopic:
         self._sent += 1
 
     def when_taken(self, then: Callable[[], None]) -> None:
-        """Call back when every reader has taken everything that was sent."""
-        self._ask(list(self._clients), then)
+        """Call back once, when every reader has taken everything that was sent."""
+        self._then = then
+        self._look()
 
-    def _ask(self, clients: list[Any], then: Callable[[], None]) -> None:
-        if not clients:
+    def _hearing(self, reader: str) -> Callable[[JointState], None]:
+        def hear(message: JointState) -> None:
+            counts = dict(zip(message.name, message.position, strict=True))
+            self._taken[reader] = counts.get(self._name, 0.0)
+            self._look()
+
+        return hear
+
+    def _look(self) -> None:
+        if self._then is not None and min(self._taken.values()) >= self._sent:
+            then, self._then = self._then, None
             then()
-            return
-
-        def answered(future: Future) -> None:
-            taken = _count(future.result().message, self._name)
-            self._ask(clients[1:] if taken >= self._sent else clients, then)
-
-        clients[0].call_async(Trigger.Request()).add_done_callback(answered)
-
-
-def _count(answer: str, topic: str) -> int:
-    """Messages on one topic from an answer such as ``cmd_vel 12, votes 3``."""
-    counts = dict(entry.rsplit(' ', 1) for entry in answer.split(', '))
-    return int(counts[topic])
