@@ -16,6 +16,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
+PACKAGE = 'dmp_cpg_ros'
+
 COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client')
 STUDIES = ('study_stops', 'benchmark_walking', 'study_recovery')
 """Executables that are no nodes; those that are stand in :mod:`dmp_cpg_ros.suite_table`."""
@@ -55,6 +57,8 @@ def run(name: str) -> int:
             print(f"dmp_cpg_ros: there is no '{name}'; {guess}valid are {', '.join(names)}",
                   file=sys.stderr)
             return BAD_INPUT
+        if _folder(name) == 'nodes':
+            return int(import_module(f'{PACKAGE}.nodes.framework.execution').run_kind(name))
         return int(import_module(_module(name)).main())
     except KeyboardInterrupt:
         return INTERRUPTED
@@ -67,9 +71,12 @@ def __getattr__(name: str) -> Callable[[], int]:
     return partial(run, name)
 
 
+def _folder(name: str) -> str:
+    return 'commands' if name in COMMANDS else 'studies' if name in STUDIES else 'nodes'
+
+
 def _module(name: str) -> str:
-    folder = 'commands' if name in COMMANDS else 'studies' if name in STUDIES else 'nodes'
-    return f'dmp_cpg_ros.{folder}.{name}'
+    return f'{PACKAGE}.{_folder(name)}.{name}'
 
 
 def _summary(name: str) -> str:

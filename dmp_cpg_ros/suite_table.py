@@ -65,7 +65,7 @@ class Kind:
 
     @property
     def module(self) -> str:
-        """Module whose ``main`` runs it."""
+        """Module of its class."""
         return f'dmp_cpg_ros.nodes.{self.name}'
 
     def has(self, parameter: str) -> bool:

@@ -32,9 +32,8 @@ from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, already_runn
 from dmp_cpg_ros.nodes.framework.execution import make_executor, prepare_middleware
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers
 from dmp_cpg_ros.nodes.messages.interfaces import interface
-from dmp_cpg_ros.nodes.scenario.lying_down import LyingDown
-from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
-from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, WALKING_NODES, instances
+from dmp_cpg_ros.nodes.scenario_player import LyingDown, ScenarioPlayer
+from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES, instances
 
 READY_WITHIN_S = 120.0
 """How long nodes may take to come up and find each other [s]."""
@@ -207,10 +206,10 @@ def _start(plan: RunPlan, group: ProcessGroup) -> None:
     files = ['--ros-args', '--params-file', str(plan.parameters), *plan.ros_arguments]
     if plan.composed:
         group.start('composed_suite', 'dmp_cpg_ros.commands.composed_suite', files)
-        group.start(RECORDER, KINDS[RECORDER].module, files)
+        group.start(RECORDER, 'dmp_cpg_ros', [RECORDER, *files])
         return
     for kind, name, _ in instances():
-        group.start(name, kind.module, [*files, '-r', f'__node:={name}'])
+        group.start(name, 'dmp_cpg_ros', [kind.name, *files, '-r', f'__node:={name}'])
 
 
 class _Watch:

@@ -4,21 +4,16 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rclpy.clock import Clock as RclpyClock
-from rclpy.clock import ClockType
-from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.nodes.framework.execution import run_node
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.framework.ticks import drain
 from dmp_cpg_ros.nodes.messages.interfaces import RECORDED, STAMPED_CMD_VEL, Interface
@@ -39,16 +34,16 @@ TICK_TOPIC = 'joint_states'
 class RecorderParameters(Parameters):
     """Parameters of the recorder."""
 
-    output: str = parameter('bag',
-        'folder of the recording; if it exists, the next free of bag_1, bag_2, ...')
-    storage: str = parameter('mcap',
-        'file format; only mcap stays readable when the recorder is killed',
-                             choices=STORAGES)
-    topics: tuple[str, ...] = parameter((ALL,), 'topics to record', choices=(
-        ALL, *(topic.name for topic in RECORDED)))
-    flush_period: float = parameter(0.25,
-        'time between flushes to disk; older messages survive when the recorder is killed',
-                                    unit='s', minimum=0.02, maximum=60.0)
+    output: str = parameter(
+        'bag', 'folder of the recording; if it exists, the next free of bag_1, bag_2, ...')
+    storage: str = parameter(
+        'mcap', 'file format; only mcap stays readable when the recorder is killed',
+        choices=STORAGES)
+    topics: tuple[str, ...] = parameter(
+        (ALL,), 'topics to record', choices=(ALL, *(topic.name for topic in RECORDED)))
+    flush_period: float = parameter(
+        0.25, 'time between flushes to disk; older messages survive when the recorder is killed',
+        unit='s', minimum=0.02, maximum=60.0)
     stamped_cmd_vel: bool = parameter(False, 'whether cmd_vel is TwistStamped')
 
 
@@ -74,21 +69,19 @@ class BagRecorder(SuiteNode):
                   if ALL in parameters.topics or topic.name in parameters.topics]
         stamped = [topic.name for topic in topics if _bears_robot_time(topic)]
         clocks = [name for name in stamped if name in CLOCK_TOPICS] or stamped
-        self._subscriptions_drained_at_end = [
-            self._record(self._offered(topic, parameters), topic.name in stamped,
-                         topic.name in clocks)
+        self._drained_at_end = [
+            self._record(STAMPED_CMD_VEL if parameters.stamped_cmd_vel and topic.name == 'cmd_vel'
+                         else topic, topic.name in stamped, topic.name in clocks)
             for topic in topics]
         self._recorded = self.publisher('~/recorded')
         self._started = time.monotonic()
         # The wall clock drives only how much a kill may cost.
-        steady = RclpyClock(clock_type=ClockType.STEADY_TIME)
-        self._flush_timer: Timer = self.create_timer(
-            parameters.flush_period, self._flush, clock=steady)
+        self._flush_timer = self.create_steady_timer(parameters.flush_period, self._flush)
 
     def deactivate(self) -> None:
         """Take what has arrived."""
         self.active = True
-        for subscription in self._subscriptions_drained_at_end:
+        for subscription in self._drained_at_end:
             drain(subscription)
         self.active = False
         self._bag.flush()
@@ -96,7 +89,7 @@ class BagRecorder(SuiteNode):
     def cleanup(self) -> None:
         """Complete the bag."""
         self.destroy_timer(self._flush_timer)
-        self._subscriptions_drained_at_end = []
+        self._drained_at_end = []
         self._bag.close()
         if self.context.ok():
             count = sum(self._bag.counts.values())
@@ -104,20 +97,15 @@ class BagRecorder(SuiteNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Messages per topic, messages on disk, seconds of wall time."""
-        values: dict[str, Any] = {
-            f'messages.{topic}': count for topic, count in self._bag.counts.items()}
-        values |= {'messages': sum(self._bag.counts.values()),
-                   'messages_on_disk': self._bag.flushed,
-                   'wall_s': time.monotonic() - self._started}
-        return values
+        counts = self._bag.counts
+        return {**{f'messages.{topic}': count for topic, count in counts.items()},
+                'messages': sum(counts.values()), 'messages_on_disk': self._bag.flushed,
+                'wall_s': time.monotonic() - self._started}
 
     def _flush(self) -> None:
         self._bag.flush()
         self._recorded.publish(JointState(
             name=list(self._bag.counts), position=list(map(float, self._bag.counts.values()))))
-
-    def _offered(self, topic: Interface, parameters: RecorderParameters) -> Interface:
-        return STAMPED_CMD_VEL if parameters.stamped_cmd_vel and topic.name == 'cmd_vel' else topic
 
     def _record(self, topic: Interface, stamped: bool, clock: bool) -> Any:
         """Subscribe; the writer needs the full name that only the subscription knows."""
@@ -142,12 +130,3 @@ def _bears_robot_time(topic: Interface) -> bool:
     """Whether the messages of a topic begin with a stamp that the suite itself sets."""
     begins = 'header' in topic.type.get_fields_and_field_types() or topic.type is Clock
     return begins and 'user' not in topic.publishers
-
-
-def main() -> int:
-    """Run the recorder; returns the exit status."""
-    return run_node(BagRecorder)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

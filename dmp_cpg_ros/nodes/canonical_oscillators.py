@@ -6,7 +6,6 @@ the region C.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from math import nan
 from typing import Any
@@ -23,9 +22,7 @@ from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, CertificateParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
-from dmp_cpg_ros.nodes.framework.execution import run_node
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
-from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateWriter,
@@ -34,14 +31,12 @@ from dmp_cpg_ros.nodes.messages.conversions import (
 )
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader
 from dmp_cpg_ros.nodes.messages.values import stamped
-from dmp_cpg_ros.suite_table import KINDS
 
 
 class CanonicalOscillators(SuiteNode):
     """Advances the four coupled oscillators with the robot's clock."""
 
     KIND = CANONICAL
-    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
     CHANGEABLE = JUDGED
     certified: Certified
 
@@ -125,12 +120,3 @@ class CanonicalOscillators(SuiteNode):
             'highest_speed': self._canonical.network(self._state.gait).highest_speed,
             'certificate': certificate_words(self.certified.certificate),
         }
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(CanonicalOscillators)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

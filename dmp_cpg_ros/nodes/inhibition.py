@@ -4,37 +4,42 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
+from dataclasses import replace
 from math import isfinite, nan
 from typing import Any
 
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
-from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
+from dmp_cpg_ros.core.inhibition.voters import VoteSensors
+from dmp_cpg_ros.core.inhibition.votes import VoteInbox
+from dmp_cpg_ros.core.inhibition.voting import Voting
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
+from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import INHIBITION, VOTE_SOURCES, TickParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
-from dmp_cpg_ros.nodes.framework.execution import run_node
-from dmp_cpg_ros.nodes.framework.gaits import gait_name
-from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
+from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.inputs.votes import NodeVotes
 from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
     CommandReader,
     InhibitionGainsWriter,
     read_reference,
+    read_votes,
 )
 from dmp_cpg_ros.nodes.messages.inhibition_state import inhibition_state
-from dmp_cpg_ros.suite_table import KINDS
+from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, read_imu
+from dmp_cpg_ros.nodes.messages.values import Array, stamped
 
 
 class InhibitionNode(SuiteNode):
@@ -43,7 +48,6 @@ class InhibitionNode(SuiteNode):
     """
 
     KIND = INHIBITION
-    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
     CHANGEABLE = (*JUDGED, *VOTE_SOURCES)
     certified: Certified
 
@@ -51,8 +55,10 @@ class InhibitionNode(SuiteNode):
         """Build the supervisor and its topics and service."""
         self.certified = Certified(self, self._acting_now)
         gaits = self.certified.gaits
+        self._inbox, self._weight = VoteInbox(), description_of(self).mass * GRAVITY
         self._build()
         self._network = self._running_gait.network(gaits.named(gait_name(self)))
+        self._votes = self._voting.initial_state(self._network)
         self._state = self._supervisor.initial_state()
         self._acting = self._supervisor.inhibition(self._state)
         self._x: Any = None
@@ -63,15 +69,19 @@ class InhibitionNode(SuiteNode):
         self._publisher = self.publisher('inhibition_state')
         self._gains_writer = InhibitionGainsWriter()
         self._gains_publisher = self.publisher('inhibition_gains')
-        self._votes = NodeVotes(self, self._network)
-        body = CommandReader()
+        body, sensors = CommandReader(), {}
+        if self._voting.voting.voting:
+            sensors = {'foot_contacts': stamped(FootContactsReader().read),
+                       'imu': stamped(read_imu)}
+            self.listen('votes', lambda message: self._inbox.accept(*read_votes(message)),
+                        command=True)
         mode = {'posture_feedback': lambda message: body.read(message).mode}
         self.match('canonical_state', {
             'canonical_state': CanonicalStateReader(gaits).read,
             'reference': read_reference,
-            **self._votes.readers,
+            **sensors,
             **(mode if self.lock_step else {}),
-        }, delayed={} if self.lock_step else mode, optional=self._votes.readers)
+        }, delayed={} if self.lock_step else mode, optional=sensors)
         self._gate = self.certified.commands()
         self.serve('inhibit', self._answer_inhibit)
 
@@ -86,12 +96,13 @@ class InhibitionNode(SuiteNode):
         self._build()
         self._network = self._running_gait.network(self._network.gait)
         self.certified.limit(self._gate)
-        self._votes.follow()
 
     def _build(self) -> None:
         of = self.parameters_of
         self._supervisor = GaitSupervisor(
             of(InhibitionParameters), of(VotingParameters), of(LegParameters).activity_rate)
+        self._voting = Voting(of(InhibitionParameters), of(VotingParameters),
+                              of(VoteSourceParameters), of(ReferenceParameters), self._weight)
         self._reference = ReferenceSystem(of(ReferenceParameters))
         self._running_gait = self.certified.running_gait()
 
@@ -102,10 +113,12 @@ class InhibitionNode(SuiteNode):
         self._network = network = self._running_gait.network(gait)
         before = self._state
         self._body_mode = values['posture_feedback'] or self._body_mode
-        tally = self._votes.count(stamp_ns, values, network, before.word)
+        self._votes = self._voting.step(
+            self._votes, stamp_ns, network, _vote_sensors(stamp_ns, values), self._x, self._r,
+            before.word in ('walking', 'free'), self._inbox.take())
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
-            tally, self._body_mode)
+            self._votes.tally, self._body_mode)
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
             self._predict()
@@ -178,12 +191,21 @@ class InhibitionNode(SuiteNode):
             canon, self._r, self._gate.at(self._state.time_ns),
             self.parameters_of(TickParameters).tick_ns * 1e-9, body_mode=self._body_mode)
         if self._state.voted:
-            self._bound = self._votes.bound(self._supervisor, self._network, self._state)
+            self._bound = self._bound_by_votes()
         elif self._state.requested:
             self._bound = self.certified.running_in(gait).time_to_rest(
                 self._network, self._x, self._r)
         else:
             self._bound = self.certified.certificate_in(gait).time_to_walking
+
+    def _bound_by_votes(self) -> float:
+        """Bound on the time from now to rest under the votes [s]."""
+        reference, p = self.parameters_of(ReferenceParameters), self._supervisor.parameters
+        gains = self._supervisor.inhibition(replace(self._state, armed=True)).gains
+        return vote_bound(
+            self._network, gains, p.region_radius, operating_range(self._network, p, reference),
+            reference.alpha_r, self._supervisor.activity_rate,
+            self.parameters_of(TickParameters).tick_ns * 1e-9)
 
     # What is told ------------------------------------------------------------------------------
 
@@ -193,34 +215,40 @@ class InhibitionNode(SuiteNode):
     def _news(self) -> tuple[Any, ...]:
         """What is told when it changes."""
         now = self._state
-        return (now.word, now.requested, now.armed, now.automatic, now.request_ns,
-                *self._votes.news(now))
+        return (now.word, now.requested, now.armed, now.automatic, now.request_ns, now.voted,
+                now.tally.causes, now.tally.weights.tobytes())
 
     def _publish_gains(self) -> None:
         self._gains_publisher.publish(self._gains_writer.fill(self._state.time_ns, self._acting))
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()
-        gains = zip(LEGS, acting.gains.tolist(), strict=True)
+        votes: dict[str, Any] = {}
+        if self._voting.voting.voting:
+            votes = {**_by_leg('vote', state.tally.weights), 'voted': state.voted,
+                     'asked': state.asked, 'cause': state.tally.cause}
         self._publisher.publish(inhibition_state(state.time_ns, state.word, {
             'requested': state.requested,
             'armed': state.armed,
             'automatic': state.automatic,
-            **{f'gain_{leg}': gain for leg, gain in gains},
+            **_by_leg('gain', acting.gains),
             'region_radius': acting.region_radius,
             'request_stamp': state.request_ns * 1e-9,
             'predicted_s': self._predicted,
             'bound_s': self._bound,
             'measured_s': state.measured_s,
             'grade': self._words(),
-            **self._votes.told(state),
+            **votes,
         }))
 
 
-def main() -> int:
-    """Run the node."""
-    return run_node(InhibitionNode)
+def _by_leg(what: str, numbers: Array) -> dict[str, float]:
+    return {f'{what}_{leg}': number for leg, number in zip(LEGS, numbers.tolist(), strict=True)}
 
 
-if __name__ == '__main__':
-    sys.exit(main())
+def _vote_sensors(stamp_ns: int, values: dict[str, Any]) -> VoteSensors:
+    """What sensors told at a tick; NaN where they are not read or have told nothing."""
+    nothing = np.full(3, np.nan)
+    contact_ns, load = values.get('foot_contacts') or (stamp_ns, np.full(len(LEGS), np.nan))
+    imu_ns, (rate, force) = values.get('imu') or (stamp_ns, (nothing, nothing))
+    return VoteSensors(contact_ns, imu_ns, load, rate, force)

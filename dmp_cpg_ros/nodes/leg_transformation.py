@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -15,9 +14,7 @@ from dmp_cpg_ros.core.modes.motion_library import Movements
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.core.suite_parameters import LegChoice
 from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.nodes.framework.execution import run_node
 from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
-from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
@@ -37,7 +34,6 @@ class LegTransformation(SuiteNode):
     """Turns a leg's oscillator state and the reference into targets of its joints."""
 
     KIND = LEG
-    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
     CHANGEABLE = ('gait',)
 
     @classmethod
@@ -83,12 +79,3 @@ class LegTransformation(SuiteNode):
             'body_mode': self._state.command.mode,
             'movement': self._state.command.movement or 'none',
         }
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(LegTransformation)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

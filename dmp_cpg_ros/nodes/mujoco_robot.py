@@ -7,34 +7,22 @@ In real time it keeps the wall clock's pace; in lock-step it waits for every tar
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping
 from typing import Any
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
-from rosgraph_msgs.msg import Clock as ClockMessage
+from rosgraph_msgs.msg import Clock
 
 from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
-from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
-from dmp_cpg_ros.core.suite_parameters import (
-    CANONICAL,
-    INHIBITION,
-    RobotFileParameters,
-    RobotParameters,
-    TickParameters,
-    chosen_world,
-)
-from dmp_cpg_ros.nodes.framework.execution import run_node
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers, RobotTiming
-from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters, NodeParameters
+from dmp_cpg_ros.nodes.framework.parameters import NodeParameters
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.conversions import (
     JointTargetsReader,
@@ -70,7 +58,9 @@ VOTING_TOPICS = ('imu', 'foot_contacts')
 """What the inhibition reads when sensors can vote."""
 
 STATE_TOPICS = ('/clock', 'imu', 'odom', 'foot_contacts', 'joint_states')
-"""What the robot publishes at every tick, the tick itself last."""
+"""What the robot publishes at every tick, the tick itself last: between nodes of one process what it
+leads to runs before its publication ends.
+"""
 
 RETREATS = {
     'stand': 'it takes up a stand',
@@ -84,27 +74,21 @@ class MujocoRobotNode(SuiteNode):
     """Publishes the robot's state at every control tick and moves its joints to their targets."""
 
     KIND = ROBOT
-    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
 
     def configure(self) -> None:
         """Stand the robot up and create its topics."""
-        self._options = self.parameters_of(RobotParameters)
-        self._lock_step = self.parameters_of(LockStepParameters).lock_step
-        self._tick_ns = self.parameters_of(TickParameters).tick_ns
+        self._options = self.parameters_of(core.RobotParameters)
+        self._tick_ns = self.parameters_of(core.TickParameters).tick_ns
         self._robot = self._make_robot()
         self._guard = self._new_guard()
         self._body_mode = 'standing' if self._options.start_pose == 'standing' else 'lying'
         self._timing, self._writer, self._reader = (
-            RobotTiming(),
-            RobotStateWriter(),
-            JointTargetsReader(),
-        )
-        self._state: RobotState = self._robot.reset()
+            RobotTiming(), RobotStateWriter(), JointTargetsReader())
+        self._state = self._robot.reset()
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._silent_ns = -1
-        self._state_publishers = [self.publisher(name) for name in STATE_TOPICS]
-        if self._state.joint_work is not None:
-            self._work_publisher = self.publisher('joint_work')
+        work = () if self._state.joint_work is None else ('joint_work',)
+        self._state_publishers = {name: self.publisher(name) for name in (*work, *STATE_TOPICS)}
         self.listen('joint_targets', self._on_targets)
         self.listen('body_mode', self._on_body_mode)
         self.listen('push', self._on_push, command=True)
@@ -122,17 +106,13 @@ class MujocoRobotNode(SuiteNode):
         self._timer: Any = None
         if self._options.gated:
             self._hold()
-        elif self._lock_step:
+        elif self.lock_step:
             self._waiting = Intervals()
             expected = self.parameters_of(NodeParameters).expected_nodes
             self._others = ReadinessOfOthers(
                 self, [name for kind in expected if kind != self.KIND
                        for name in KINDS[kind].instances])
-            self._timer = self.create_timer(
-                READY_PERIOD_S,
-                self._start_when_connected,
-                clock=Clock(clock_type=ClockType.STEADY_TIME),
-            )
+            self._timer = self.create_steady_timer(READY_PERIOD_S, self._start_when_connected)
         else:
             self._start_real_time()
 
@@ -150,18 +130,16 @@ class MujocoRobotNode(SuiteNode):
 
     def readers(self, topic: Interface) -> tuple[str, ...]:
         """Count those among the readers of a topic that read it with these parameters."""
-        readers = super().readers(topic)
         if self.local is not None:
-            return readers
-        if topic.name == 'joint_states' and self._options.reading == 'torque':
-            readers = (*readers, LEG)
-        if topic.name in BODY_TOPICS[self.parameters_of(StateSourceParameters).state_source]:
-            readers = (*readers, POSTURE)
-        if topic.name in VOTING_TOPICS and self.parameters_of(VotingSwitch).voting:
-            readers = (*readers, INHIBITION)
-        if topic.name == 'foot_contacts' and self._options.contact_feedback:
-            readers = (*readers, CANONICAL)
-        return readers
+            return super().readers(topic)
+        name, options = topic.name, self._options
+        reads = {
+            LEG: name == 'joint_states' and options.reading == 'torque',
+            POSTURE: name in BODY_TOPICS[self.parameters_of(StateSourceParameters).state_source],
+            core.INHIBITION: name in VOTING_TOPICS and self.parameters_of(VotingSwitch).voting,
+            core.CANONICAL: name == 'foot_contacts' and options.contact_feedback,
+        }
+        return (*super().readers(topic), *(kind for kind, does in reads.items() if does))
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the robot has fallen or stands by itself."""
@@ -175,30 +153,20 @@ class MujocoRobotNode(SuiteNode):
     # The tick ------------------------------------------------------------------------------------
 
     def _publish_state(self) -> None:
-        stamp = self._state.time_ns
+        stamp, writer = self._state.time_ns, self._writer
         self._holding = False
         self.begin_tick(stamp)
-        writer = self._writer
         try:
             writer.fill(self._state)
         except DataError as error:
             self._start_over(stamp, f'the robot at {stamp * 1e-9:.3f} s: {error}')
             writer.fill(self._state)
-        messages = (
-            writer.clock,
-            writer.imu,
-            writer.odom,
-            writer.foot_contacts,
-            writer.joint_states,
-        )
         self._timing.published(stamp)
-        first = 0 if self._lock_step or stamp // self._tick_ns % CLOCK_EVERY == 0 else 1
-        for publisher, message in zip(
-            self._state_publishers[first:], messages[first:], strict=True
-        ):
-            publisher.publish(message)
-        if writer.joint_work is not None:
-            self._work_publisher.publish(writer.joint_work)
+        clock_ticks = self.lock_step or stamp // self._tick_ns % CLOCK_EVERY == 0
+        for name, publisher in self._state_publishers.items():
+            message = getattr(writer, name.strip('/'))
+            if message is not None and (clock_ticks or name != '/clock'):
+                publisher.publish(message)
         self.end_tick()
 
     def _step(self) -> None:
@@ -226,12 +194,9 @@ class MujocoRobotNode(SuiteNode):
         elif any(self._guard.stamps):
             self._silent_ns = now
             if not self.health.has_problem('silent'):
-                self.warn(
-                    'silent',
-                    f'no targets from {", ".join(silent)} for {self._options.target_timeout} s: '
-                    f'the robot looks after itself: {RETREATS[self._guard.fallback]}',
-                    error=True,
-                )
+                self.warn('silent', f'no targets from {", ".join(silent)} for '
+                          f'{self._options.target_timeout} s: the robot looks after itself: '
+                          f'{RETREATS[self._guard.fallback]}', error=True)
 
     def _start_over(self, time_ns: int, why: str) -> None:
         """Put the robot back when its simulation has diverged; time goes on."""
@@ -255,18 +220,13 @@ class MujocoRobotNode(SuiteNode):
                             f'{now * 1e-9:.3f} s')
         self._guard.accept(leg, stamp, targets)
         self._timing.arrived(stamp)
-        if (
-            self._lock_step
-            and not self._holding
-            and stamp == self._state.time_ns
-            and all(known == stamp for known in self._guard.stamps)
-        ):
+        if self.lock_step and not self._holding and all(
+                known == now for known in self._guard.stamps):
             self._step()
             self._hold()
 
     def _on_push(self, message: Any) -> None:
-        force = read_push_force(message)
-        take = getattr(self._robot, 'take_push', None)
+        force, take = read_push_force(message), getattr(self._robot, 'take_push', None)
         if take is None:
             raise DataError(f'physics: {self._options.physics} knows no forces; '
                             'physics: mujoco does')
@@ -289,27 +249,26 @@ class MujocoRobotNode(SuiteNode):
             self._publish_state()
             return
         self._holding = True
-        message = ClockMessage()
+        message = Clock()
         set_stamp(message.clock, self._state.time_ns)
         self._held.publish(message)
 
-    def _on_advance(self, message: ClockMessage) -> None:
+    def _on_advance(self, message: Clock) -> None:
         self._open_until = max(self._open_until, stamp_ns(message.clock))
-        if self._holding and self._open_until >= self._state.time_ns:
-            if self._lock_step:
-                self._publish_state()
-            else:
-                self._holding = False
-                self._start_real_time()
+        if not self._holding or self._open_until < self._state.time_ns:
+            return
+        if self.lock_step:
+            self._publish_state()
+        else:
+            self._holding = False
+            self._start_real_time()
 
     # Real time -----------------------------------------------------------------------------------
 
     def _start_real_time(self) -> None:
         self._publish_state()
         self._begun = time.monotonic_ns() - self._state.time_ns
-        self._timer = self.create_timer(
-            self._tick_ns * 1e-9, self._on_timer, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        self._timer = self.create_steady_timer(self._tick_ns * 1e-9, self._on_timer)
 
     def _on_timer(self) -> None:
         """Run the tick that is due, and one more when the process was kept from running before."""
@@ -329,15 +288,14 @@ class MujocoRobotNode(SuiteNode):
         """Whether to let wall time pass, so that a machine too slow for real time does not make
         the robot fall.
         """
-        now = self._state.time_ns
-        lag = round(self._options.longest_lag * 1e9)
+        now, lag = self._state.time_ns, round(self._options.longest_lag * 1e9)
         if lag == 0 or self._guard.age_ns(now) <= lag or self._guard.silent(now):
             self._waits = 0
             return False
         self._waits += 1
         if self._waits * self._tick_ns > self._options.target_timeout * 1e9:
             return False
-        self._timing.waited()
+        self._timing.waits += 1
         return True
 
     # Inside --------------------------------------------------------------------------------------
@@ -347,8 +305,8 @@ class MujocoRobotNode(SuiteNode):
         return CommandWatchdog(fallback, round(self._options.target_timeout * 1e9))
 
     def _make_robot(self) -> Robot:
-        p, file = self._options, find_config(self.parameters_of(RobotFileParameters).robot)
-        world = chosen_world(self.parameters_of(WorldParameters), p)
+        p, file = self._options, find_config(self.parameters_of(core.RobotFileParameters).robot)
+        world = core.chosen_world(self.parameters_of(WorldParameters), p)
         if p.physics == 'perfect_tracking':
             return PerfectTrackingRobot(load_description(file), self._tick_ns, p.start_pose)
         from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -356,21 +314,5 @@ class MujocoRobotNode(SuiteNode):
         robot_file = load_robot_file(file)
         if p.reading == 'torque':
             robot_file = robot_file.without_gains()
-        return MujocoRobot(
-            robot_file,
-            self._tick_ns,
-            p.seed,
-            p.initial_spread,
-            world=world,
-            sensors=self.parameters_of(SensorParameters),
-            start_pose=p.start_pose,
-        )
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(MujocoRobotNode)
-
-
-if __name__ == '__main__':
-    sys.exit(main())
+        return MujocoRobot(robot_file, self._tick_ns, p.seed, p.initial_spread, world=world,
+                           sensors=self.parameters_of(SensorParameters), start_pose=p.start_pose)

@@ -4,30 +4,164 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
 from std_msgs.msg import String
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
+from dmp_cpg_ros.core.estimation.estimate import BodyEstimate, estimated_state
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
+from dmp_cpg_ros.core.estimation.parameters import (
+    ESTIMATE,
+    EstimationParameters,
+    StateSourceParameters,
+)
+from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.modes.requests import REQUESTS
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
+from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
+from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.transformation.leg import LegParameters
-from dmp_cpg_ros.nodes.framework.execution import run_node
 from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
-from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.inputs.body_state import BodyState
 from dmp_cpg_ros.nodes.messages.conversions import (
     CanonicalStateReader,
     PostureFeedbackWriter,
     read_reference,
 )
-from dmp_cpg_ros.suite_table import KINDS, POSTURE
+from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS
+from dmp_cpg_ros.nodes.messages.robot_state import (
+    BaseMotion,
+    FootContactsReader,
+    JointsReader,
+    OdometryWriter,
+    read_imu,
+    read_odom,
+)
+from dmp_cpg_ros.nodes.messages.values import stamped
+from dmp_cpg_ros.suite_table import POSTURE
+
+WELL_AGAIN_NS = 1_000_000_000
+"""Time without a problem after which sensors count as well again [ns]."""
+
+
+class BodyState:
+    """Topics and estimator behind the state of the body.
+
+    Parameters
+    ----------
+    node : SuiteNode
+        The node that needs the state; its parameters choose where it comes from.
+    description : RobotDescription
+        The robot.
+    legs : RobotLegs, optional
+        Its legs, where others ask them too.
+
+    Attributes
+    ----------
+    optional : tuple of str
+        Topics whose silence the estimator bears.
+    readers : mapping of str to callable
+        How to read each topic.
+    estimate : BodyEstimate or None
+        The last one.
+    """
+
+    def __init__(self, node: SuiteNode, description: RobotDescription,
+                 legs: RobotLegs | None = None) -> None:
+        """Build the estimator, where there is one, and its publisher."""
+        self._node = node
+        self.estimate: BodyEstimate | None = None
+        self._memory: EstimatorState | None = None
+        self._estimator: BodyEstimator | None = None
+        self.optional: tuple[str, ...] = ()
+        self.readers: dict[str, Callable[[Any], Any]] = {'joint_states': JointsReader().read}
+        if node.parameters_of(StateSourceParameters).state_source != ESTIMATE:
+            self.readers['odom'] = read_odom
+            return
+        self.optional = BODY_TOPICS[ESTIMATE]
+        self.readers |= {'imu': stamped(read_imu),
+                         'foot_contacts': stamped(FootContactsReader().read)}
+        self._estimator = BodyEstimator(
+            description, node.parameters_of(EstimationParameters), legs)
+        self._writer, self._publisher = OdometryWriter(), node.publisher('estimated_odom')
+        self._published, self._problem_ns = -1, 0
+        self.on_parameters()
+
+    def on_parameters(self) -> None:
+        """Take over the estimator's parameters."""
+        if self._estimator is None:
+            return
+        parameters = self._node.parameters_of(EstimationParameters)
+        self._estimator.parameters = parameters
+        rate = parameters.estimate_rate
+        self._period_ns = round(1e9 / rate) if rate > 0.0 else 0
+
+    def state(self, stamp_ns: int, values: Mapping[str, Any]) -> RobotState:
+        """State at a stamp from what the topics said.
+
+        Parameters
+        ----------
+        stamp_ns : int
+            Stamp of the tick [ns].
+        values : mapping
+            By topic, what its reader returned.
+        """
+        if self._estimator is None:
+            position, velocity, effort = values['joint_states']
+            base: BaseMotion = values['odom']
+            return RobotState(stamp_ns, position, velocity, effort, *base, np.zeros(3),
+                              np.zeros(len(LEGS)))
+        readings = sensor_readings(stamp_ns, values)
+        self._memory, estimate = self._estimator.step(self._memory, readings)
+        self.estimate = estimate
+        self._tell_problems(stamp_ns, estimate)
+        if self._period_ns and stamp_ns // self._period_ns != self._published:
+            self._published = stamp_ns // self._period_ns
+            self._publisher.publish(self._writer.fill_estimate(estimate))
+        return estimated_state(readings, estimate)
+
+    def diagnostic_values(self) -> Mapping[str, Any]:
+        """Values for ``/diagnostics``: what no other topic tells of the estimate."""
+        memory, estimate = self._memory, self.estimate
+        if memory is None or estimate is None:
+            return {}
+        roll, pitch, _ = roll_pitch_yaw(estimate.quaternion)
+        slope_x, slope_y = memory.terrain.slope
+        return {
+            'estimated_roll_rad': roll,
+            'estimated_pitch_rad': pitch,
+            'estimated_height_m': estimate.height,
+            'terrain_slope_x': slope_x,
+            'terrain_slope_y': slope_y,
+            'gyro_bias_rad_s': ' '.join(f'{bias:.5f}' for bias in memory.filter.gyro_bias),
+        }
+
+    def _tell_problems(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+        if estimate.problems:
+            self._problem_ns = stamp_ns
+            self._node.warn('sensors', 'the estimator does without '
+                            f'{", ".join(estimate.problems)}: silent, not finite, or impossible')
+        elif stamp_ns > self._problem_ns + WELL_AGAIN_NS:
+            self._node.clear('sensors')
+
+
+def sensor_readings(stamp_ns: int, values: Mapping[str, Any]) -> SensorReadings:
+    """Readings of one tick; what bears another stamp is missing (NaN)."""
+    position, velocity, effort = values['joint_states']
+    rate = force = np.full(3, np.nan)
+    contacts = np.full(len(LEGS), np.nan)
+    imu, feet = values['imu'], values['foot_contacts']
+    if imu is not None and imu[0] == stamp_ns:
+        rate, force = imu[1]
+    if feet is not None and feet[0] == stamp_ns:
+        contacts = feet[1]
+    return SensorReadings(stamp_ns, position, velocity, effort, rate, force, contacts)
 
 
 class PostureControl(SuiteNode):
@@ -37,7 +171,6 @@ class PostureControl(SuiteNode):
     """
 
     KIND = POSTURE
-    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
     # The rate of the swings' activity is the legs' too, and the certificate's.
     CHANGEABLE = tuple(name for cls in (PostureParameters, EstimationParameters)
                        for name in cls.__dataclass_fields__
@@ -122,12 +255,3 @@ class PostureControl(SuiteNode):
         elif mode in ('standing', 'lying'):
             self.clear('fell')
         self.report()
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(PostureControl)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,11 +14,8 @@ from dmp_cpg_ros.core.gait.running import approached
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified
-from dmp_cpg_ros.nodes.framework.execution import run_node
-from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, ReferenceWriter
-from dmp_cpg_ros.suite_table import KINDS
 
 
 class ReferenceFilter(SuiteNode):
@@ -28,7 +24,6 @@ class ReferenceFilter(SuiteNode):
     """
 
     KIND = REFERENCE
-    PARAMETER_SETS = (*KINDS[KIND].sets, LockStepParameters)
     CHANGEABLE = JUDGED
     certified: Certified
 
@@ -62,12 +57,3 @@ class ReferenceFilter(SuiteNode):
         """Reference and whether a stop holds it at zero."""
         return {**dict(zip(('v_x', 'v_y', 'gamma'), self._r, strict=True)),
                 'stopping': self._requested}
-
-
-def main() -> int:
-    """Run the node."""
-    return run_node(ReferenceFilter)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

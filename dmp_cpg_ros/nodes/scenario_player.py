@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plays a scenario to the running suite: velocity commands and service calls at their ticks."""
+"""Plays a scenario to the running suite: velocity commands and service calls at their ticks; lays
+the robot down at the end.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.scenario.events import Command
 from dmp_cpg_ros.core.scenario.push import Push
@@ -26,18 +28,71 @@ from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
 from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
-from dmp_cpg_ros.nodes.scenario.acknowledged_topic import AcknowledgedTopic
 
 FAR_NS = 2**31 * 10**9 - 1
 """A stamp later than every run [ns]."""
-
 
 LEAD_NS = 40_000_000
 """In real time a push is stamped so much later than the clock that its message is in time [ns]."""
 
 
+PATIENCE_NS = 12_000_000_000
+"""Time on the robot's clock within which it must lie [ns]: coming to rest, and the movement."""
+
+
 class PlayerError(DmpCpgError):
     """The suite did not take a command or a request."""
+
+
+class AcknowledgedTopic:
+    """Publishes an interface of the table and counts what its readers have taken.
+
+    Parameters
+    ----------
+    node : Node
+        Who sends.
+    name : str
+        Topic whose readers tell of it on ``~/commands_taken``.
+    """
+
+    def __init__(self, node: Node, name: str) -> None:
+        """Create the publisher, and a subscription for each reader."""
+        topic, taken, self._name = interface(name), interface('~/commands_taken'), name
+        self._publisher = node.create_publisher(topic.type, topic.name, topic.publisher_qos)
+        self._sent, self._taken = 0, dict.fromkeys(topic.subscribers, 0.0)
+        self._then: Callable[[], None] | None = None
+        self._answers = [
+            node.create_subscription(taken.type, f'{reader}/commands_taken',
+                                     self._hearing(reader), taken.reader_qos)
+            for reader in topic.subscribers]
+
+    def connected(self) -> bool:
+        """Whether all readers are there."""
+        return bool(self._publisher.get_subscription_count() >= len(self._answers) and all(
+            answer.get_publisher_count() for answer in self._answers))
+
+    def send(self, message: Any) -> None:
+        """Publish."""
+        self._publisher.publish(message)
+        self._sent += 1
+
+    def when_taken(self, then: Callable[[], None]) -> None:
+        """Call back once, when every reader has taken everything that was sent."""
+        self._then = then
+        self._look()
+
+    def _hearing(self, reader: str) -> Callable[[JointState], None]:
+        def hear(message: JointState) -> None:
+            counts = dict(zip(message.name, message.position, strict=True))
+            self._taken[reader] = counts.get(self._name, 0.0)
+            self._look()
+
+        return hear
+
+    def _look(self) -> None:
+        if self._then is not None and min(self._taken.values()) >= self._sent:
+            then, self._then = self._then, None
+            then()
 
 
 class ScenarioPlayer(Node):  # type: ignore[misc]
@@ -65,65 +120,50 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         What the body does, as last told; empty before.
     """
 
-    def __init__(
-        self, scenario: Scenario, tick_ns: int, lock_step: bool, say: Callable[[float, str], None]
-    ) -> None:
+    def __init__(self, scenario: Scenario, tick_ns: int, lock_step: bool,
+                 say: Callable[[float, str], None]) -> None:
         """Create the topics; nothing is sent before :meth:`begin`."""
         super().__init__('scenario_player')
-        self._actions, self._tick_ns, self._lock_step, self._say = (
-            scenario.timeline(tick_ns),
-            tick_ns,
-            lock_step,
-            say,
-        )
+        self._tick_ns, self._lock_step, self._say = tick_ns, lock_step, say
+        self._actions, self._next = scenario.timeline(tick_ns), 0
         self._end_ns = scenario.ticks(tick_ns) * tick_ns
-        self._next, self._begun, self._busy, self._word = 0, False, False, ''
+        self._begun, self._busy, self._word = False, False, ''
         self._holding_ns, self._inhibition_ns = -1, -1
-        self.time_ns = 0
-        self.finished = Future()
+        self.time_ns, self.mode, self.finished = 0, '', Future()
+        voting = any(action.kind == 'votes' for action in self._actions)
+        self._topics = {name: AcknowledgedTopic(self, name) for name in (
+            'cmd_vel', 'push', *(['votes'] if voting else []))}
         gate = interface(f'{GATE_OWNER}/advance_until')
-        self._commands = AcknowledgedTopic(self, 'cmd_vel')
-        self._pushes = AcknowledgedTopic(self, 'push')
-        self._topics = [self._commands, self._pushes]
-        if any(action.kind == 'votes' for action in self._actions):
-            self._votes = AcknowledgedTopic(self, 'votes')
-            self._topics.append(self._votes)
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
-        self._inhibit = self.create_client(SetBool, interface('inhibit').name)
+        self._callees = {name: self.create_client(interface(name).type, name)
+                          for name in ('inhibit', *REQUESTS)}
         self._setter = ParameterSetter(self)
-        self._modes = {
-            what: self.create_client(Trigger, interface(what).name) for what in REQUESTS
-        }
-        self.mode = ''
         self._deliver: dict[str, Callable[[Any], None]] = {
             'command': self._send,
-            'inhibit': self._call_inhibit,
+            'inhibit': lambda stop: self._ask('inhibit', SetBool.Request(data=stop)),
             'gait': lambda name: self._set({'gait': name}),
             'push': self._push,
             'set': self._set,
             'votes': self._vote,
             **{what: self._asking(what) for what in REQUESTS},
         }
-        for name, callback in (
-            (f'{GATE_OWNER}/holding_at', self._on_holding),
-            ('inhibition_state', self._on_inhibition),
-            ('inhibition_gains', self._on_gains),
-            ('body_mode', self._on_body_mode),
-            ('/clock', self._on_clock),
-        ):
+        heard: dict[str, Callable[[Any], None]] = {
+            f'{GATE_OWNER}/holding_at': self._on_holding,
+            'inhibition_state': self._on_inhibition,
+            'inhibition_gains': self._on_gains,
+            'body_mode': self._on_body_mode,
+            **({} if lock_step else {'/clock': self._on_clock}),
+        }
+        for name, callback in heard.items():
             topic = interface(name)
-            if name != '/clock' or not lock_step:
-                self.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
+            self.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
 
     def connected(self) -> bool:
-        """Whether the gate, the readers of commands and the service are there."""
-        services = (self._inhibit, *self._modes.values())
-        return (
-            self._gate.get_subscription_count() > 0
-            and all(client.service_is_ready() for client in services)
-            and self._setter.connected()
-            and all(topic.connected() for topic in self._topics)
-        )
+        """Whether the gate, the readers of commands and the services are there."""
+        return (self._gate.get_subscription_count() > 0
+                and all(client.service_is_ready() for client in self._callees.values())
+                and self._setter.connected()
+                and all(topic.connected() for topic in self._topics.values()))
 
     def begin(self) -> None:
         """Begin with the first tick."""
@@ -155,68 +195,60 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """Deliver what acts at the held tick once all nodes have finished the tick before, then
         open the gate.
         """
-        if (
-            not self._begun
-            or not self._lock_step
-            or self._holding_ns < 0
-            or self._busy
-            or self.finished.done()
-        ):
+        if (not self._begun or not self._lock_step or self._holding_ns < 0 or self._busy
+                or self.finished.done()):
             return
         if self._holding_ns > 0 and self._inhibition_ns < self._holding_ns - self._tick_ns:
             return
         self.time_ns = self._holding_ns
         if self.time_ns >= self._end_ns:
             self.finished.set_result(None)
-            return
-        if self._deliver_due():
-            return
-        following = (
-            self._actions[self._next].time_ns if self._next < len(self._actions) else self._end_ns
-        )
-        self._holding_ns = -1
-        self._open(min(following, self._end_ns) - self._tick_ns)
+        elif not self._deliver_due():
+            following = (self._actions[self._next].time_ns if self._next < len(self._actions)
+                         else self._end_ns)
+            self._holding_ns = -1
+            self._open(min(following, self._end_ns) - self._tick_ns)
 
     def _deliver_due(self) -> bool:
-        """Deliver due actions; returns whether one is under way and will call back."""
-        while (
-            self._next < len(self._actions) and self._actions[self._next].time_ns <= self.time_ns
-        ):
-            action = self._actions[self._next]
-            self._next += 1
-            if action.label:
-                self._say(self.time_ns * 1e-9, f'> {action.label}')
-            self._busy = True
-            self._deliver[action.kind](action.value)
-            return True
-        return False
+        """Deliver the next action if it is due; returns whether one is under way and will call
+        back.
+        """
+        if self._next == len(self._actions) or self._actions[self._next].time_ns > self.time_ns:
+            return False
+        action = self._actions[self._next]
+        self._next += 1
+        if action.label:
+            self._say(self.time_ns * 1e-9, f'> {action.label}')
+        self._busy = True
+        self._deliver[action.kind](action.value)
+        return True
 
     def _send(self, command: Command) -> None:
         message = Twist()
         message.linear.x, message.linear.y, message.angular.z = command
-        self._commands.send(message)
-        self._finish(self._commands)
+        self._publish('cmd_vel', message)
 
     def _push(self, push: Push) -> None:
         """Send the push's forces at once; the robot applies each at its stamp."""
-        start_ns = self.time_ns if self._lock_step else self.time_ns + LEAD_NS
+        start_ns, messages = self.time_ns if self._lock_step else self.time_ns + LEAD_NS, []
         for force in push.forces(start_ns, self._tick_ns):
             message = WrenchStamped()
             set_stamp(message.header.stamp, force.time_ns)
             message.header.frame_id = force.frame
             vector = message.wrench.force
             vector.x, vector.y, vector.z = force.force
-            self._pushes.send(message)
-        self._finish(self._pushes)
+            messages.append(message)
+        self._publish('push', *messages)
 
     def _vote(self, weights: dict[str, float]) -> None:
-        message = JointState(
-            name=[f'scenario/{leg}' for leg in weights], effort=list(weights.values()))
-        self._votes.send(message)
-        self._finish(self._votes)
+        self._publish('votes', JointState(
+            name=[f'scenario/{leg}' for leg in weights], effort=list(weights.values())))
 
-    def _finish(self, topic: AcknowledgedTopic) -> None:
-        """Go on: in lock-step when all readers have what was sent."""
+    def _publish(self, name: str, *messages: Any) -> None:
+        """Send, and go on: in lock-step when all readers have what was sent."""
+        topic = self._topics[name]
+        for message in messages:
+            topic.send(message)
         if self._lock_step:
             topic.when_taken(self._delivered)
         else:
@@ -229,33 +261,22 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         else:
             self._deliver_due()
 
-    def _call_inhibit(self, stop: bool) -> None:
-        request = SetBool.Request(data=stop)
-        self._inhibit.call_async(request).add_done_callback(self._answered)
-
-    def _answered(self, future: Future) -> None:
-        answer = future.result()
-        if answer is None or not answer.success:
-            self._fail(f'service inhibit: {"no answer" if answer is None else answer.message}')
-            return
-        self._say(self.time_ns * 1e-9, f'  inhibit: {answer.message}')
-        self._delivered()
-
     def _asking(self, what: str) -> Callable[[Any], None]:
         """What delivers a request to stand up, lie down or recover."""
+        return lambda _: self._ask(what, Trigger.Request())
 
+    def _ask(self, service: str, request: Any) -> None:
         def answered(future: Future) -> None:
             answer = future.result()
             if answer is None or not answer.success:
-                self._fail(f'service {what}: {"no answer" if answer is None else answer.message}')
+                reason = 'no answer' if answer is None else answer.message
+                if not self.finished.done():
+                    self.finished.set_exception(PlayerError(f'service {service}: {reason}'))
                 return
-            self._say(self.time_ns * 1e-9, f'  {what}: {answer.message}')
+            self._say(self.time_ns * 1e-9, f'  {service}: {answer.message}')
             self._delivered()
 
-        def ask(_: Any) -> None:
-            self._modes[what].call_async(Trigger.Request()).add_done_callback(answered)
-
-        return ask
+        self._callees[service].call_async(request).add_done_callback(answered)
 
     def _on_body_mode(self, message: String) -> None:
         mode = read_body_mode(message)
@@ -284,13 +305,62 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         elif not self._busy:
             self._deliver_due()
 
-    # Inside --------------------------------------------------------------------------------------
-
     def _open(self, until_ns: int) -> None:
         message: Any = Clock()
         set_stamp(message.clock, until_ns)
         self._gate.publish(message)
 
-    def _fail(self, text: str) -> None:
-        if not self.finished.done():
-            self.finished.set_exception(PlayerError(text))
+
+class LyingDown:
+    """Asks for ``lie_down`` and watches until the robot lies.
+
+    Parameters
+    ----------
+    node : Node
+        Whose topics and service it uses.
+    say : callable (time_s, text)
+        Told what happens.
+    """
+
+    def __init__(self, node: Node, say: Callable[[float, str], None]) -> None:
+        """Create client and subscriptions; nothing is asked before :meth:`begin`."""
+        self._say, self._time_ns, self._deadline_ns = say, 0, 0
+        self._mode, self._done = '', Future()
+        self._client = node.create_client(Trigger, interface('lie_down').name)
+        for name, callback in (('body_mode', self._on_mode), ('/clock', self._on_clock)):
+            topic = interface(name)
+            node.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
+
+    def begin(self) -> Future:
+        """Ask; the future holds how it ended, in words, once it has."""
+        self._deadline_ns = self._time_ns + PATIENCE_NS
+        if self._mode in ('lying', 'damped'):
+            self._end(f'it is {self._mode}')
+        else:
+            self._client.call_async(Trigger.Request()).add_done_callback(self._answered)
+        return self._done
+
+    def _answered(self, future: Future) -> None:
+        answer = future.result()
+        if answer is None or not answer.success:
+            self._end(f'refused: {"no answer" if answer is None else answer.message}')
+        else:
+            self._say(self._time_ns * 1e-9, f'  lie_down: {answer.message}')
+
+    def _on_mode(self, message: String) -> None:
+        try:
+            self._mode = read_body_mode(message)
+        except DataError:
+            return
+        if self._deadline_ns and self._mode in ('lying', 'damped'):
+            self._end(f'it is {self._mode}')
+
+    def _on_clock(self, message: Clock) -> None:
+        self._time_ns = stamp_ns(message.clock)
+        if self._deadline_ns and self._time_ns > self._deadline_ns:
+            self._end(f'it is still {self._mode} after {PATIENCE_NS * 1e-9:g} s')
+
+    def _end(self, how: str) -> None:
+        if not self._done.done():
+            self._done.set_result(how)
+            self._say(self._time_ns * 1e-9, how)

@@ -636,8 +636,8 @@ def test_bad_arguments_end_a_process_with_status_two(processes: Processes) -> No
         (processes.node('reference_filter', alpha_r='fast'), 2, ('alpha_r', 'fast', 'number')),
         (processes.node('reference_filter', alpha='3.0'), 2, ("'alpha'", 'alpha_r')),
         (processes.node('reference_filter', '-p'), 2, ('-p',)),
-        (processes.python('-m', 'dmp_cpg_ros.nodes.reference_filter', '--fast'), 2, ('--fast',)),
-        (processes.python('-m', 'dmp_cpg_ros.nodes.reference_filter', '--help'), 0,
+        (processes.python('-m', 'dmp_cpg_ros', 'reference_filter', '--fast'), 2, ('--fast',)),
+        (processes.python('-m', 'dmp_cpg_ros', 'reference_filter', '--help'), 0,
          ('alpha_r', 'cmd_vel', 'geometry_msgs/msg/Twist')),
     ]
     for process, status, words in started:

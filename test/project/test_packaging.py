@@ -17,6 +17,7 @@ import pytest
 from checkout import PACKAGE, ROOT, imports, modules, setup_argument, setup_constant
 
 import dmp_cpg_ros
+from dmp_cpg_ros.suite_table import KINDS
 
 CONTRACT = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition',
             'posture_control', 'mujoco_robot', 'bag_recorder', 'walk', 'certify', 'analyze',
@@ -156,7 +157,9 @@ def test_an_executable_has_its_function(executable: str) -> None:
     places = [f'{PACKAGE}.{folder}.{executable}' for folder in ('commands', 'studies', 'nodes')]
     module = next(name for name in places if name in modules())
     tree = ast.parse(modules()[module].read_text(encoding='utf-8'))
-    assert 'main' in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    function = KINDS[executable].class_name if executable in KINDS else 'main'
+    assert function in {node.name for node in tree.body
+                        if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
     assert callable(getattr(import_module(f'{PACKAGE}.__main__'), executable))
 
 

@@ -30,7 +30,7 @@ def test_a_row_names_its_class(kind: Kind) -> None:
     pytest.importorskip('rclpy')
     node_class = getattr(import_module(kind.module), kind.class_name)
     assert node_class.KIND == kind.name
-    assert set(kind.sets) <= set(node_class.PARAMETER_SETS)
+    assert set(kind.sets) <= set(node_class.parameter_table().sets)
     for own in kind.instances.values():
         assert all(kind.has(name) for name in own)
 

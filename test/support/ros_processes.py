@@ -158,7 +158,7 @@ class Processes:
         """Start a node of the suite, with parameters as keywords."""
         pairs = [f'{name}:={_yaml(value)}' for name, value in parameters.items()]
         given = [item for pair in pairs for item in ('-p', pair)]
-        return self.python('-m', f'dmp_cpg_ros.nodes.{kind}', '--ros-args', *ros_arguments, *given)
+        return self.python('-m', 'dmp_cpg_ros', kind, '--ros-args', *ros_arguments, *given)
 
     def end(self) -> None:
         """Kill what still runs."""

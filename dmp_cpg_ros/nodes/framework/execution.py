@@ -19,6 +19,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterable, Sequence
+from importlib import import_module
 from pathlib import Path
 from types import FrameType
 
@@ -38,6 +39,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterErro
 from dmp_cpg_ros.nodes.framework.claims import claim_node
 from dmp_cpg_ros.nodes.framework.parameters import BATCH, NodeParameters, help_text
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.suite_table import KINDS
 
 PROFILE = 'fastdds.xml'
 """Profile of Fast DDS in the config folder; it says why it is there."""
@@ -168,8 +170,14 @@ def spin(nodes: Node | Sequence[Node], kind: str = 'events', until: Future | Non
             executor.remove_node(node)
 
 
+def run_kind(name: str) -> int:
+    """Body of the executable of a kind of node."""
+    kind = KINDS[name]
+    return run_node(getattr(import_module(kind.module), kind.class_name))
+
+
 def run_node(node_class: type[SuiteNode], arguments: Sequence[str] | None = None) -> int:
-    """Body of the executable of a node.
+    """Run a node in this process.
 
     Parameters
     ----------

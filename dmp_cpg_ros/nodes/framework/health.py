@@ -18,17 +18,17 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.subscription import Subscription
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.messages.interfaces import Interface, partners
-from dmp_cpg_ros.nodes.messages.values import set_stamp, text
+from dmp_cpg_ros.nodes.messages.values import status_message
 from dmp_cpg_ros.suite_table import KINDS
 
 PERIOD_NS = 1_000_000_000
@@ -61,8 +61,7 @@ class NodeHealth:
     def __init__(self, name: str, clock: Callable[[], float] = time.monotonic) -> None:
         """Start healthy; nodes report at different moments, so that no tick bears all reports."""
         self.name, self._clock = name, clock
-        self.ticks = 0
-        self.stamp_ns = 0
+        self.ticks = self.stamp_ns = 0
         self.rejected: dict[str, int] = {}
         self._recent: dict[str, tuple[bytes, str]] = {}
         self._logged: dict[str, float] = {}
@@ -116,23 +115,15 @@ class NodeHealth:
             Whether this report closes the second in which messages were rejected; later reports
             are healthy again.
         """
-        problems = dict(self._problems)
-        for topic, problem in self._recent.items():
-            problems.setdefault(topic, problem)
+        # The lasting ones first.
+        told = {**self._problems, **self._recent, **self._problems}.values()
         if periodic:
             self._recent = {}
-        entries: dict[str, Any] = {
-            'state': state, 'ticks': self.ticks, 'last_stamp_ns': self.stamp_ns}
-        entries.update((f'rejected.{topic}', count) for topic, count in self.rejected.items())
-        entries.update(values)
-        status = DiagnosticStatus(
-            name=self.name, hardware_id='dmp_cpg_ros',
-            level=max((level for level, _ in problems.values()), default=DiagnosticStatus.OK),
-            message='; '.join(message for _, message in problems.values()) or state,
-            values=[KeyValue(key=key, value=text(value)) for key, value in entries.items()])
-        message = DiagnosticArray(status=[status])
-        set_stamp(message.header.stamp, self.stamp_ns)
-        return message
+        return status_message(
+            self.name, self.stamp_ns, '; '.join(message for _, message in told) or state,
+            {'state': state, 'ticks': self.ticks, 'last_stamp_ns': self.stamp_ns,
+             **{f'rejected.{topic}': count for topic, count in self.rejected.items()}, **values},
+            level=max((level for level, _ in told), default=DiagnosticStatus.OK))
 
 
 def _level(error: bool) -> bytes:
@@ -140,7 +131,13 @@ def _level(error: bool) -> bytes:
 
 
 class RobotTiming:
-    """Measures on the machine's monotonic clock; nothing of it enters the gait."""
+    """Measures on the machine's monotonic clock; nothing of it enters the gait.
+
+    Attributes
+    ----------
+    ticks, misses, waits : int
+        Ticks; those at which targets were missing; periods that the simulation let pass.
+    """
 
     def __init__(self) -> None:
         """Start without any tick."""
@@ -148,9 +145,7 @@ class RobotTiming:
         self._latency = array('d')
         self._first: tuple[float, int] | None = None
         self._last: tuple[float, int] | None = None
-        self.ticks = 0
-        self.misses = 0
-        self.waits = 0
+        self.ticks = self.misses = self.waits = 0
 
     def published(self, stamp_ns: int) -> None:
         """Note that the state of a tick has been published."""
@@ -177,30 +172,18 @@ class RobotTiming:
         if entry is not None and entry[1] < len(LEGS):
             self.misses += 1
 
-    def waited(self) -> None:
-        """Note that the simulation let a period of wall time pass."""
-        self.waits += 1
-
     def values(self) -> dict[str, float | int]:
         """Rate [Hz], real-time factor, latency [ms] and misses since the start; NaN without
         ticks.
         """
-        values: dict[str, float | int] = {
-            'deadline_misses': self.misses,
-            'waits': self.waits,
-            'timed_ticks': self.ticks,
-        }
-        wall = robot = float('nan')
+        wall = robot = math.nan
         if self._first is not None and self._last is not None and self._last[0] > self._first[0]:
             wall, robot = self._last[0] - self._first[0], (self._last[1] - self._first[1]) * 1e-9
         latency = np.frombuffer(self._latency) if self._latency else np.array([np.nan])
-        values.update(
-            rate_hz=(self.ticks - 1) / wall,
-            real_time_factor=robot / wall,
-            latency_ms_p50=float(np.percentile(latency, 50)),
-            latency_ms_p99=float(np.percentile(latency, 99)),
-        )
-        return values
+        half, most = np.percentile(latency, (50, 99)).tolist()
+        return {'deadline_misses': self.misses, 'waits': self.waits, 'timed_ticks': self.ticks,
+                'rate_hz': (self.ticks - 1) / wall, 'real_time_factor': robot / wall,
+                'latency_ms_p50': half, 'latency_ms_p99': most}
 
 
 ASK_AGAIN_S = 2.0
@@ -290,31 +273,22 @@ def missing_connections(node: Node, kind: str,
     list of str
         One text per missing connection.
     """
+    ends = [(topic, kinds, publisher, 'read', 'readers', publisher.get_subscription_count,
+             node.get_subscriptions_info_by_topic) for topic, kinds, publisher in outputs]
+    ends += [(topic, partners(topic, readers=False), subscription, 'published', 'publishers',
+              subscription.get_publisher_count, node.get_publishers_info_by_topic)
+             for topic, subscription in inputs]
     missing: list[str] = []
-    for topic, readers, publisher in outputs:
-        ends = node.get_subscriptions_info_by_topic(publisher.topic_name)
-        absent = _absent(node, ends, readers, kind, expected)
-        missing += [f'{topic.name} is not read by {name}' for name in absent]
-        known = sum(_compatible(publisher.qos_profile, end.qos_profile) for end in ends)
-        if not absent and publisher.get_subscription_count() < known:
-            missing.append(f'{topic.name} is not matched with all of its {known} readers')
-    for topic, subscription in inputs:
-        ends = node.get_publishers_info_by_topic(subscription.topic_name)
-        absent = _absent(node, ends, partners(topic, readers=False), kind, expected)
-        missing += [f'{topic.name} is not published by {name}' for name in absent]
-        known = sum(_compatible(end.qos_profile, subscription.qos_profile) for end in ends)
-        if not absent and subscription.get_publisher_count() < known:
-            missing.append(f'{topic.name} is not matched with all of its {known} publishers')
+    for topic, kinds, own, done, words, matched, look in ends:
+        others = look(own.topic_name)
+        found = {other.node_name for other in others
+                 if other.node_namespace == node.get_namespace()}
+        absent = [name for other in kinds if other in expected and other != kind
+                  for name in KINDS[other].instances if name not in found]
+        missing += [f'{topic.name} is not {done} by {name}' for name in absent]
+        pairs = [(own, other) if done == 'read' else (other, own) for other in others]
+        known = sum(qos_check_compatible(offer.qos_profile, request.qos_profile)[0]
+                    != QoSCompatibility.ERROR for offer, request in pairs)
+        if not absent and matched() < known:
+            missing.append(f'{topic.name} is not matched with all of its {known} {words}')
     return missing
-
-
-def _absent(node: Node, ends: Sequence[Any], partners: Sequence[str],
-            kind: str, expected: Collection[str]) -> list[str]:
-    """Names of expected partners that are not among the ends of a topic."""
-    found = {end.node_name for end in ends if end.node_namespace == node.get_namespace()}
-    return [name for partner in partners if partner in expected and partner != kind
-            for name in KINDS[partner].instances if name not in found]
-
-
-def _compatible(offered: QoSProfile, requested: QoSProfile) -> bool:
-    return bool(qos_check_compatible(offered, requested)[0] != QoSCompatibility.ERROR)

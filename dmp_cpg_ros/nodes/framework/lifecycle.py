@@ -14,6 +14,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any, ClassVar
 
+from rclpy.clock import Clock, ClockType
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.service import Service
@@ -109,52 +110,44 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         """Run :meth:`configure`; what it made is destroyed again when it fails."""
         result = self._run('configure', self.configure)
         self.configured = result == TransitionCallbackReturn.SUCCESS
-        if not self.configured:
-            self.destroy_entities()
-        self._enter('inactive' if self.configured else 'unconfigured')
-        return result
+        return self._enter('inactive', result) if self.configured else self._leave(result)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Run :meth:`activate` and let messages in."""
         result = self._run('activate', self.activate)
         self.active = result == TransitionCallbackReturn.SUCCESS
-        self._enter('active' if self.active else 'inactive')
-        return result
+        return self._enter('active' if self.active else 'inactive', result)
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Keep messages out and run :meth:`deactivate`."""
         self.active = False
-        result = self._run('deactivate', self.deactivate, may_refuse=False)
-        self._enter('inactive')
-        return result
+        return self._enter('inactive', self._run('deactivate', self.deactivate, may_refuse=False))
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Run :meth:`cleanup` and destroy all entities."""
         self.configured = False
-        result = self._run('clean up', self.cleanup, may_refuse=False)
-        self.destroy_entities()
-        self._enter('unconfigured')
-        return result
+        return self._leave(self._run('clean up', self.cleanup, may_refuse=False))
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """End the node's work in whatever state it is."""
-        result = self._run('shut down', self.close, may_refuse=False)
-        self.destroy_entities()
-        self._enter('finalized')
-        return result
+        return self._leave(self._run('shut down', self.close, may_refuse=False), 'finalized')
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Go back to ``unconfigured`` after an error."""
         failure = self.failure
         self._run('clean up', self.close, may_refuse=False)
         self.failure = failure
-        self.destroy_entities()
-        self._enter('unconfigured')
-        return TransitionCallbackReturn.SUCCESS
+        return self._leave(TransitionCallbackReturn.SUCCESS)
 
-    def _enter(self, label: str) -> None:
+    def _leave(self, result: TransitionCallbackReturn, label: str = 'unconfigured',
+               ) -> TransitionCallbackReturn:
+        self.destroy_entities()
+        return self._enter(label, result)
+
+    def _enter(self, label: str, result: TransitionCallbackReturn) -> TransitionCallbackReturn:
         self.state_label = label
         self.state_changed()
+        return result
 
     def _run(self, verb: str, hook: Callable[[], None], *,
              may_refuse: bool = True) -> TransitionCallbackReturn:
@@ -220,6 +213,11 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         return super().create_timer(
             timer_period_sec, self.guarded(f'timer {callback.__name__}', callback),
             *arguments, **options)
+
+    def create_steady_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
+        """Create a timer of wall time [s] that goes on whatever the robot's clock does."""
+        return self.create_timer(
+            period_s, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _guard_transitions(self, service: Service) -> None:
         """Let the service of transitions, which rclpy makes in a way of its own, refuse too."""

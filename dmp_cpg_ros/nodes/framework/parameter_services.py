@@ -4,13 +4,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import qos_profile_parameter_events
@@ -44,32 +42,21 @@ class ParameterFollower:
         counted as dropped.
     """
 
-    def __init__(
-        self,
-        node: GuardedLifecycleNode,
-        owners: Mapping[str, Sequence[str]],
-        take: Callable[[dict[str, Any]], None],
-    ) -> None:
+    def __init__(self, node: GuardedLifecycleNode, owners: Mapping[str, Sequence[str]],
+                 take: Callable[[dict[str, Any]], None]) -> None:
         """Listen, and ask the owners that are there."""
         self._node, self._take = node, take
         self._names = {owner: tuple(names) for owner, names in owners.items()}
         space = node.get_namespace().rstrip('/')
         self._owners = {f'{space}/{owner}': owner for owner in owners}
         self._events = node.create_subscription(
-            ParameterEvent,
-            '/parameter_events',
-            self._on_event,
-            qos_profile_parameter_events,
-            raw=True,
-        )
+            ParameterEvent, '/parameter_events', self._on_event, qos_profile_parameter_events,
+            raw=True)
         self._read = serialized_reader(ParameterEvent)
-        self._askers = {
-            owner: node.create_client(GetParameters, f'{owner}/get_parameters') for owner in owners
-        }
+        self._askers = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
+                        for owner in owners}
         self._pending: dict[str, Future] = {}
-        self._timer = node.create_timer(
-            ASK_EVERY_S, self._ask, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        self._timer = node.create_steady_timer(ASK_EVERY_S, self._ask)
 
     def end(self) -> None:
         """Stop following."""
@@ -81,17 +68,13 @@ class ParameterFollower:
     def _on_event(self, data: bytes) -> None:
         event: ParameterEvent = self._read(data)
         owner = self._owners.get(event.node)
-        if owner is not None:
-            self._tell(owner, [*event.new_parameters, *event.changed_parameters])
-
-    def _tell(self, owner: str, parameters: Iterable[ParameterMessage]) -> None:
+        if owner is None:
+            return
         names = self._names[owner]
         try:
-            values = {
-                entry.name: plain(Parameter.from_parameter_msg(entry).value)
-                for entry in parameters
-                if entry.name in names
-            }
+            values = {entry.name: plain(Parameter.from_parameter_msg(entry).value)
+                      for entry in (*event.new_parameters, *event.changed_parameters)
+                      if entry.name in names}
         except (TypeError, ValueError) as error:
             raise DataError(f'a value of {owner} cannot be read: {error}') from None
         if values:

@@ -34,6 +34,7 @@ from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, partners
 from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.suite_table import KINDS
 
 P = TypeVar('P', bound=Parameters)
 Readers = Mapping[str, Callable[[Any], Any]]
@@ -55,8 +56,9 @@ class SuiteNode(GuardedLifecycleNode):
     ----------
     KIND : str
         Kind of node in the interfaces table, also the name of its executable.
-    PARAMETER_SETS : tuple of Parameters classes
-        Parameter sets beyond :class:`~dmp_cpg_ros.nodes.framework.parameters.NodeParameters`.
+    PARAMETER_SETS : tuple of Parameters classes, optional
+        Parameter sets beyond :class:`~dmp_cpg_ros.nodes.framework.parameters.NodeParameters`;
+        default those of its kind in the table of nodes, and ``lock_step``.
     CHANGEABLE : collection of str
         Parameters that may change while the node runs; all others are read-only. Those that
         another node owns are refused with its name, and change only by :meth:`follow`.
@@ -125,8 +127,8 @@ class SuiteNode(GuardedLifecycleNode):
     @classmethod
     def parameter_table(cls) -> parameters.ParameterTable:
         """All parameters of this kind of node."""
-        return parameters.ParameterTable(
-            (parameters.NodeParameters, *cls.PARAMETER_SETS), cls.CHANGEABLE)
+        sets = cls.PARAMETER_SETS or (*KINDS[cls.KIND].sets, parameters.LockStepParameters)
+        return parameters.ParameterTable((parameters.NodeParameters, *sets), cls.CHANGEABLE)
 
     @classmethod
     def default_name(cls, arguments: Sequence[str]) -> str:

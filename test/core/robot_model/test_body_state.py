@@ -22,7 +22,6 @@ from ros_processes import Processes, Ros
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
-from dmp_cpg_ros.nodes.inputs.body_state import sensor_readings
 from dmp_cpg_ros.nodes.messages.cdr import Serialized
 from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.interfaces import interface
@@ -33,6 +32,7 @@ from dmp_cpg_ros.nodes.messages.robot_state import (
     read_imu,
     read_odom,
 )
+from dmp_cpg_ros.nodes.posture_control import sensor_readings
 
 processes, ros_domain, ros = ros_processes.processes, ros_processes.ros_domain, ros_processes.ros
 

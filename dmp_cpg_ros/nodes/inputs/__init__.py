@@ -1,3 +1,0 @@
-# Copyright 2026 The dmp_cpg_ros authors
-# SPDX-License-Identifier: Apache-2.0
-"""What nodes listen to beside their neighbours in the data flow."""

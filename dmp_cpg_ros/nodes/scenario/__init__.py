@@ -1,3 +1,0 @@
-# Copyright 2026 The dmp_cpg_ros authors
-# SPDX-License-Identifier: Apache-2.0
-"""Parts of the scenario player."""
