@@ -58,7 +58,7 @@ def run(name: str) -> int:
                   file=sys.stderr)
             return BAD_INPUT
         if _folder(name) == 'nodes':
-            return int(import_module(f'{PACKAGE}.nodes.framework.execution').run_kind(name))
+            return int(import_module(f'{PACKAGE}.nodes.framework.execution').run_node(name))
         return int(import_module(_module(name)).main())
     except KeyboardInterrupt:
         return INTERRUPTED

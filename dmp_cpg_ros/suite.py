@@ -11,24 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
+from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
-from dmp_cpg_ros.core.suite_parameters import (
-    PART_OF,
-    GaitParameters,
-    RobotFileParameters,
-    RobotParameters,
-    SuiteParameters,
-    TickParameters,
-    chosen_world,
-)
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.primitive_files import load_motion
-from dmp_cpg_ros.suite_table import CANONICAL, KINDS, LEG, ROBOT, WALKING
+from dmp_cpg_ros.suite_table import KINDS, LEG, ROBOT, WALKING
 
 DEFAULT_FILE = 'suite.yaml'
 """Parameter file of the package, in the config folder."""
@@ -58,9 +50,9 @@ class Suite:
         The parameter file itself.
     """
 
-    parameters: SuiteParameters
+    parameters: core.SuiteParameters
     gait: Gait
-    robot: RobotParameters
+    robot: core.RobotParameters
     sensors: SensorParameters
     world: World
     tick_ns: int
@@ -100,11 +92,8 @@ def load_gait(name: str, file: str | Path = 'gaits.yaml') -> Gait:
     return gaits[name]
 
 
-def load_suite(
-    file: str | Path | None = None,
-    overrides: Mapping[str, Any] | None = None,
-    namespace: str = '',
-) -> Suite:
+def load_suite(file: str | Path | None = None, overrides: Mapping[str, Any] | None = None,
+               namespace: str = '') -> Suite:
     """Read a parameter file.
 
     Parameters
@@ -130,36 +119,27 @@ def load_suite(
     for name in overrides:
         if name not in SUITE_NAMES:
             raise ParameterError(
-                f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}"
-            )
+                f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}")
     content = load_yaml(path)
-    sets = {kind.name: _node_sets(content, path, kind.name, overrides, namespace)
+    sets = {kind.name: node_sets(path, kind.name, overrides, namespace, content=content)
             for kind in WALKING}
-    canonical, robot = sets[CANONICAL], sets[ROBOT]
+    canonical, robot = sets[core.CANONICAL], sets[ROBOT]
     parameters = dataclasses.replace(
-        SuiteParameters.of(
-            {part: sets[node][part] for node, parts in PART_OF.items() for part in parts}),
+        core.SuiteParameters.of(
+            {part: sets[node][part] for node, parts in core.PART_OF.items() for part in parts}),
         motion=load_motion(sets[LEG][LegParameters].motion))
-    gait = canonical[GaitParameters]
+    gait = canonical[core.GaitParameters]
     return Suite(
-        parameters,
-        load_gait(gait.gait, gait.gaits_file),
-        robot[RobotParameters],
+        parameters, load_gait(gait.gait, gait.gaits_file), robot[core.RobotParameters],
         robot[SensorParameters],
-        chosen_world(robot[WorldParameters], robot[RobotParameters]),
-        robot[TickParameters].tick_ns,
-        find_config(robot[RobotFileParameters].robot),
-        path,
-    )
+        core.chosen_world(robot[WorldParameters], robot[core.RobotParameters]),
+        robot[core.TickParameters].tick_ns, find_config(robot[core.RobotFileParameters].robot),
+        path)
 
 
-def node_sets(
-    path: Path,
-    kind: str,
-    overrides: Mapping[str, Any] | None = None,
-    namespace: str = '',
-    name: str | None = None,
-) -> dict[type[Any], Any]:
+def node_sets(path: Path, kind: str, overrides: Mapping[str, Any] | None = None,
+              namespace: str = '', name: str | None = None,
+              content: Mapping[str, Any] | None = None) -> dict[type[Any], Any]:
     """Parameter sets of one node from a parameter file.
 
     Values for other nodes under ``/**`` are left aside; names that no node has are errors.
@@ -176,6 +156,8 @@ def node_sets(
         Namespace of the node.
     name : str, optional
         Its name, where there are several of the kind; the first of them without.
+    content : mapping, optional
+        Of the file, where it has been read already.
 
     Returns
     -------
@@ -186,21 +168,12 @@ def node_sets(
     DmpCpgError
         As :func:`load_suite`.
     """
-    return _node_sets(load_yaml(path), path, kind, overrides or {}, namespace, name)
-
-
-def _node_sets(
-    content: Mapping[str, Any], path: Path, kind: str, overrides: Mapping[str, Any],
-    namespace: str = '', name: str | None = None,
-) -> dict[type[Any], Any]:
     node = f'{namespace.rstrip("/")}/{name or next(iter(KINDS[kind].instances))}'
-    given = {**node_parameters(content, node, path), **overrides}
-    for name in given:
-        if name not in SUITE_NAMES and name not in NODE_NAMES:
-            raise ParameterError(
-                f"'{path}', {node}: there is no parameter '{name}'; valid are "
-                f'{", ".join(sorted(SUITE_NAMES))}'
-            )
+    content = load_yaml(path) if content is None else content
+    given = {**node_parameters(content, node, path), **(overrides or {})}
+    for unknown in given.keys() - SUITE_NAMES - NODE_NAMES:
+        raise ParameterError(f"'{path}', {node}: there is no parameter '{unknown}'; valid are "
+                             f'{", ".join(sorted(SUITE_NAMES))}')
     sets: dict[type[Any], Any] = {}
     for cls in KINDS[kind].sets:
         names = {field.name for field in dataclasses.fields(cls)}
@@ -211,23 +184,10 @@ def _node_sets(
     return sets
 
 
-SUITE_NAMES = frozenset(
-    field.name
-    for kind in WALKING
-    for cls in kind.sets
-    for field in dataclasses.fields(cls)
-)
+SUITE_NAMES = frozenset(field.name for kind in WALKING for cls in kind.sets
+                        for field in dataclasses.fields(cls))
 """Names of all parameters of all parts."""
 
-NODE_NAMES = (
-    'autostart',
-    'executor',
-    'expected_nodes',
-    'lock_step',
-    'use_sim_time',
-    'storage',
-    'output',
-    'topics',
-    'flush_period',
-)
+NODE_NAMES = frozenset(('autostart', 'executor', 'expected_nodes', 'lock_step', 'use_sim_time',
+                        'storage', 'output', 'topics', 'flush_period'))
 """Parameters that nodes have as nodes, not for their part of the core."""

@@ -12,6 +12,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingSwitch
@@ -20,19 +21,6 @@ from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
-from dmp_cpg_ros.core.suite_parameters import (
-    CANONICAL,
-    CERTIFIED,
-    INHIBITION,
-    REFERENCE,
-    CertificateParameters,
-    CommandParameters,
-    GaitParameters,
-    LegChoice,
-    RobotFileParameters,
-    RobotParameters,
-    TickParameters,
-)
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 LEG, POSTURE, ROBOT, RECORDER = (
@@ -79,18 +67,18 @@ def _single(name: str, class_name: str, *sets: type[Parameters]) -> Kind:
 
 
 SUITE_TABLE: tuple[Kind, ...] = (
-    _single(REFERENCE, 'ReferenceFilter',
-            *CERTIFIED, CommandParameters, CertificateParameters),
-    _single(CANONICAL, 'CanonicalOscillators', *CERTIFIED, CertificateParameters),
-    _single(INHIBITION, 'InhibitionNode',
-            *CERTIFIED, CommandParameters, CertificateParameters, VoteSourceParameters),
+    _single(core.REFERENCE, 'ReferenceFilter',
+            *core.CERTIFIED, core.CommandParameters, core.CertificateParameters),
+    _single(core.CANONICAL, 'CanonicalOscillators', *core.CERTIFIED, core.CertificateParameters),
+    _single(core.INHIBITION, 'InhibitionNode', *core.CERTIFIED, core.CommandParameters,
+            core.CertificateParameters, VoteSourceParameters),
     _single(POSTURE, 'PostureControl', PostureParameters, ModeParameters, EstimationParameters,
-            StateSourceParameters, GaitParameters, RobotFileParameters),
+            StateSourceParameters, core.GaitParameters, core.RobotFileParameters),
     Kind(LEG, 'LegTransformation',
-         (LegChoice, LegParameters, GaitParameters, RobotFileParameters),
+         (core.LegChoice, LegParameters, core.GaitParameters, core.RobotFileParameters),
          {f'{LEG}_{leg}': {'leg': leg} for leg in LEGS}),
-    _single(ROBOT, 'MujocoRobotNode', RobotParameters, SensorParameters, WorldParameters,
-            StateSourceParameters, TickParameters, RobotFileParameters, VotingSwitch),
+    _single(ROBOT, 'MujocoRobotNode', core.RobotParameters, SensorParameters, WorldParameters,
+            StateSourceParameters, core.TickParameters, core.RobotFileParameters, VotingSwitch),
     _single(RECORDER, 'BagRecorder'),
 )
 """All kinds of nodes in the order of the data flow; the robot comes last of those that walk, so

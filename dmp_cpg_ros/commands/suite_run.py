@@ -32,7 +32,7 @@ from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, already_runn
 from dmp_cpg_ros.nodes.framework.execution import make_executor, prepare_middleware
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers
 from dmp_cpg_ros.nodes.messages.interfaces import interface
-from dmp_cpg_ros.nodes.scenario_player import LyingDown, ScenarioPlayer
+from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES, instances
 
 READY_WITHIN_S = 120.0
@@ -181,8 +181,6 @@ def run_suite(plan: RunPlan, say: Say) -> None:
             player = ScenarioPlayer(plan.scenario, plan.tick_ns, plan.lock_step, say)
             executor = make_executor('events')
             executor.add_node(player)
-            # In lock-step no time passes that nobody asks for: nothing can fall.
-            lying_down = None if plan.lock_step else LyingDown(player, say)
             watch = _Watch(executor, player, group, interrupted, say)
             try:
                 watch.until_ready([*WALKING_NODES, RECORDER])
@@ -190,8 +188,9 @@ def run_suite(plan: RunPlan, say: Say) -> None:
                 watch.until(player.finished, float('inf'))
                 player.finished.result()
             finally:
-                if lying_down is not None and player.time_ns > 0:
-                    watch.lay_down(lying_down)
+                # In lock-step no time passes that nobody asks for: nothing can fall.
+                if not plan.lock_step and player.time_ns > 0:
+                    watch.lay_down()
                 watch.finish_work()
                 executor.remove_node(player)
                 player.destroy_node()
@@ -271,7 +270,7 @@ class _Watch:
                 self._say(math.nan, f'waiting for {waiting}')
             self.until(Future(), SLICE_S)
 
-    def lay_down(self, lying_down: LyingDown) -> None:
+    def lay_down(self) -> None:
         """End the recording, then lay the robot down; a second Ctrl-C cuts it short."""
         if self._group.ended():
             return
@@ -281,7 +280,7 @@ class _Watch:
             for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
                 self._change_state(RECORDER, transition)
             self._recording = False
-            down, deadline = lying_down.begin(), time.monotonic() + LYING_WITHIN_S
+            down, deadline = self._player.lie_down(), time.monotonic() + LYING_WITHIN_S
             while len(interrupted) == begun and time.monotonic() < deadline:
                 if self.until(down, SLICE_S):
                     return

@@ -18,8 +18,7 @@ from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, VelocityCommand
-from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader
-from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
+from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 
 STEPS = {'w': (0.1, 0.0), 's': (-0.1, 0.0), 'a': (0.0, 0.2), 'd': (0.0, -0.2)}

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -108,22 +108,18 @@ class BagRecorder(SuiteNode):
             name=list(self._bag.counts), position=list(map(float, self._bag.counts.values()))))
 
     def _record(self, topic: Interface, stamped: bool, clock: bool) -> Any:
-        """Subscribe; the writer needs the full name that only the subscription knows."""
-        writers: list[Callable[[bytes], None]] = []
+        write = self._bag.add_topic(
+            self.resolve_topic_name(topic.name), topic.type_name, topic.publisher_qos,
+            stamped=stamped, clock=clock)
         is_tick = topic.name == TICK_TOPIC
 
         def receive(data: bytes) -> None:
-            writers[0](data)
+            write(data)
             if is_tick:
                 self.begin_tick(self._bag.newest_ns or 0)
                 self.end_tick()
 
-        subscription = self.listen(topic, receive, raw=True, qos=topic.recorder_qos)
-        assert subscription is not None, 'the recorder is a process of its own'
-        writers.append(self._bag.add_topic(
-            subscription.topic_name, topic.type_name, topic.publisher_qos, stamped=stamped,
-            clock=clock))
-        return subscription
+        return self.listen(topic, receive, raw=True, qos=topic.recorder_qos)
 
 
 def _bears_robot_time(topic: Interface) -> bool:

@@ -24,11 +24,7 @@ from dmp_cpg_ros.core.suite_parameters import CANONICAL, CertificateParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages.conversions import (
-    CanonicalStateWriter,
-    InhibitionGainsReader,
-    read_reference,
-)
+from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader
 from dmp_cpg_ros.nodes.messages.values import stamped
 
@@ -60,12 +56,13 @@ class CanonicalOscillators(SuiteNode):
         self._inhibition = initial_inhibition(inhibition)
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
-        self._writer = CanonicalStateWriter(tuple(gaits.gaits))
+        self._writer = conversions.CanonicalStateWriter(tuple(gaits.gaits))
         self._publisher = self.publisher('canonical_state')
         feedback = self.parameters_of(CanonicalParameters).contact_feedback
         contacts = {'foot_contacts': stamped(FootContactsReader().read)} if feedback else {}
-        self.match('reference', {'reference': read_reference, **contacts}, optional=contacts,
-                   delayed={'inhibition_gains': InhibitionGainsReader().read})
+        self.match('reference', {'reference': conversions.read_reference, **contacts},
+                   delayed={'inhibition_gains': conversions.InhibitionGainsReader().read},
+                   optional=contacts)
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""

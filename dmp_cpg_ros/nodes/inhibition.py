@@ -30,14 +30,7 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages.conversions import (
-    CanonicalStateReader,
-    CommandReader,
-    InhibitionGainsWriter,
-    read_reference,
-    read_votes,
-)
-from dmp_cpg_ros.nodes.messages.inhibition_state import inhibition_state
+from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, read_imu
 from dmp_cpg_ros.nodes.messages.values import Array, stamped
 
@@ -67,18 +60,18 @@ class InhibitionNode(SuiteNode):
         self._predicted = self._bound = nan
         self._told: tuple[Any, ...] = ()
         self._publisher = self.publisher('inhibition_state')
-        self._gains_writer = InhibitionGainsWriter()
+        self._gains_writer = conversions.InhibitionGainsWriter()
         self._gains_publisher = self.publisher('inhibition_gains')
-        body, sensors = CommandReader(), {}
+        body, sensors = conversions.CommandReader(), {}
         if self._voting.voting.voting:
             sensors = {'foot_contacts': stamped(FootContactsReader().read),
                        'imu': stamped(read_imu)}
-            self.listen('votes', lambda message: self._inbox.accept(*read_votes(message)),
-                        command=True)
+            self.listen('votes', command=True, callback=lambda message: self._inbox.accept(
+                *conversions.read_votes(message)))
         mode = {'posture_feedback': lambda message: body.read(message).mode}
         self.match('canonical_state', {
-            'canonical_state': CanonicalStateReader(gaits).read,
-            'reference': read_reference,
+            'canonical_state': conversions.CanonicalStateReader(gaits).read,
+            'reference': conversions.read_reference,
             **sensors,
             **(mode if self.lock_step else {}),
         }, delayed={} if self.lock_step else mode, optional=sensors)
@@ -227,7 +220,7 @@ class InhibitionNode(SuiteNode):
         if self._voting.voting.voting:
             votes = {**_by_leg('vote', state.tally.weights), 'voted': state.voted,
                      'asked': state.asked, 'cause': state.tally.cause}
-        self._publisher.publish(inhibition_state(state.time_ns, state.word, {
+        self._publisher.publish(conversions.inhibition_state(state.time_ns, state.word, {
             'requested': state.requested,
             'armed': state.armed,
             'automatic': state.automatic,

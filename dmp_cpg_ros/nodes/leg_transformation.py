@@ -16,12 +16,7 @@ from dmp_cpg_ros.core.suite_parameters import LegChoice
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages.conversions import (
-    CanonicalStateReader,
-    JointTargetsWriter,
-    PostureFeedbackReader,
-    read_reference,
-)
+from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.robot_state import JointsReader
 from dmp_cpg_ros.primitive_files import load_motion
 from dmp_cpg_ros.suite_table import KINDS, LEG
@@ -51,11 +46,12 @@ class LegTransformation(SuiteNode):
         self._leg = LegControl(
             leg, description, parameters, Movements(description), load_motion(parameters.motion))
         self._state = self._leg.initial_state()
-        self._writer, self._publisher = JointTargetsWriter(leg), self.publisher('joint_targets')
+        self._writer = conversions.JointTargetsWriter(leg)
+        self._publisher = self.publisher('joint_targets')
         readers: dict[str, Callable[[Any], Any]] = {
-            'canonical_state': CanonicalStateReader(gaits).read,
-            'reference': read_reference,
-            'posture_feedback': PostureFeedbackReader().read,
+            'canonical_state': conversions.CanonicalStateReader(gaits).read,
+            'reference': conversions.read_reference,
+            'posture_feedback': conversions.PostureFeedbackReader().read,
         }
         if parameters.reading == 'torque':
             readers['joint_states'] = JointsReader().read

@@ -24,11 +24,7 @@ from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers, RobotTiming
 from dmp_cpg_ros.nodes.framework.parameters import NodeParameters
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages.conversions import (
-    JointTargetsReader,
-    read_body_mode,
-    read_push_force,
-)
+from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS, Interface
 from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
@@ -58,8 +54,8 @@ VOTING_TOPICS = ('imu', 'foot_contacts')
 """What the inhibition reads when sensors can vote."""
 
 STATE_TOPICS = ('/clock', 'imu', 'odom', 'foot_contacts', 'joint_states')
-"""What the robot publishes at every tick, the tick itself last: between nodes of one process what it
-leads to runs before its publication ends.
+"""What the robot publishes at every tick, the tick itself last: between nodes of one process, what
+it leads to runs before its publication ends.
 """
 
 RETREATS = {
@@ -83,7 +79,7 @@ class MujocoRobotNode(SuiteNode):
         self._guard = self._new_guard()
         self._body_mode = 'standing' if self._options.start_pose == 'standing' else 'lying'
         self._timing, self._writer, self._reader = (
-            RobotTiming(), RobotStateWriter(), JointTargetsReader())
+            RobotTiming(), RobotStateWriter(), conversions.JointTargetsReader())
         self._state = self._robot.reset()
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._silent_ns = -1
@@ -206,7 +202,7 @@ class MujocoRobotNode(SuiteNode):
 
     def _on_body_mode(self, message: Any) -> None:
         """Know when lying is no fall; a fall is over when the robot stands again."""
-        mode = read_body_mode(message)
+        mode = conversions.read_body_mode(message)
         if mode == 'standing' and self._body_mode != 'standing':
             self._fell = False
             self.clear('fell')
@@ -226,7 +222,7 @@ class MujocoRobotNode(SuiteNode):
             self._hold()
 
     def _on_push(self, message: Any) -> None:
-        force, take = read_push_force(message), getattr(self._robot, 'take_push', None)
+        force, take = conversions.read_push_force(message), getattr(self._robot, 'take_push', None)
         if take is None:
             raise DataError(f'physics: {self._options.physics} knows no forces; '
                             'physics: mujoco does')

@@ -29,20 +29,8 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
-from dmp_cpg_ros.nodes.messages.conversions import (
-    CanonicalStateReader,
-    PostureFeedbackWriter,
-    read_reference,
-)
+from dmp_cpg_ros.nodes.messages import conversions, robot_state
 from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS
-from dmp_cpg_ros.nodes.messages.robot_state import (
-    BaseMotion,
-    FootContactsReader,
-    JointsReader,
-    OdometryWriter,
-    read_imu,
-    read_odom,
-)
 from dmp_cpg_ros.nodes.messages.values import stamped
 from dmp_cpg_ros.suite_table import POSTURE
 
@@ -80,16 +68,18 @@ class BodyState:
         self._memory: EstimatorState | None = None
         self._estimator: BodyEstimator | None = None
         self.optional: tuple[str, ...] = ()
-        self.readers: dict[str, Callable[[Any], Any]] = {'joint_states': JointsReader().read}
+        self.readers: dict[str, Callable[[Any], Any]] = {
+            'joint_states': robot_state.JointsReader().read}
         if node.parameters_of(StateSourceParameters).state_source != ESTIMATE:
-            self.readers['odom'] = read_odom
+            self.readers['odom'] = robot_state.read_odom
             return
         self.optional = BODY_TOPICS[ESTIMATE]
-        self.readers |= {'imu': stamped(read_imu),
-                         'foot_contacts': stamped(FootContactsReader().read)}
+        self.readers |= {'imu': stamped(robot_state.read_imu),
+                         'foot_contacts': stamped(robot_state.FootContactsReader().read)}
         self._estimator = BodyEstimator(
             description, node.parameters_of(EstimationParameters), legs)
-        self._writer, self._publisher = OdometryWriter(), node.publisher('estimated_odom')
+        self._writer = robot_state.OdometryWriter()
+        self._publisher = node.publisher('estimated_odom')
         self._published, self._problem_ns = -1, 0
         self.on_parameters()
 
@@ -114,7 +104,7 @@ class BodyState:
         """
         if self._estimator is None:
             position, velocity, effort = values['joint_states']
-            base: BaseMotion = values['odom']
+            base: robot_state.BaseMotion = values['odom']
             return RobotState(stamp_ns, position, velocity, effort, *base, np.zeros(3),
                               np.zeros(len(LEGS)))
         readings = sensor_readings(stamp_ns, values)
@@ -178,7 +168,7 @@ class PostureControl(SuiteNode):
 
     def configure(self) -> None:
         """Build the controller and its topics."""
-        canonical = CanonicalStateReader(known_gaits(self))
+        canonical = conversions.CanonicalStateReader(known_gaits(self))
         description = description_of(self)
         legs = RobotLegs(description)
         self._body = BodyState(self, description, legs)
@@ -187,10 +177,11 @@ class PostureControl(SuiteNode):
             self.parameters_of(ModeParameters), legs)
         self._state, self._told = self._control.initial_state(), ''
         self._mode_publisher = self.publisher('body_mode')
-        self._writer, self._publisher = PostureFeedbackWriter(), self.publisher('posture_feedback')
+        self._writer = conversions.PostureFeedbackWriter()
+        self._publisher = self.publisher('posture_feedback')
         self.match('canonical_state', {
             **self._body.readers,
-            'reference': read_reference,
+            'reference': conversions.read_reference,
             'canonical_state': canonical.read,
         }, optional=self._body.optional)
         for what in REQUESTS:

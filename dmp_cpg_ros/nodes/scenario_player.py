@@ -6,26 +6,28 @@ the robot down at the end.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, WrenchStamped
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.core.errors import DataError, DmpCpgError
+from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.scenario.events import Command
 from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.nodes.framework.parameter_services import ParameterSetter
-from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
-from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
+from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
+from dmp_cpg_ros.nodes.framework.parameters import plain, ros_value
+from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
 
@@ -95,6 +97,70 @@ class AcknowledgedTopic:
             then()
 
 
+class ParameterSetter:
+    """Calls the nodes' own parameter services, as ``ros2 param set`` does.
+
+    Parameters
+    ----------
+    node : Node
+        Who asks.
+    """
+
+    def __init__(self, node: Node) -> None:
+        """Create the clients."""
+        self._setters = {owner: node.create_client(
+            SetParametersAtomically, f'{owner}/set_parameters_atomically') for owner in CHANGEABLE}
+        self._getters = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
+                         for owner in CHANGEABLE}
+
+    def connected(self) -> bool:
+        """Whether all services are there."""
+        return all(client.service_is_ready()
+                   for client in (*self._setters.values(), *self._getters.values()))
+
+    def set(self, values: Mapping[str, Any], done: Callable[[str], None]) -> None:
+        """Ask for a change.
+
+        Parameters
+        ----------
+        values : mapping of str to value
+            Parameters of one owner.
+        done : callable (reason)
+            Called with why the change is refused, or with an empty text once the owner has
+            accepted it and all followers know it.
+        """
+        owner = OWNER[next(iter(values))]
+        wanted = {name: ros_value(value) for name, value in values.items()}
+        request = SetParametersAtomically.Request(parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in wanted.items()])
+
+        def answered(future: Future) -> None:
+            answer = future.result()
+            if answer is None or not answer.result.successful:
+                done('no answer' if answer is None else answer.result.reason)
+                return
+            self._await([node for node in CHANGEABLE if node != owner], wanted, done)
+
+        self._setters[owner].call_async(request).add_done_callback(answered)
+
+    def _await(self, followers: list[str], wanted: Mapping[str, Any],
+               done: Callable[[str], None]) -> None:
+        """Ask each follower until it has the values."""
+        if not followers:
+            done('')
+            return
+
+        def answered(future: Future) -> None:
+            answer = future.result()
+            known = [] if answer is None else [
+                plain(parameter_value_to_python(value)) for value in answer.values]
+            follow = followers[1:] if known == list(wanted.values()) else followers
+            self._await(follow, wanted, done)
+
+        request = GetParameters.Request(names=list(wanted))
+        self._getters[followers[0]].call_async(request).add_done_callback(answered)
+
+
 class ScenarioPlayer(Node):  # type: ignore[misc]
     """Holds the robot's gate and lets a tick pass when everything that is to act in it has been
     delivered.
@@ -130,6 +196,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._begun, self._busy, self._word = False, False, ''
         self._holding_ns, self._inhibition_ns = -1, -1
         self.time_ns, self.mode, self.finished = 0, '', Future()
+        self._lain: Future | None = None
         voting = any(action.kind == 'votes' for action in self._actions)
         self._topics = {name: AcknowledgedTopic(self, name) for name in (
             'cmd_vel', 'push', *(['votes'] if voting else []))}
@@ -284,6 +351,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             known, self.mode = self.mode, mode
             if known or mode != 'standing':
                 self._say(self.time_ns * 1e-9, mode)
+        self._watch_lying()
 
     def _set(self, values: dict[str, Any]) -> None:
         """Ask the owner for a change; the robot walks on when it is refused."""
@@ -298,6 +366,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     def _on_clock(self, message: Clock) -> None:
         self.time_ns = stamp_ns(message.clock)
+        self._watch_lying()
         if not self._begun or self.finished.done():
             return
         if self.time_ns >= self._end_ns:
@@ -305,62 +374,39 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         elif not self._busy:
             self._deliver_due()
 
+    def lie_down(self) -> Future:
+        """Lay the robot down at the end of a real-time run, so that it does not drop; the future
+        holds how it ended, in words, once it has.
+        """
+        if not self.finished.done():
+            self.finished.set_result(None)
+        lain = self._lain = Future()
+        self._deadline_ns = self.time_ns + PATIENCE_NS
+
+        def answered(future: Future) -> None:
+            answer = future.result()
+            if answer is None or not answer.success:
+                self._end_lying(f'refused: {"no answer" if answer is None else answer.message}')
+            else:
+                self._say(self.time_ns * 1e-9, f'  lie_down: {answer.message}')
+
+        self._watch_lying()
+        if not lain.done():
+            self._callees['lie_down'].call_async(Trigger.Request()).add_done_callback(answered)
+        return lain
+
+    def _watch_lying(self) -> None:
+        if self.mode in ('lying', 'damped'):
+            self._end_lying(f'it is {self.mode}')
+        elif self._lain is not None and self.time_ns > self._deadline_ns:
+            self._end_lying(f'it is still {self.mode} after {PATIENCE_NS * 1e-9:g} s')
+
+    def _end_lying(self, how: str) -> None:
+        if self._lain is not None and not self._lain.done():
+            self._lain.set_result(how)
+            self._say(self.time_ns * 1e-9, how)
+
     def _open(self, until_ns: int) -> None:
         message: Any = Clock()
         set_stamp(message.clock, until_ns)
         self._gate.publish(message)
-
-
-class LyingDown:
-    """Asks for ``lie_down`` and watches until the robot lies.
-
-    Parameters
-    ----------
-    node : Node
-        Whose topics and service it uses.
-    say : callable (time_s, text)
-        Told what happens.
-    """
-
-    def __init__(self, node: Node, say: Callable[[float, str], None]) -> None:
-        """Create client and subscriptions; nothing is asked before :meth:`begin`."""
-        self._say, self._time_ns, self._deadline_ns = say, 0, 0
-        self._mode, self._done = '', Future()
-        self._client = node.create_client(Trigger, interface('lie_down').name)
-        for name, callback in (('body_mode', self._on_mode), ('/clock', self._on_clock)):
-            topic = interface(name)
-            node.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
-
-    def begin(self) -> Future:
-        """Ask; the future holds how it ended, in words, once it has."""
-        self._deadline_ns = self._time_ns + PATIENCE_NS
-        if self._mode in ('lying', 'damped'):
-            self._end(f'it is {self._mode}')
-        else:
-            self._client.call_async(Trigger.Request()).add_done_callback(self._answered)
-        return self._done
-
-    def _answered(self, future: Future) -> None:
-        answer = future.result()
-        if answer is None or not answer.success:
-            self._end(f'refused: {"no answer" if answer is None else answer.message}')
-        else:
-            self._say(self._time_ns * 1e-9, f'  lie_down: {answer.message}')
-
-    def _on_mode(self, message: String) -> None:
-        try:
-            self._mode = read_body_mode(message)
-        except DataError:
-            return
-        if self._deadline_ns and self._mode in ('lying', 'damped'):
-            self._end(f'it is {self._mode}')
-
-    def _on_clock(self, message: Clock) -> None:
-        self._time_ns = stamp_ns(message.clock)
-        if self._deadline_ns and self._time_ns > self._deadline_ns:
-            self._end(f'it is still {self._mode} after {PATIENCE_NS * 1e-9:g} s')
-
-    def _end(self, how: str) -> None:
-        if not self._done.done():
-            self._done.set_result(how)
-            self._say(self._time_ns * 1e-9, how)

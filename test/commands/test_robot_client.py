@@ -26,8 +26,7 @@ from ros_processes import NodeProcess, Processes, Ros, reserved_domain, wait_unt
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
-from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
-from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
+from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.suite_table import WALKING_NODES
 

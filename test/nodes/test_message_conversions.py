@@ -38,11 +38,12 @@ from dmp_cpg_ros.nodes.messages.conversions import (
     PostureFeedbackReader,
     PostureFeedbackWriter,
     ReferenceWriter,
+    inhibition_state,
     read_body_mode,
     read_reference,
+    read_state_word,
     read_twist,
 )
-from dmp_cpg_ros.nodes.messages.inhibition_state import inhibition_state, read_state_word
 from dmp_cpg_ros.nodes.messages.robot_state import (
     FootContactsReader,
     JointsReader,

@@ -14,35 +14,28 @@ from dataclasses import replace
 from math import nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rcl_interfaces.msg import ParameterEvent
+from rcl_interfaces.srv import GetParameters
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import qos_profile_parameter_events
+from rclpy.task import Future
+
+from dmp_cpg_ros.core import suite_parameters as suite
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.certificates import gate
 from dmp_cpg_ros.core.certificates.certify import Certificate
 from dmp_cpg_ros.core.certificates.changes import refused_change
-from dmp_cpg_ros.core.certificates.gate import (
-    UNCERTIFIED,
-    CertificateGate,
-    Running,
-    Verdict,
-    shown,
-)
-from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
-from dmp_cpg_ros.core.suite_parameters import (
-    CHANGEABLE,
-    OWNER,
-    CertificateParameters,
-    CommandParameters,
-    GaitParameters,
-    SuiteParameters,
-    TickParameters,
-)
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
-from dmp_cpg_ros.nodes.framework.parameter_services import ParameterFollower
+from dmp_cpg_ros.nodes.framework.parameters import plain
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.conversions import read_twist
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL
 
@@ -52,11 +45,93 @@ if TYPE_CHECKING:
 Sets = Mapping[type[Any], Any]
 """Parameter sets by their class."""
 
-JUDGED = (*OWNER, 'allow_uncertified')
+JUDGED = (*suite.OWNER, 'allow_uncertified')
 """Parameters that may change in a node with a certificate."""
 
 PROBLEM = 'certificate'
 """Key of the warning on ``/diagnostics``."""
+
+
+ASK_EVERY_S = 5.0
+"""Period of asking the owners [s]: what an event did not tell, because a node was not there yet or
+had to be started again, is known after this time.
+"""
+
+
+class ParameterFollower:
+    """Tells a node what the owners of some parameters have accepted.
+
+    Owners announce changes on ``/parameter_events``; they are also asked now and then.
+
+    Parameters
+    ----------
+    node : SuiteNode
+        The node that follows.
+    owners : mapping of str to sequence of str
+        Names of nodes in the same namespace, with the names of their parameters.
+    take : callable (values)
+        Told names and values whenever an owner says them, changed or not; what it raises is
+        counted as dropped.
+    """
+
+    def __init__(self, node: SuiteNode, owners: Mapping[str, Sequence[str]],
+                 take: Callable[[dict[str, Any]], None]) -> None:
+        """Listen, and ask the owners that are there."""
+        self._node, self._take = node, take
+        self._names = {owner: tuple(names) for owner, names in owners.items()}
+        space = node.get_namespace().rstrip('/')
+        self._owners = {f'{space}/{owner}': owner for owner in owners}
+        self._events = node.create_subscription(
+            ParameterEvent, '/parameter_events', self._on_event, qos_profile_parameter_events,
+            raw=True)
+        self._read = serialized_reader(ParameterEvent)
+        self._askers = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
+                        for owner in owners}
+        self._pending: dict[str, Future] = {}
+        self._timer = node.create_steady_timer(ASK_EVERY_S, self._ask)
+
+    def end(self) -> None:
+        """Stop following."""
+        self._node.destroy_timer(self._timer)
+        self._node.destroy_subscription(self._events)
+        for client in self._askers.values():
+            self._node.destroy_client(client)
+
+    def _on_event(self, data: bytes) -> None:
+        event: ParameterEvent = self._read(data)
+        owner = self._owners.get(event.node)
+        if owner is None:
+            return
+        names = self._names[owner]
+        try:
+            values = {entry.name: plain(Parameter.from_parameter_msg(entry).value)
+                      for entry in (*event.new_parameters, *event.changed_parameters)
+                      if entry.name in names}
+        except (TypeError, ValueError) as error:
+            raise DataError(f'a value of {owner} cannot be read: {error}') from None
+        if values:
+            self._take(values)
+
+    def _ask(self) -> None:
+        for owner, client in self._askers.items():
+            former = self._pending.pop(owner, None)
+            if former is not None and not former.done():
+                client.remove_pending_request(former)
+            if client.service_is_ready():
+                future = client.call_async(GetParameters.Request(names=self._names[owner]))
+                self._pending[owner] = future
+                future.add_done_callback(self._node.guarded(
+                    f'{owner}/get_parameters', self._answer_of(owner)))
+
+    def _answer_of(self, owner: str) -> Callable[[Future], None]:
+        def answered(future: Future) -> None:
+            answer, names = future.result(), self._names[owner]
+            if answer is not None and len(answer.values) == len(names):
+                values = map(parameter_value_to_python, answer.values)
+                self._take({name: plain(value)
+                            for name, value in zip(names, values, strict=True)})
+
+        return answered
 
 
 class Acting(NamedTuple):
@@ -104,9 +179,9 @@ class Certified:
         self.gaits, self._scale = known_gaits(node), body_scale(description_of(node))
         self._held: Certificate | None = None
         self._held_in: dict[str, Certificate] = {}
-        self._judged: Verdict | None = None
-        self._gate = CertificateGate(node.let_ticks_pass)
-        others = {owner: names for owner, names in CHANGEABLE.items() if owner != node.KIND}
+        self._judged: gate.Verdict | None = None
+        self._gate = gate.CertificateGate(node.let_ticks_pass)
+        others = {owner: names for owner, names in suite.CHANGEABLE.items() if owner != node.KIND}
         self._follower = ParameterFollower(node, others, node.follow)
 
     def end(self) -> None:
@@ -128,15 +203,15 @@ class Certified:
         running = self.running_in(gait)
         if running.moving:
             return running.certificate()
-        if running.gait.name == self._node.accepted[GaitParameters].gait:
+        if running.gait.name == self._node.accepted[suite.GaitParameters].gait:
             return self.certificate
         if gait.name not in self._held_in:
             self._held_in[gait.name] = running.certificate()
         return self._held_in[gait.name]
 
-    def running_in(self, gait: GaitInForce) -> Running:
+    def running_in(self, gait: GaitInForce) -> gate.Running:
         """What runs in a gait in force, or in a change between two."""
-        if gait.name == self._node.accepted[GaitParameters].gait:
+        if gait.name == self._node.accepted[suite.GaitParameters].gait:
             return self._running(self._node.accepted)
         ends = (gait.transition.before, gait.transition.after) if isinstance(
             gait, BlendedGait) else (gait,)
@@ -150,17 +225,18 @@ class Certified:
             self._node.warn(PROBLEM, f'WITHOUT a certificate: {self.certificate.explained()}',
                             error=True)
 
-    def _running(self, sets: Sets, names: Sequence[str] = ()) -> Running:
+    def _running(self, sets: Sets, names: Sequence[str] = ()) -> gate.Running:
         """What parameter sets describe, or the same with other gaits; raises ParameterError for a
         gait that there is not.
         """
         choice = sets[GaitChoiceParameters]
         chosen = choice.auto_gaits if choice.auto_gait else ()
-        names = names or (sets[GaitParameters].gait, *chosen)
+        names = names or (sets[suite.GaitParameters].gait, *chosen)
         gait, *others = [self.gaits.named(name) for name in dict.fromkeys(names)]
-        return Running(SuiteParameters.of(sets), gait, self._scale,
-                       sets[TickParameters].tick_ns * 1e-9, tuple(others),
-                       self._acting().cadence if self._node.configured else None)
+        return gate.Running(
+            suite.SuiteParameters.of(sets), gait, self._scale,
+            sets[suite.TickParameters].tick_ns * 1e-9, tuple(others),
+            self._acting().cadence if self._node.configured else None)
 
     # Changes -----------------------------------------------------------------------------------
 
@@ -178,7 +254,7 @@ class Certified:
         acting, changed = self._acting(), node.changed_values(sets)
         if acting.gaits:
             self._check_gait(acting.gaits, sets)
-        if not changed or UNCERTIFIED.issuperset(changed):
+        if not changed or gate.UNCERTIFIED.issuperset(changed):
             return
         running = self._running(sets)
         if node.following:
@@ -188,8 +264,8 @@ class Certified:
         if waits:
             raise ParameterError(waits)
         verdict = self._gate.judge(present, self.certificate, running)
-        if not verdict.accepted and not sets[CertificateParameters].allow_uncertified:
-            asked = ', '.join(f'{name} = {shown(value)}' for name, value in changed.items())
+        if not verdict.accepted and not sets[suite.CertificateParameters].allow_uncertified:
+            asked = ', '.join(f'{name} = {gate.shown(value)}' for name, value in changed.items())
             raise ParameterError(
                 f'{asked} would lose the certificate: {verdict.reason} '
                 '(allow_uncertified:=true changes it all the same)')
@@ -197,9 +273,9 @@ class Certified:
 
     def _check_gait(self, walked: tuple[Gait, ...], sets: Sets) -> None:
         """Refuse gaits that are not known, or whose changes are not certified."""
-        name, choice, named = sets[GaitParameters].gait, sets[GaitChoiceParameters], (
-            self.gaits.named)
-        asked = name != self._node.accepted[GaitParameters].gait
+        name, choice = sets[suite.GaitParameters].gait, sets[GaitChoiceParameters]
+        named = self.gaits.named
+        asked = name != self._node.accepted[suite.GaitParameters].gait
         chosen = choice.auto_gait and choice != self._node.accepted[GaitChoiceParameters]
         if asked:
             named(name)
@@ -211,9 +287,9 @@ class Certified:
             return
         news = choice.auto_gaits if chosen else (name,)
         gaits = [named(gait) for gait in (*(gait.name for gait in walked), *news)]
-        reason = refused_change(SuiteParameters.of(sets), gaits, self._scale,
-                                sets[TickParameters].tick_ns * 1e-9)
-        if reason and not sets[CertificateParameters].allow_uncertified:
+        reason = refused_change(suite.SuiteParameters.of(sets), gaits, self._scale,
+                                sets[suite.TickParameters].tick_ns * 1e-9)
+        if reason and not sets[suite.CertificateParameters].allow_uncertified:
             raise ParameterError(f'{reason} (allow_uncertified:=true changes all the same)')
 
     def accept(self) -> None:
@@ -237,23 +313,22 @@ class Certified:
                            of(GaitChangeParameters), of(GaitChoiceParameters), quarter)
 
     def commands(self) -> CommandGate:
-        """Gate of what comes on ``cmd_vel``."""
-        gate = CommandGate(self._node.parameters_of(ReferenceParameters), self._scale)
-        self.limit(gate)
-        if self._node.parameters_of(CommandParameters).stamped_cmd_vel:
-            self._node.listen(
-                STAMPED_CMD_VEL, lambda message: gate.accept(*read_twist(message.twist)),
-                command=True)
-        else:
-            self._node.listen(
-                'cmd_vel', lambda message: gate.accept(*read_twist(message)), command=True)
-        return gate
+        """What comes on ``cmd_vel``, limited."""
+        commands = CommandGate(self._node.parameters_of(ReferenceParameters), self._scale)
+        self.limit(commands)
+        stamped = self._node.parameters_of(suite.CommandParameters).stamped_cmd_vel
 
-    def limit(self, gate: CommandGate) -> None:
-        """Let a gate of commands follow the limits, those of the gait included."""
+        def take(message: Any) -> None:
+            commands.accept(*read_twist(message.twist if stamped else message))
+
+        self._node.listen(STAMPED_CMD_VEL if stamped else 'cmd_vel', take, command=True)
+        return commands
+
+    def limit(self, commands: CommandGate) -> None:
+        """Let commands follow the limits, those of the gait included."""
         of = self._node.parameters_of
-        gate.follow(of(ReferenceParameters), highest_speed(
-            of(GaitChoiceParameters), of(GaitParameters).gait, self.gaits.named))
+        commands.follow(of(ReferenceParameters), highest_speed(
+            of(GaitChoiceParameters), of(suite.GaitParameters).gait, self.gaits.named))
 
 
 def certificate_words(certificate: Certificate) -> str:

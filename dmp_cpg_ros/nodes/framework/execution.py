@@ -21,7 +21,6 @@ import traceback
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
-from types import FrameType
 
 import rclpy
 from rclpy.context import Context
@@ -56,13 +55,9 @@ def prepare_middleware() -> None:
     Other middlewares do not look at these variables. Processes that are started later inherit
     them.
     """
-    if any(os.environ.get(name) for name in VARIABLES):
-        return
-    if any(Path(name).is_file() for name in _IN_WORKING_FOLDER):
-        return
-    profile = str(find_config(PROFILE))
-    for name in VARIABLES:
-        os.environ[name] = profile
+    chosen = any(os.environ.get(name) for name in VARIABLES)
+    if not chosen and not any(Path(name).is_file() for name in _IN_WORKING_FOLDER):
+        os.environ.update(dict.fromkeys(VARIABLES, str(find_config(PROFILE))))
 
 
 _THREADS = '/proc/self/task'
@@ -135,20 +130,19 @@ def make_executor(kind: str, context: Context | None = None) -> Executor:
     return SingleThreadedExecutor(context=context)
 
 
-def spin(nodes: Node | Sequence[Node], kind: str = 'events', until: Future | None = None) -> None:
+def spin(nodes: Sequence[Node], kind: str, until: Future) -> None:
     """Run nodes of one context in one executor until it is shut down or a future is done.
 
     Parameters
     ----------
-    nodes : Node or sequence of Node
+    nodes : sequence of Node
         Several nodes make up a composed process.
     kind : str
         As for :func:`make_executor`.
-    until : Future, optional
+    until : Future
         Ends the run.
     """
-    nodes = [nodes] if isinstance(nodes, Node) else list(nodes)
-    context, until = nodes[0].context, until or Future()
+    context = nodes[0].context
     executor = make_executor(kind, context)
     # What start-up made stays; without this the collector would look through it in mid-tick. Ticks
     # leave no cycles behind, so it need not look often at what they make.
@@ -170,21 +164,8 @@ def spin(nodes: Node | Sequence[Node], kind: str = 'events', until: Future | Non
             executor.remove_node(node)
 
 
-def run_kind(name: str) -> int:
-    """Body of the executable of a kind of node."""
-    kind = KINDS[name]
-    return run_node(getattr(import_module(kind.module), kind.class_name))
-
-
-def run_node(node_class: type[SuiteNode], arguments: Sequence[str] | None = None) -> int:
-    """Run a node in this process.
-
-    Parameters
-    ----------
-    node_class : type of SuiteNode
-        Kind of node.
-    arguments : sequence of str, optional
-        Command line without the program's name; default that of the process.
+def run_node(kind: str) -> int:
+    """Body of the executable of a kind of node, with the command line of the process.
 
     Returns
     -------
@@ -192,12 +173,13 @@ def run_node(node_class: type[SuiteNode], arguments: Sequence[str] | None = None
         Exit status: 0 after Ctrl-C or SIGTERM, 2 when a parameter or argument is bad, 1 when
         something else failed.
     """
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
-    if {'-h', '--help'} & set(_before_ros_args(arguments)):
+    node_class = getattr(import_module(KINDS[kind].module), KINDS[kind].class_name)
+    arguments = sys.argv[1:]
+    own = arguments[:arguments.index('--ros-args')] if '--ros-args' in arguments else arguments
+    if {'-h', '--help'} & set(own):
         print(help_text(node_class))
         return OK
-    return run_nodes(node_class.KIND, arguments,
-                     lambda: [node_class(node_class.default_name(arguments))])
+    return run_nodes(kind, arguments, lambda: [node_class(node_class.default_name(arguments))])
 
 
 def run_nodes(program: str, arguments: Sequence[str],
@@ -251,21 +233,15 @@ def _status(program: str, body: Callable[[], object]) -> int:
     try:
         body()
     except _BAD_ARGUMENTS as error:
-        return _said(program, str(error), BAD_INPUT)
+        status, message = BAD_INPUT, str(error)
     except DmpCpgError as error:
-        return _said(program, str(error), FAILED)
+        status, message = FAILED, str(error)
     except Exception:  # noqa: BLE001 - the last resort of a process
-        return _said(program, traceback.format_exc(), FAILED)
-    return OK
-
-
-def _said(program: str, message: str, status: int) -> int:
+        status, message = FAILED, traceback.format_exc()
+    else:
+        return OK
     print(f'{program}: {message}', file=sys.stderr, flush=True)
     return status
-
-
-def _before_ros_args(arguments: list[str]) -> list[str]:
-    return arguments[:arguments.index('--ros-args')] if '--ros-args' in arguments else arguments
 
 
 def _first_signal() -> Future:
@@ -281,7 +257,7 @@ def _first_signal() -> Future:
     # executes none; the byte is written at once.
     signal.set_wakeup_fd(writable, warn_on_full_buffer=False)
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _ignore)
+        signal.signal(number, lambda *_: None)
 
     def wait() -> None:
         os.read(readable, 1)
@@ -289,7 +265,3 @@ def _first_signal() -> Future:
 
     threading.Thread(target=wait, daemon=True).start()
     return until
-
-
-def _ignore(signum: int, frame: FrameType | None) -> None:
-    """Do nothing: the signal has written its byte."""

@@ -60,12 +60,10 @@ class TickInputs:
         if trigger not in inputs or not set(optional) <= others or set(delayed) & set(inputs):
             raise ValueError('trigger and optional inputs must be inputs, delayed ones must not')
         self._on_tick, self._inputs, self._trigger = on_tick, tuple(inputs), trigger
-        self._delayed, self._optional = tuple(delayed), frozenset(optional)
-        self._lock_step = lock_step
+        self._delayed, self._optional, self._lock_step = tuple(delayed), optional, lock_step
         self._others = tuple(name for name in inputs if name != trigger)
         self._held: dict[str, Any] = dict.fromkeys(delayed)
         self.ignored = 0
-        self.incomplete = 0
         self.reset()
 
     def reset(self) -> None:
@@ -118,7 +116,6 @@ class TickInputs:
             self._fire_newest()
         if len(self._pending) > PENDING_TICKS:
             del self._pending[min(self._pending)]
-            self.incomplete += 1
 
     def _add_delayed(self, name: str, stamp_ns: int, value: Any) -> None:
         if not self._lock_step:
@@ -147,50 +144,38 @@ class TickInputs:
         """Real time: fire, oldest first, each tick that has nothing to wait for any more."""
         while self._pending:
             stamp = min(self._pending)
-            if self._trigger in self._pending[stamp]:
-                if self._waits(stamp):
+            tick = self._pending[stamp]
+            if self._trigger in tick:
+                if self._waits(stamp, tick):
                     return
-            elif not self._is_lost(self._trigger, stamp):
+                self._fire_incomplete(stamp, tick)
+            elif self._is_lost(self._trigger, stamp):
+                del self._pending[stamp]
+            else:
                 return
-            self._fire_incomplete(stamp)
 
-    def _waits(self, stamp: int) -> bool:
+    def _waits(self, stamp: int, tick: dict[str, Any]) -> bool:
         """Whether the tick, which has been triggered, lacks an input that may still come."""
-        arrived = self._pending[stamp]
-        if len(arrived) == len(self._inputs):
-            return False
-        if sum(self._trigger in tick for tick in self._pending.values()) > 1 + HOLD_TICKS:
-            return False
-        return any(
-            name not in arrived
-            and self._missed[name] < PATIENCE
-            and not self._is_lost(name, stamp)
-            for name in self._others
-        )
+        triggered = sum(self._trigger in each for each in self._pending.values())
+        return triggered <= 1 + HOLD_TICKS and any(
+            name not in tick and self._missed[name] < PATIENCE and not self._is_lost(name, stamp)
+            for name in self._others)
 
     def _is_lost(self, name: str, stamp: int) -> bool:
         """Whether an input of a tick cannot come: a later one came, and each keeps its order."""
         newest = self._newest.get(name)
         return newest is not None and newest[0] > stamp
 
-    def _fire_incomplete(self, stamp: int) -> None:
-        tick = self._pending[stamp]
-        if self._trigger not in tick:
-            del self._pending[stamp]
-            self.incomplete += 1
-            return
+    def _fire_incomplete(self, stamp: int, tick: dict[str, Any]) -> None:
+        """Fire with the newest of what is missing, or drop a tick for which nothing has come."""
         for name in self._others:
             if name in tick:
                 continue
             self._missed[name] += 1
-            if name in self._newest:
-                tick[name] = self._newest[name][1]
-            elif name in self._optional:
-                tick[name] = None
-            else:
+            if name not in self._newest and name not in self._optional:
                 del self._pending[stamp]
-                self.incomplete += 1
                 return
+            tick[name] = self._newest.get(name, (0, None))[1]
         tick.update(self._held)
         self._fire(stamp, tick)
 

@@ -9,10 +9,11 @@ in :mod:`~dmp_cpg_ros.nodes.messages.robot_state`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -28,17 +29,13 @@ from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import FRAMES, PushForce
-from dmp_cpg_ros.nodes.messages.cdr import (
-    FIELDS,
-    RefilledMessage,
-    SerializedJointState,
-    SerializedTwist,
-)
+from dmp_cpg_ros.core.suite_parameters import INHIBITION
+from dmp_cpg_ros.nodes.messages import cdr
 from dmp_cpg_ros.nodes.messages.joint_states import JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.robot_state import BASE_FRAME
-from dmp_cpg_ros.nodes.messages.values import Array, checked_numbers, header_ns
+from dmp_cpg_ros.nodes.messages.values import Array, checked_numbers, header_ns, status_message
 
-AnyJointState: TypeAlias = JointState | SerializedJointState
+AnyJointState: TypeAlias = JointState | cdr.SerializedJointState
 
 _OSCILLATORS = slice(0, len(layouts.OSCILLATOR_ROWS))
 _GAITS = slice(_OSCILLATORS.stop, None)
@@ -70,19 +67,19 @@ class ReferenceWriter:
 
     def __init__(self) -> None:
         """Lay the message out."""
-        self._message = RefilledMessage(BASE_FRAME)
+        self._message = cdr.RefilledMessage(BASE_FRAME)
         self._message.refilled(reference=6)
         self._numbers = np.zeros(6)
 
-    def fill(self, time_ns: int, r: Array) -> SerializedTwist:
+    def fill(self, time_ns: int, r: Array) -> cdr.SerializedTwist:
         """Refill with r = (v_x, v_y, γ), ndarray (3,); raises DataError when it is not finite."""
         self._numbers[:2], self._numbers[5] = r[:2], r[2]
-        return SerializedTwist(self._message.filled(time_ns, self._numbers))
+        return cdr.SerializedTwist(self._message.filled(time_ns, self._numbers))
 
 
-def read_reference(message: TwistStamped | SerializedTwist) -> Array:
+def read_reference(message: TwistStamped | cdr.SerializedTwist) -> Array:
     """Reference r = (v_x, v_y, γ), ndarray (3,) [m/s, m/s, rad/s]; raises DataError."""
-    if isinstance(message, SerializedTwist):
+    if isinstance(message, cdr.SerializedTwist):
         numbers = checked_numbers(message.numbers, 'velocity')
         return np.array((numbers[0], numbers[1], numbers[5]))
     return np.array(read_twist(message.twist))
@@ -100,11 +97,11 @@ class CanonicalStateWriter:
     def __init__(self, gaits: Sequence[str]) -> None:
         """Lay the message out."""
         self._gaits, rows = tuple(gaits), layouts.canonical_rows(gaits)
-        self._writer = JointStateWriter(rows, FIELDS[:2])
+        self._writer = JointStateWriter(rows, cdr.FIELDS[:2])
         self._position, self._velocity = np.zeros((2, len(rows)))
 
     def fill(self, time_ns: int, x: Array, x_dot: Array, gait: GaitInForce,
-             cadence_rate: float = 0.0) -> SerializedJointState:
+             cadence_rate: float = 0.0) -> cdr.SerializedJointState:
         """Refill.
 
         Parameters
@@ -143,7 +140,7 @@ class CanonicalStateReader:
         """Prepare the order."""
         rows = layouts.canonical_rows(gaits.gaits)
         self._gaits, self._names = gaits, rows[_GAITS]
-        self._reader = JointStateReader(rows, FIELDS[:2])
+        self._reader = JointStateReader(rows, cdr.FIELDS[:2])
         self._last: tuple[bytes, GaitInForce] | None = None
 
     def read(self, message: AnyJointState) -> tuple[Array, Array, GaitInForce]:
@@ -171,7 +168,7 @@ class JointTargetsWriter:
         """Lay the message of a leg out."""
         self._writer = JointStateWriter(_joints_of(leg))
 
-    def fill(self, time_ns: int, targets: JointTargets) -> SerializedJointState:
+    def fill(self, time_ns: int, targets: JointTargets) -> cdr.SerializedJointState:
         """Refill with the targets of the leg's joints; raises DataError."""
         return self._writer.fill(time_ns, targets.position, targets.velocity, targets.effort)
 
@@ -203,7 +200,7 @@ class PostureFeedbackWriter:
         self._writer = JointStateWriter(layouts.POSTURE_ROWS)
         self._position, self._velocity, self._effort = np.zeros((3, len(layouts.POSTURE_ROWS)))
 
-    def fill(self, time_ns: int, feedback: PostureFeedback) -> SerializedJointState:
+    def fill(self, time_ns: int, feedback: PostureFeedback) -> cdr.SerializedJointState:
         """Refill with a feedback; raises DataError when it is not finite."""
         self._position[_JOINTS] = feedback.measured
         self._position[_FEET] = feedback.shift_in_base.reshape(-1)
@@ -237,7 +234,7 @@ class CommandReader:
 
     def __init__(self) -> None:
         """Prepare the order."""
-        self._reader = JointStateReader((*layouts.MODE_ROWS, *layouts.MOVEMENT_ROWS), FIELDS[:2])
+        self._reader = JointStateReader(layouts.POSTURE_ROWS[_COMMAND], cdr.FIELDS[:2])
         self._last: tuple[bytes, BodyCommand] | None = None
 
     def read(self, message: AnyJointState) -> BodyCommand:
@@ -257,9 +254,9 @@ class InhibitionGainsWriter:
 
     def __init__(self) -> None:
         """Lay the message out."""
-        self._writer = JointStateWriter(layouts.GAIN_ROWS, FIELDS[:1])
+        self._writer = JointStateWriter(layouts.GAIN_ROWS, cdr.FIELDS[:1])
 
-    def fill(self, time_ns: int, inhibition: Inhibition) -> SerializedJointState:
+    def fill(self, time_ns: int, inhibition: Inhibition) -> cdr.SerializedJointState:
         """Refill; raises DataError when a number is not finite."""
         return self._writer.fill(time_ns, np.array((
             *inhibition.gains, inhibition.region_radius, inhibition.requested,
@@ -276,7 +273,7 @@ class InhibitionGainsReader:
 
     def __init__(self) -> None:
         """Prepare the order."""
-        self._reader = JointStateReader(layouts.GAIN_ROWS, FIELDS[:1])
+        self._reader = JointStateReader(layouts.GAIN_ROWS, cdr.FIELDS[:1])
 
     def read(self, message: AnyJointState) -> Inhibition:
         """Inhibition that is announced; raises DataError for numbers that no parameters allow."""
@@ -315,3 +312,16 @@ def read_body_mode(message: String) -> str:
     if message.data not in MODES:
         raise DataError(f"body mode '{message.data[:40]}' must be one of {', '.join(MODES)}")
     return str(message.data)
+
+
+def inhibition_state(time_ns: int, word: str, values: Mapping[str, Any]) -> DiagnosticArray:
+    """State word of the stop at a time [ns], with values, for people."""
+    return status_message(INHIBITION, time_ns, word, values)
+
+
+def read_state_word(message: DiagnosticArray) -> str:
+    """State word of ``inhibition_state``, for people; raises DataError where there is none."""
+    names = [status.name for status in message.status]
+    if INHIBITION not in names:
+        raise DataError(f"no status named '{INHIBITION}' among {names}")
+    return str(message.status[names.index(INHIBITION)].message)

@@ -40,12 +40,6 @@ class RobotStateWriter:
         Only of every tenth state, and of a robot that knows its work.
     """
 
-    imu: cdr.SerializedImu
-    odom: cdr.SerializedOdometry
-    foot_contacts: cdr.SerializedJointState
-    joint_states: cdr.SerializedJointState
-    joint_work: cdr.SerializedJointState | None
-
     def __init__(self) -> None:
         """Lay the messages out."""
         self.clock, self._odom, self._imu = Clock(), OdometryWriter(), cdr.RefilledMessage(

@@ -26,15 +26,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rclpy.qos import QoSProfile
-from rosbags.interfaces import (
-    Connection,
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
+from rosbags import interfaces as bags
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_typestore
 
@@ -52,7 +44,7 @@ LAG_NS = 1_000_000_000
 back by more has begun anew.
 """
 
-_UNSET = QosTime(9223372036, 854775807)
+_UNSET = bags.QosTime(9223372036, 854775807)
 
 
 class RecordingError(DmpCpgError):
@@ -93,7 +85,7 @@ class BagWriter:
         self.counts: dict[str, int] = {}
         self.newest_ns: int | None = None
         self._first_ns = 0
-        self._waiting: list[tuple[Connection, int, bytes]] = []
+        self._waiting: list[tuple[bags.Connection, int, bytes]] = []
         self._store = get_typestore(Stores.ROS2_JAZZY)
         try:
             self._writer = Writer(
@@ -189,7 +181,7 @@ class BagWriter:
         """Whether the clock is about to reach a stamp, or is not known yet."""
         return self.newest_ns is None or self.newest_ns < stamp <= self.newest_ns + LAG_NS
 
-    def _write(self, connection: Connection, stamp: int, data: bytes) -> None:
+    def _write(self, connection: bags.Connection, stamp: int, data: bytes) -> None:
         """Write a message with its stamp, or with the time of the clock where that is no time of
         this recording.
         """
@@ -202,11 +194,12 @@ class BagWriter:
             raise RecordingError(f"cannot write to '{self.folder}': {error}") from error
 
 
-def offered_qos(profile: QoSProfile) -> Qos:
+def offered_qos(profile: QoSProfile) -> bags.Qos:
     """Profile of rclpy as rosbags stores it; unset times are rosbag2's infinity."""
-    return Qos(QosHistory(int(profile.history)), profile.depth,
-               QosReliability(int(profile.reliability)), QosDurability(int(profile.durability)),
-               _UNSET, _UNSET, QosLiveliness.SYSTEM_DEFAULT, _UNSET, False)
+    return bags.Qos(
+        bags.QosHistory(int(profile.history)), profile.depth,
+        bags.QosReliability(int(profile.reliability)), bags.QosDurability(int(profile.durability)),
+        _UNSET, _UNSET, bags.QosLiveliness.SYSTEM_DEFAULT, _UNSET, False)
 
 
 def _leading_stamp(data: bytes) -> int:
