@@ -35,8 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from dmp_cpg_ros.suite_table import KINDS
 
     print('usage: python -m dmp_cpg_ros NAME [...], or NAME [...] alone; NAME --help says more')
-    for title, names in (('commands', COMMANDS), ('studies', STUDIES),
-                         ('nodes', tuple(KINDS))):
+    for title, names in (('commands', COMMANDS), ('studies', STUDIES), ('nodes', tuple(KINDS))):
         print(f'\n{title}:')
         for name in names:
             print(f'  {name:22}{_summary(name)}')

@@ -129,12 +129,10 @@ def load_suite(file: str | Path | None = None, overrides: Mapping[str, Any] | No
             {part: sets[node][part] for node, parts in core.PART_OF.items() for part in parts}),
         motion=load_motion(sets[LEG][LegParameters].motion))
     gait = canonical[core.GaitParameters]
-    return Suite(
-        parameters, load_gait(gait.gait, gait.gaits_file), robot[core.RobotParameters],
-        robot[SensorParameters],
-        core.chosen_world(robot[WorldParameters], robot[core.RobotParameters]),
-        robot[core.TickParameters].tick_ns, find_config(robot[core.RobotFileParameters].robot),
-        path)
+    world = core.chosen_world(robot[WorldParameters], robot[core.RobotParameters])
+    return Suite(parameters, load_gait(gait.gait, gait.gaits_file), robot[core.RobotParameters],
+                 robot[SensorParameters], world, robot[core.TickParameters].tick_ns,
+                 find_config(robot[core.RobotFileParameters].robot), path)
 
 
 def node_sets(path: Path, kind: str, overrides: Mapping[str, Any] | None = None,

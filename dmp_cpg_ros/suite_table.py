@@ -8,7 +8,6 @@ such shared values stand once, under ``/**``.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -55,11 +54,6 @@ class Kind:
     def module(self) -> str:
         """Module of its class."""
         return f'dmp_cpg_ros.nodes.{self.name}'
-
-    def has(self, parameter: str) -> bool:
-        """Whether a parameter is in one of the sets."""
-        return any(field.name == parameter for cls in self.sets
-                   for field in dataclasses.fields(cls))
 
 
 def _single(name: str, class_name: str, *sets: type[Parameters]) -> Kind:

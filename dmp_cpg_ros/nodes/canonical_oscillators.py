@@ -26,7 +26,7 @@ from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader
-from dmp_cpg_ros.nodes.messages.values import stamped
+from dmp_cpg_ros.nodes.messages.values import stamped, told_at
 
 
 class CanonicalOscillators(SuiteNode):
@@ -75,9 +75,8 @@ class CanonicalOscillators(SuiteNode):
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the oscillators to the stamp of the reference."""
-        dt, r, feet = self.elapsed, values['reference'], values.get('foot_contacts')
-        # Of a lost message no forces are known.
-        force = feet[1] if feet and feet[0] == stamp_ns else np.full(len(LEGS), np.nan)
+        dt, r = self.elapsed, values['reference']
+        force = told_at(stamp_ns, values.get('foot_contacts'), np.full(len(LEGS), np.nan))
         self._inhibition = values['inhibition_gains'] or self._inhibition
         self._state = state = self._canonical.step(
             self._state, r, self._inhibition, dt, force, self.certified.certificate.contact)
@@ -108,12 +107,9 @@ class CanonicalOscillators(SuiteNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Phase error of the legs beside its bound [rad]."""
-        return {
-            'phase_error_rad': nan if self._lock is None else self._lock.error,
-            'phase_error_bound_rad': nan if self._lock is None else self._lock.bound,
-            'gait': self._state.gait.name,
-            'cadence_scale': self._state.cadence_scale,
-            'gait_wanted': self._state.wanted.name,
-            'highest_speed': self._canonical.network(self._state.gait).highest_speed,
-            'certificate': certificate_words(self.certified.certificate),
-        }
+        return {'phase_error_rad': nan if self._lock is None else self._lock.error,
+                'phase_error_bound_rad': nan if self._lock is None else self._lock.bound,
+                'gait': self._state.gait.name, 'cadence_scale': self._state.cadence_scale,
+                'gait_wanted': self._state.wanted.name,
+                'highest_speed': self._canonical.network(self._state.gait).highest_speed,
+                'certificate': certificate_words(self.certified.certificate)}

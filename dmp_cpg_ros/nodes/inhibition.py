@@ -76,7 +76,7 @@ class InhibitionNode(SuiteNode):
             **(mode if self.lock_step else {}),
         }, delayed={} if self.lock_step else mode, optional=sensors)
         self._gate = self.certified.commands()
-        self.serve('inhibit', self._answer_inhibit)
+        self.serve('inhibit', self._take_request)
 
     def activate(self) -> None:
         """Tell late joiners the state from the start; in lock-step the first tick does."""
@@ -128,50 +128,34 @@ class InhibitionNode(SuiteNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop."""
-        return {
-            'inhibition': self._state.word,
-            'requested': self._state.requested,
-            'command': self._gate.at(self._state.time_ns),
-        }
+        return {'inhibition': self._state.word, 'requested': self._state.requested,
+                'command': self._gate.at(self._state.time_ns)}
 
     # The service -------------------------------------------------------------------------------
 
-    def _answer_inhibit(self, request: Any, response: Any) -> Any:
+    def _take_request(self, request: Any) -> tuple[bool, str]:
         """Take a request; the answer says when it will be fulfilled. It acts from the next tick
         on.
         """
-        response.message = self._refused(request.data)
-        if response.message:
-            response.success = False
-            return response
-        already = request.data == self._state.requested
-        self._state = self._supervisor.request(self._state, request.data)
-        response.success = request.data == self._state.requested
-        if not response.success:
-            response.message = f'held by votes: {self._state.tally.cause}; ask again without them'
-        elif already:
-            response.message = f'already {self._state.word}'
-        else:
-            self._predict()
-            verb = 'at rest' if request.data else 'walking'
-            when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else (
-                'not within 10 s')
-            most = f'at most {self._bound:.3f} s' if isfinite(self._bound) else (
-                'without a bound from this state')
-            response.message = f'{verb} {when}, {most}; {self._words()}'
-        return response
-
-    def _refused(self, stop: bool) -> str:
-        """Why a request cannot be taken; empty when it can."""
-        if not self.active:
-            return f'inhibition is {self.state_label}, not active'
+        stop: bool = request.data
         if self._x is None:
-            return 'no canonical_state and reference yet; is canonical_oscillators running?'
+            return False, 'no canonical_state and reference yet; is canonical_oscillators running?'
         if not stop and self._body_mode != 'standing':
             service = 'recover' if self._body_mode == 'damped' else 'stand_up'
-            return (f'the gait cannot start: the robot is {self._body_mode}, not standing; call '
-                    f'{service}, or wait until it stands')
-        return ''
+            return False, (
+                f'the gait cannot start: the robot is {self._body_mode}, not standing; call '
+                f'{service}, or wait until it stands')
+        already = stop == self._state.requested
+        self._state = self._supervisor.request(self._state, stop)
+        if stop != self._state.requested:
+            return False, f'held by votes: {self._state.tally.cause}; ask again without them'
+        if already:
+            return True, f'already {self._state.word}'
+        self._predict()
+        when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
+        most = f'at most {self._bound:.3f} s' if isfinite(self._bound) else (
+            'without a bound from this state')
+        return True, f'{"at rest" if stop else "walking"} {when}, {most}; {self._words()}'
 
     def _predict(self) -> None:
         """Look ahead to the rest or the walk that was just requested."""
@@ -216,23 +200,14 @@ class InhibitionNode(SuiteNode):
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()
-        votes: dict[str, Any] = {}
+        told = {'requested': state.requested, 'armed': state.armed, 'automatic': state.automatic,
+                **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,
+                'request_stamp': state.request_ns * 1e-9, 'predicted_s': self._predicted,
+                'bound_s': self._bound, 'measured_s': state.measured_s, 'grade': self._words()}
         if self._voting.voting.voting:
-            votes = {**_by_leg('vote', state.tally.weights), 'voted': state.voted,
+            told |= {**_by_leg('vote', state.tally.weights), 'voted': state.voted,
                      'asked': state.asked, 'cause': state.tally.cause}
-        self._publisher.publish(conversions.inhibition_state(state.time_ns, state.word, {
-            'requested': state.requested,
-            'armed': state.armed,
-            'automatic': state.automatic,
-            **_by_leg('gain', acting.gains),
-            'region_radius': acting.region_radius,
-            'request_stamp': state.request_ns * 1e-9,
-            'predicted_s': self._predicted,
-            'bound_s': self._bound,
-            'measured_s': state.measured_s,
-            'grade': self._words(),
-            **votes,
-        }))
+        self._publisher.publish(conversions.inhibition_state(state.time_ns, state.word, told))
 
 
 def _by_leg(what: str, numbers: Array) -> dict[str, float]:

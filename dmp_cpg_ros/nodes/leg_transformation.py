@@ -69,9 +69,6 @@ class LegTransformation(SuiteNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Which leg, and how much it swings."""
-        return {
-            'leg': self.parameters_of(LegChoice).leg,
-            'activity': self._state.leg.activity,
-            'body_mode': self._state.command.mode,
-            'movement': self._state.command.movement or 'none',
-        }
+        return {'leg': self.parameters_of(LegChoice).leg, 'activity': self._state.leg.activity,
+                'body_mode': self._state.command.mode,
+                'movement': self._state.command.movement or 'none'}

@@ -58,11 +58,8 @@ STATE_TOPICS = ('/clock', 'imu', 'odom', 'foot_contacts', 'joint_states')
 it leads to runs before its publication ends.
 """
 
-RETREATS = {
-    'stand': 'it takes up a stand',
-    'lie': 'it lowers itself onto its belly',
-    'damp': 'its joints are damped',
-}
+RETREATS = {'stand': 'it takes up a stand', 'lie': 'it lowers itself onto its belly',
+            'damp': 'its joints are damped'}
 """What the robot does by itself, in words."""
 
 
@@ -139,12 +136,8 @@ class MujocoRobotNode(SuiteNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the robot has fallen or stands by itself."""
-        return {
-            **self._timing.values(),
-            'fell': self._fell,
-            'time_s': self._state.time_ns * 1e-9,
-            'silent_legs': ' '.join(self._guard.silent(self._state.time_ns)) or 'none',
-        }
+        return {**self._timing.values(), 'fell': self._fell, 'time_s': self._state.time_ns * 1e-9,
+                'silent_legs': ' '.join(self._guard.silent(self._state.time_ns)) or 'none'}
 
     # The tick ------------------------------------------------------------------------------------
 

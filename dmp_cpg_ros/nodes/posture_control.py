@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions, robot_state
 from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS
-from dmp_cpg_ros.nodes.messages.values import stamped
+from dmp_cpg_ros.nodes.messages.values import stamped, told_at
 from dmp_cpg_ros.suite_table import POSTURE
 
 WELL_AGAIN_NS = 1_000_000_000
@@ -123,14 +124,10 @@ class BodyState:
             return {}
         roll, pitch, _ = roll_pitch_yaw(estimate.quaternion)
         slope_x, slope_y = memory.terrain.slope
-        return {
-            'estimated_roll_rad': roll,
-            'estimated_pitch_rad': pitch,
-            'estimated_height_m': estimate.height,
-            'terrain_slope_x': slope_x,
-            'terrain_slope_y': slope_y,
-            'gyro_bias_rad_s': ' '.join(f'{bias:.5f}' for bias in memory.filter.gyro_bias),
-        }
+        return {'estimated_roll_rad': roll, 'estimated_pitch_rad': pitch,
+                'estimated_height_m': estimate.height, 'terrain_slope_x': slope_x,
+                'terrain_slope_y': slope_y,
+                'gyro_bias_rad_s': ' '.join(f'{bias:.5f}' for bias in memory.filter.gyro_bias)}
 
     def _tell_problems(self, stamp_ns: int, estimate: BodyEstimate) -> None:
         if estimate.problems:
@@ -144,13 +141,9 @@ class BodyState:
 def sensor_readings(stamp_ns: int, values: Mapping[str, Any]) -> SensorReadings:
     """Readings of one tick; what bears another stamp is missing (NaN)."""
     position, velocity, effort = values['joint_states']
-    rate = force = np.full(3, np.nan)
-    contacts = np.full(len(LEGS), np.nan)
-    imu, feet = values['imu'], values['foot_contacts']
-    if imu is not None and imu[0] == stamp_ns:
-        rate, force = imu[1]
-    if feet is not None and feet[0] == stamp_ns:
-        contacts = feet[1]
+    nothing, no_contacts = np.full(3, np.nan), np.full(len(LEGS), np.nan)
+    rate, force = told_at(stamp_ns, values['imu'], (nothing, nothing))
+    contacts = told_at(stamp_ns, values['foot_contacts'], no_contacts)
     return SensorReadings(stamp_ns, position, velocity, effort, rate, force, contacts)
 
 
@@ -185,7 +178,7 @@ class PostureControl(SuiteNode):
             'canonical_state': canonical.read,
         }, optional=self._body.optional)
         for what in REQUESTS:
-            self.serve(what, self._answering(what))
+            self.serve(what, partial(self._take_request, what))
 
     def activate(self) -> None:
         """Tell late joiners the mode from the start."""
@@ -211,26 +204,12 @@ class PostureControl(SuiteNode):
         condition = self._state.mode.condition
         measured = {} if condition is None else {
             name: getattr(condition, name) for name in ('tilt', 'height', 'support')}
-        return {
-            'body_mode': self._state.mode.mode,
-            'reason': self._state.mode.reason,
-            **measured,
-            **self._body.diagnostic_values(),
-        }
+        return {'body_mode': self._state.mode.mode, 'reason': self._state.mode.reason, **measured,
+                **self._body.diagnostic_values()}
 
-    def _answering(self, what: str) -> Callable[[Any, Any], Any]:
-        """Take a request; the answer says what will happen from the next tick on, or why not."""
-
-        def answer(request: Any, response: Any) -> Any:
-            if not self.active:
-                response.success = False
-                response.message = f'posture_control is {self.state_label}, not active'
-                return response
-            self._state, given = self._control.request(self._state, what)
-            response.success, response.message = given.accepted, given.text
-            return response
-
-        return answer
+    def _take_request(self, what: str, _: Any) -> tuple[bool, str]:
+        self._state, given = self._control.request(self._state, what)
+        return given.accepted, given.text
 
     def _tell(self) -> None:
         """Publish and log a new mode; a fall is an error until it is over."""

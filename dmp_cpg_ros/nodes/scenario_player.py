@@ -6,7 +6,8 @@ the robot down at the end.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -26,7 +27,7 @@ from dmp_cpg_ros.core.scenario.events import Command
 from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
-from dmp_cpg_ros.nodes.framework.parameters import plain, ros_value
+from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
@@ -73,14 +74,11 @@ class AcknowledgedTopic:
         return bool(self._publisher.get_subscription_count() >= len(self._answers) and all(
             answer.get_publisher_count() for answer in self._answers))
 
-    def send(self, message: Any) -> None:
-        """Publish."""
-        self._publisher.publish(message)
-        self._sent += 1
-
-    def when_taken(self, then: Callable[[], None]) -> None:
-        """Call back once, when every reader has taken everything that was sent."""
-        self._then = then
+    def send(self, messages: Sequence[Any], then: Callable[[], None]) -> None:
+        """Publish, and call back once, when every reader has taken everything that was sent."""
+        for message in messages:
+            self._publisher.publish(message)
+        self._sent, self._then = self._sent + len(messages), then
         self._look()
 
     def _hearing(self, reader: str) -> Callable[[JointState], None]:
@@ -130,7 +128,7 @@ class ParameterSetter:
             accepted it and all followers know it.
         """
         owner = OWNER[next(iter(values))]
-        wanted = {name: ros_value(value) for name, value in values.items()}
+        wanted = {name: plain(value) for name, value in values.items()}
         request = SetParametersAtomically.Request(parameters=[
             Parameter(name, value=value).to_parameter_msg() for name, value in wanted.items()])
 
@@ -203,24 +201,16 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         gate = interface(f'{GATE_OWNER}/advance_until')
         self._gate = self.create_publisher(Clock, gate.name, gate.publisher_qos)
         self._callees = {name: self.create_client(interface(name).type, name)
-                          for name in ('inhibit', *REQUESTS)}
+                         for name in ('inhibit', *REQUESTS)}
         self._setter = ParameterSetter(self)
         self._deliver: dict[str, Callable[[Any], None]] = {
-            'command': self._send,
-            'inhibit': lambda stop: self._ask('inhibit', SetBool.Request(data=stop)),
+            'command': self._send, 'push': self._push, 'votes': self._vote, 'set': self._set,
             'gait': lambda name: self._set({'gait': name}),
-            'push': self._push,
-            'set': self._set,
-            'votes': self._vote,
-            **{what: self._asking(what) for what in REQUESTS},
-        }
+            **{name: partial(self._ask, name) for name in self._callees}}
         heard: dict[str, Callable[[Any], None]] = {
-            f'{GATE_OWNER}/holding_at': self._on_holding,
-            'inhibition_state': self._on_inhibition,
-            'inhibition_gains': self._on_gains,
-            'body_mode': self._on_body_mode,
-            **({} if lock_step else {'/clock': self._on_clock}),
-        }
+            f'{GATE_OWNER}/holding_at': self._on_holding, 'inhibition_state': self._on_inhibition,
+            'inhibition_gains': self._on_gains, 'body_mode': self._on_body_mode,
+            **({} if lock_step else {'/clock': self._on_clock})}
         for name, callback in heard.items():
             topic = interface(name)
             self.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
@@ -313,12 +303,10 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     def _publish(self, name: str, *messages: Any) -> None:
         """Send, and go on: in lock-step when all readers have what was sent."""
-        topic = self._topics[name]
-        for message in messages:
-            topic.send(message)
         if self._lock_step:
-            topic.when_taken(self._delivered)
+            self._topics[name].send(messages, self._delivered)
         else:
+            self._topics[name].send(messages, lambda: None)
             self._delivered()
 
     def _delivered(self) -> None:
@@ -328,11 +316,9 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         else:
             self._deliver_due()
 
-    def _asking(self, what: str) -> Callable[[Any], None]:
-        """What delivers a request to stand up, lie down or recover."""
-        return lambda _: self._ask(what, Trigger.Request())
+    def _ask(self, service: str, stop: bool) -> None:
+        request = SetBool.Request(data=stop) if service == 'inhibit' else Trigger.Request()
 
-    def _ask(self, service: str, request: Any) -> None:
         def answered(future: Future) -> None:
             answer = future.result()
             if answer is None or not answer.success:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import sys
 import time
 import timeit
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -183,6 +184,11 @@ def messages() -> list[Row]:
         while publisher.get_subscription_count() < len(ends):
             time.sleep(0.01)
 
+        def fill_by_rclpy() -> None:
+            for field in ('position', 'velocity', 'effort'):
+                setattr(message, field, array('d', getattr(other, field).tobytes()))
+            publisher.publish(message)
+
         def deliver() -> None:
             publisher.publish(data)
             for end in ends:
@@ -196,6 +202,9 @@ def messages() -> list[Row]:
             ('write posture_feedback', lambda: writer.fill(0, feedback)),
             ('the same by rclpy, filled already', lambda: serialize_message(message)),
             ('the same by rosbags, filled already', lambda: store.serialize_cdr(other, kind)),
+            ('write and publish posture_feedback', lambda: publisher.publish(
+                writer.fill(0, feedback).serialized)),
+            ('fill and publish it by rclpy', fill_by_rclpy),
             ('read reference', lambda: read_reference(read_twist(twist))),
             ('the same by rclpy', lambda: read_reference(
                 deserialize_message(twist, TwistStamped))),

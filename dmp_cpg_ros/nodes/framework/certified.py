@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from math import nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rcl_interfaces.msg import ParameterEvent
+from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rcl_interfaces.srv import GetParameters
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.task import Future
 
@@ -59,34 +60,24 @@ had to be started again, is known after this time.
 
 
 class ParameterFollower:
-    """Tells a node what the owners of some parameters have accepted.
+    """Lets a node follow what the owners of parameters have accepted.
 
-    Owners announce changes on ``/parameter_events``; they are also asked now and then.
-
-    Parameters
-    ----------
-    node : SuiteNode
-        The node that follows.
-    owners : mapping of str to sequence of str
-        Names of nodes in the same namespace, with the names of their parameters.
-    take : callable (values)
-        Told names and values whenever an owner says them, changed or not; what it raises is
-        counted as dropped.
+    Owners announce changes on ``/parameter_events``; they are also asked now and then. What the
+    node refuses is counted as dropped.
     """
 
-    def __init__(self, node: SuiteNode, owners: Mapping[str, Sequence[str]],
-                 take: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, node: SuiteNode) -> None:
         """Listen, and ask the owners that are there."""
-        self._node, self._take = node, take
-        self._names = {owner: tuple(names) for owner, names in owners.items()}
-        space = node.get_namespace().rstrip('/')
-        self._owners = {f'{space}/{owner}': owner for owner in owners}
+        self._node, space = node, node.get_namespace().rstrip('/')
+        self._names = {owner: names for owner, names in suite.CHANGEABLE.items()
+                       if owner != node.KIND}
+        self._owners = {f'{space}/{owner}': owner for owner in self._names}
         self._events = node.create_subscription(
             ParameterEvent, '/parameter_events', self._on_event, qos_profile_parameter_events,
             raw=True)
         self._read = serialized_reader(ParameterEvent)
         self._askers = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
-                        for owner in owners}
+                        for owner in self._names}
         self._pending: dict[str, Future] = {}
         self._timer = node.create_steady_timer(ASK_EVERY_S, self._ask)
 
@@ -100,17 +91,18 @@ class ParameterFollower:
     def _on_event(self, data: bytes) -> None:
         event: ParameterEvent = self._read(data)
         owner = self._owners.get(event.node)
-        if owner is None:
-            return
-        names = self._names[owner]
+        if owner is not None:
+            self._tell(owner, {entry.name: entry.value for entry in (
+                *event.new_parameters, *event.changed_parameters)})
+
+    def _tell(self, owner: str, values: Mapping[str, ParameterValue]) -> None:
         try:
-            values = {entry.name: plain(Parameter.from_parameter_msg(entry).value)
-                      for entry in (*event.new_parameters, *event.changed_parameters)
-                      if entry.name in names}
-        except (TypeError, ValueError) as error:
+            told = {name: plain(parameter_value_to_python(value))
+                    for name, value in values.items() if name in self._names[owner]}
+        except RuntimeError as error:
             raise DataError(f'a value of {owner} cannot be read: {error}') from None
-        if values:
-            self._take(values)
+        if told:
+            self._node.follow(told)
 
     def _ask(self) -> None:
         for owner, client in self._askers.items():
@@ -121,17 +113,12 @@ class ParameterFollower:
                 future = client.call_async(GetParameters.Request(names=self._names[owner]))
                 self._pending[owner] = future
                 future.add_done_callback(self._node.guarded(
-                    f'{owner}/get_parameters', self._answer_of(owner)))
+                    f'{owner}/get_parameters', partial(self._answered, owner)))
 
-    def _answer_of(self, owner: str) -> Callable[[Future], None]:
-        def answered(future: Future) -> None:
-            answer, names = future.result(), self._names[owner]
-            if answer is not None and len(answer.values) == len(names):
-                values = map(parameter_value_to_python, answer.values)
-                self._take({name: plain(value)
-                            for name, value in zip(names, values, strict=True)})
-
-        return answered
+    def _answered(self, owner: str, future: Future) -> None:
+        answer, names = future.result(), self._names[owner]
+        if answer is not None and len(answer.values) == len(names):
+            self._tell(owner, dict(zip(names, answer.values, strict=True)))
 
 
 class Acting(NamedTuple):
@@ -181,8 +168,7 @@ class Certified:
         self._held_in: dict[str, Certificate] = {}
         self._judged: gate.Verdict | None = None
         self._gate = gate.CertificateGate(node.let_ticks_pass)
-        others = {owner: names for owner, names in suite.CHANGEABLE.items() if owner != node.KIND}
-        self._follower = ParameterFollower(node, others, node.follow)
+        self._follower = ParameterFollower(node)
 
     def end(self) -> None:
         """Stop following."""

@@ -15,8 +15,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import IO
 
-from rclpy.node import Node
-
 from dmp_cpg_ros.core.errors import ParameterError
 
 
@@ -64,11 +62,6 @@ def claimed(names: Iterable[str], domain: int) -> list[str]:
         except AlreadyRunningError:
             taken.append(name)
     return taken
-
-
-def claim_node(node: Node) -> IO[str]:
-    """Claim a node's full name."""
-    return claim(node.get_fully_qualified_name(), node.context.get_domain_id())
 
 
 def already_running(domain: int, who: str) -> str:

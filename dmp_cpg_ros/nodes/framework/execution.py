@@ -35,7 +35,7 @@ from rclpy.utilities import get_default_context, remove_ros_args
 
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
-from dmp_cpg_ros.nodes.framework.claims import claim_node
+from dmp_cpg_ros.nodes.framework.claims import claim
 from dmp_cpg_ros.nodes.framework.parameters import BATCH, NodeParameters, help_text
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.suite_table import KINDS
@@ -219,7 +219,8 @@ def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[Sui
     prepare_middleware()
     rclpy.init(args=[program, *arguments], signal_handler_options=SignalHandlerOptions.NO)
     nodes.extend(make())
-    claims = [claim_node(node) for node in nodes]
+    claims = [claim(node.get_fully_qualified_name(), node.context.get_domain_id())
+              for node in nodes]
     for node in nodes:
         node.start()
     parameters = nodes[0].parameters_of(NodeParameters)

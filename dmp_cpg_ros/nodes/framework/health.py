@@ -143,15 +143,14 @@ class RobotTiming:
         """Start without any tick."""
         self._published: dict[int, list[float]] = {}
         self._latency = array('d')
-        self._first: tuple[float, int] | None = None
-        self._last: tuple[float, int] | None = None
+        self._first = self._last = (math.nan, 0)
         self.ticks = self.misses = self.waits = 0
 
     def published(self, stamp_ns: int) -> None:
         """Note that the state of a tick has been published."""
         now = time.monotonic()
-        self._first = self._first or (now, stamp_ns)
         self._last = (now, stamp_ns)
+        self._first = self._first if self.ticks else self._last
         self.ticks += 1
         self._published[stamp_ns] = [now, 0.0]
         if len(self._published) > 64:
@@ -176,11 +175,9 @@ class RobotTiming:
         """Rate [Hz], real-time factor, latency [ms] and misses since the start; NaN without
         ticks.
         """
-        wall = robot = math.nan
-        if self._first is not None and self._last is not None and self._last[0] > self._first[0]:
-            wall, robot = self._last[0] - self._first[0], (self._last[1] - self._first[1]) * 1e-9
-        latency = np.frombuffer(self._latency) if self._latency else np.array([np.nan])
-        half, most = np.percentile(latency, (50, 99)).tolist()
+        wall = self._last[0] - self._first[0] or math.nan
+        robot = (self._last[1] - self._first[1]) * 1e-9
+        half, most = np.percentile(self._latency or [math.nan], (50, 99)).tolist()
         return {'deadline_misses': self.misses, 'waits': self.waits, 'timed_ticks': self.ticks,
                 'rate_hz': (self.ticks - 1) / wall, 'real_time_factor': robot / wall,
                 'latency_ms_p50': half, 'latency_ms_p99': most}

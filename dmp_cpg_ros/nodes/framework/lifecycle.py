@@ -216,8 +216,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
 
     def create_steady_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
         """Create a timer of wall time [s] that goes on whatever the robot's clock does."""
-        return self.create_timer(
-            period_s, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        return self.create_timer(period_s, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _guard_transitions(self, service: Service) -> None:
         """Let the service of transitions, which rclpy makes in a way of its own, refuse too."""

@@ -83,7 +83,6 @@ class SuitePublisher:
 
     def publish(self, message: Any) -> None:
         """Publish outside, then inside."""
-        self._publisher.publish(
-            message.serialized if isinstance(message, Serialized) else message)
+        self._publisher.publish(message.serialized if isinstance(message, Serialized) else message)
         if self._local is not None:
             self._local.publish(self._topic, message)

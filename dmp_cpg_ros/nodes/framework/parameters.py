@@ -22,7 +22,7 @@ from rclpy.parameter import Parameter
 from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-from dmp_cpg_ros.nodes.messages.interfaces import Interface, published_by, read_by, served_by
+from dmp_cpg_ros.nodes.messages.interfaces import published_by, read_by, served_by
 from dmp_cpg_ros.suite_table import KINDS, WALKING
 
 BATCH, NORMAL = 'batch', 'normal'
@@ -42,9 +42,9 @@ class NodeParameters(Parameters):
 
     autostart: bool = parameter(
         True, 'whether the node configures and activates itself when it starts')
-    executor: str = parameter('events',
-        "rclpy's executor; events needs a quarter of the CPU time of single",
-                              choices=('events', 'single'))
+    executor: str = parameter(
+        'events', "rclpy's executor; events needs a quarter of the CPU time of single",
+        choices=('events', 'single'))
     scheduling: str = parameter(
         BATCH, 'policy of the Linux scheduler; batch keeps a reader from interrupting its writer',
         choices=POLICIES)
@@ -112,18 +112,18 @@ class ParameterTable:
         low, high = field.metadata.get('minimum'), field.metadata.get('maximum')
         descriptor = ParameterDescriptor(
             description=describe(field), read_only=name not in self.changeable,
-                                         additional_constraints=constraint(field))
-        bounded = low is not None or high is not None
-        if bounded and isinstance(field.default, float):
+            additional_constraints=constraint(field))
+        if (low, high) == (None, None):
+            return descriptor
+        if isinstance(field.default, float):
             huge = sys.float_info.max
             descriptor.floating_point_range = [FloatingPointRange(
                 from_value=-huge if low is None else float(low),
                 to_value=huge if high is None else float(high))]
-        elif bounded and isinstance(field.default, int):
+        elif isinstance(field.default, int):
             descriptor.integer_range = [IntegerRange(
                 from_value=-2**63 if low is None else int(low),
-                to_value=2**63 - 1 if high is None else int(high),
-                step=1)]
+                to_value=2**63 - 1 if high is None else int(high), step=1)]
         return descriptor
 
 
@@ -146,18 +146,15 @@ def constraint(field: dataclasses.Field[Any]) -> str:
 
 
 def plain(value: Any) -> Any:
-    """Value of a ROS parameter as a plain Python value."""
+    """Value as ROS takes it: arrays and tuples as lists."""
     return list(value) if isinstance(value, (array.array, list, tuple)) else value
 
 
-def ros_value(value: Any) -> Any:
-    """Value of a field as ROS takes it."""
-    return list(value) if isinstance(value, tuple) else value
-
-
-def declare(node: Node, table: ParameterTable, arguments: Sequence[str] | None = None,
-            ) -> dict[type[Parameters], Parameters]:
+def declare(node: Node, table: ParameterTable) -> dict[type[Parameters], Parameters]:
     """Declare a node's parameters with the overrides that it was given.
+
+    The command line of the process tells values that a parameter file shares among all nodes
+    (``/**``), which a node need not know, from misspelt ones.
 
     Parameters
     ----------
@@ -165,9 +162,6 @@ def declare(node: Node, table: ParameterTable, arguments: Sequence[str] | None =
         Node whose overrides came from the command line, parameter files or its constructor.
     table : ParameterTable
         Its parameters.
-    arguments : sequence of str, optional
-        The command line, to tell values that a parameter file shares among all nodes (``/**``),
-        which a node need not know, from misspelt ones; default ``sys.argv``.
 
     Returns
     -------
@@ -179,21 +173,19 @@ def declare(node: Node, table: ParameterTable, arguments: Sequence[str] | None =
     ParameterError
         If an override is unknown, of the wrong type, not finite or out of range.
     """
-    overrides = {name: plain(override.value)
-                 for name, override in node._parameter_overrides.items()
-                 if not name.startswith(FOREIGN_PREFIXES)}
-    shared = shared_names(sys.argv if arguments is None else arguments)
-    sets = table.build({name: value for name, value in overrides.items()
-                        if name in table.fields or name not in shared})
-    values = table.values(sets)
-    for name, value in values.items():
+    shared = shared_names(sys.argv)
+    sets = table.build({
+        name: plain(override.value) for name, override in node._parameter_overrides.items()
+        if not name.startswith(FOREIGN_PREFIXES)
+        and (name in table.fields or name not in shared)})
+    for name, value in table.values(sets).items():
         if value == ():
             raise ParameterError(
                 f"parameter '{name}' must not be an empty list; {constraint(table.fields[name])}")
         if name in node._parameter_overrides:
-            node._parameter_overrides[name] = Parameter(name, value=ros_value(value))
+            node._parameter_overrides[name] = Parameter(name, value=plain(value))
         if not node.has_parameter(name):
-            node.declare_parameter(name, ros_value(table.fields[name].default),
+            node.declare_parameter(name, plain(table.fields[name].default),
                                    table.descriptor(name))
     return sets
 
@@ -230,25 +222,15 @@ def help_text(node_class: type[SuiteNode]) -> str:
              '[--params-file FILE] ...]', summary]
     for title, interfaces in (('subscribes to', read_by(kind)), ('publishes', published_by(kind)),
                               ('serves', served_by(kind))):
-        if interfaces:
-            parts.append('\n'.join([f'{title}:', *_interface_lines(interfaces)]))
-    parts.append('\n'.join(['parameters:', *_parameter_lines(node_class.parameter_table())]))
-    return '\n\n'.join(parts)
-
-
-def _interface_lines(interfaces: Iterable[Interface]) -> list[str]:
-    return [f'  {entry.name} ({entry.type_name}{", latched" if entry.latched else ""})\n'
-            f'      {entry.meaning}' for entry in interfaces]
-
-
-def _parameter_lines(table: ParameterTable) -> list[str]:
-    lines = []
+        lines = [f'  {entry.name} ({entry.type_name}{", latched" if entry.latched else ""})\n'
+                 f'      {entry.meaning}' for entry in interfaces]
+        parts += ['\n'.join([f'{title}:', *lines])] if lines else []
+    table, lines = node_class.parameter_table(), ['parameters:']
     for name, field in table.fields.items():
-        notes = [f'default {_yaml(ros_value(field.default))}']
-        notes += [text for text in (constraint(field),) if text]
-        notes += ['changeable'] if name in table.changeable else []
-        lines += [f'  {name}: {describe(field)}', f"      {', '.join(notes)}"]
-    return lines
+        notes = (f'default {_yaml(plain(field.default))}', constraint(field),
+                 'changeable' if name in table.changeable else '')
+        lines += [f'  {name}: {describe(field)}', f"      {', '.join(filter(None, notes))}"]
+    return '\n\n'.join([*parts, '\n'.join(lines)])
 
 
 def _yaml(value: object) -> str:

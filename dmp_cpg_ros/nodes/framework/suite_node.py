@@ -10,13 +10,13 @@ node overrides the hooks that it needs: ``configure``, ``activate``, ``deactivat
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from typing import Any, ClassVar, TypeVar, cast
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
-from rclpy.service import Service
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
@@ -90,10 +90,9 @@ class SuiteNode(GuardedLifecycleNode):
         self._sets: Sets = self.accepted
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._accept_change)
-        self._entities: list[Publisher | Subscription | Service] = []
+        self._undo: list[Callable[[], object]] = []
         self._commands: list[Subscription] = []
         self._commands_taken: dict[str, int] = {}
-        self._local_readers: list[Callable[[Any], None]] = []
         self._inputs: list[tuple[Interface, Subscription]] = []
         topic, ready = interface('/diagnostics'), interface('~/ready')
         self._diagnostics = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
@@ -159,7 +158,7 @@ class SuiteNode(GuardedLifecycleNode):
         """
         known = self._table.values(self.accepted)
         news = {name: value for name, value in values.items()
-                if name in known and value != parameters.ros_value(known[name])}
+                if name in known and value != parameters.plain(known[name])}
         if not news:
             return
         self.following = True
@@ -223,7 +222,7 @@ class SuiteNode(GuardedLifecycleNode):
         """Create a publisher of an interface of the table."""
         topic = interface(name)
         publisher = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
-        self._entities.append(publisher)
+        self._undo.append(partial(self.destroy_publisher, publisher))
         self._outputs.append((topic, publisher))
         return SuitePublisher(publisher, topic.name, self.local)
 
@@ -270,38 +269,38 @@ class SuiteNode(GuardedLifecycleNode):
         if self.local is not None and inside:
             receive = self.guarded(topic.name, receive)
             self.local.attach(topic.name, receive)
-            self._local_readers.append(receive)
+            self._undo.append(partial(self.local.detach, receive))
             return None
         subscription = self.create_subscription(
             topic.type, topic.name, self._counted(topic.name, receive) if command else receive,
             qos or topic.reader_qos, raw=True)
-        self._entities.append(subscription)
+        self._undo.append(partial(self.destroy_subscription, subscription))
         self._inputs.append((topic, subscription))
         if command:
             self._commands.append(subscription)
         return subscription
 
-    def serve(self, name: str, callback: Callable[[Any, Any], Any]) -> None:
-        """Create a service of the table; its callback runs in every state of the node."""
+    def serve(self, name: str, take: Callable[[Any], tuple[bool, str]]) -> None:
+        """Create a service of the table; while the node is active, what takes its requests tells
+        whether they are accepted, and what will happen or why not.
+        """
+        def answer(request: Any, response: Any) -> Any:
+            response.success, response.message = take(request) if self.active else (
+                False, f'{self.get_name()} is {self.state_label}, not active')
+            return response
+
         service = interface(name)
-        self._entities.append(self.create_service(service.type, service.name, callback))
+        served = self.create_service(service.type, service.name, answer)
+        self._undo.append(partial(self.destroy_service, served))
 
     def destroy_entities(self) -> None:
         """Destroy the publishers, subscriptions and services of :meth:`configure`."""
         if self.certified is not None:
             self.certified.end()
             self.certified = None
-        for entity in reversed(self._entities):
-            if isinstance(entity, Publisher):
-                self.destroy_publisher(entity)
-            elif isinstance(entity, Subscription):
-                self.destroy_subscription(entity)
-            else:
-                self.destroy_service(entity)
-        if self.local is not None:
-            for reader in self._local_readers:
-                self.local.detach(reader)
-        self._entities, self._commands, self._inputs, self._local_readers = [], [], [], []
+        for undo in reversed(self._undo):
+            undo()
+        self._undo, self._commands, self._inputs = [], [], []
         self._outputs = self._outputs[:1]
 
     def missing(self) -> list[str]:

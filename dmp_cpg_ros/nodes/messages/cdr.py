@@ -97,9 +97,8 @@ class SerializedJointState(Serialized):
         if field not in FIELDS:
             raise AttributeError(field)
         begin, end = self._places[field]
-        array = np.frombuffer(self.serialized[begin:end])
-        setattr(self, field, array)
-        return array
+        setattr(self, field, np.frombuffer(self.serialized[begin:end]))
+        return getattr(self, field)
 
     def checked(self, field: str) -> Array:
         """An array whose numbers are finite, checked once for all readers; raises DataError."""

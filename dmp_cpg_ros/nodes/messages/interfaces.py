@@ -174,9 +174,8 @@ TOPICS: tuple[Interface, ...] = (
     Interface('/diagnostics', DiagnosticArray, 'health of every node', tuple(KINDS), ()),
     Interface(f'{GATE_OWNER}/holding_at', Clock, 'stamp of the tick that the gate holds',
               (ROBOT,), ('user',), latched=True, sometimes=(ROBOT,), recorded=False),
-    Interface(f'{GATE_OWNER}/advance_until', Clock,
-              'stamp up to which the gate lets ticks pass', ('user',), (ROBOT,),
-              sometimes=(ROBOT,), recorded=False),
+    Interface(f'{GATE_OWNER}/advance_until', Clock, 'stamp up to which the gate lets ticks pass',
+              ('user',), (ROBOT,), sometimes=(ROBOT,), recorded=False),
     Interface('~/commands_taken', JointState,
               'how many messages on cmd_vel, push and votes (names) the node has taken (position)',
               (REFERENCE, INHIBITION, ROBOT), ('user',), latched=True, recorded=False),
@@ -216,8 +215,7 @@ def interface(name: str) -> Interface:
         If there is none of that name; the valid names are listed.
     """
     if name not in INTERFACES:
-        raise ParameterError(
-            f"there is no interface '{name}'; valid are {', '.join(INTERFACES)}")
+        raise ParameterError(f"there is no interface '{name}'; valid are {', '.join(INTERFACES)}")
     return INTERFACES[name]
 
 

@@ -48,6 +48,11 @@ def stamped(read: Callable[[Any], Any]) -> Callable[[Any], tuple[int, Any]]:
     return lambda message: (header_ns(message), read(message))
 
 
+def told_at(stamp_ns: int, reading: tuple[int, Any] | None, missing: Any) -> Any:
+    """What a stamped reading tells of a time [ns]; what is missing where it is of another one."""
+    return reading[1] if reading is not None and reading[0] == stamp_ns else missing
+
+
 def set_stamp(stamp: Time, time_ns: int) -> None:
     """Write nanoseconds into a stamp."""
     stamp.sec, stamp.nanosec = divmod(time_ns, NS)

@@ -129,10 +129,7 @@ class BagWriter:
             stamp = _leading_stamp(data) if stamped else 0
             if clock:
                 self._advance(stamp)
-            if self._is_early(stamp):
-                self._waiting.append((connection, stamp, data))
-            else:
-                self._write(connection, stamp, data)
+            self._take(connection, stamp, data)
 
         return write
 
@@ -169,17 +166,18 @@ class BagWriter:
             self._first_ns = self.newest_ns = stamp
         elif not self.newest_ns - LAG_NS <= stamp <= self.newest_ns:
             self.newest_ns, self._first_ns = stamp, min(stamp, self._first_ns)
-        if self._waiting:
-            waiting, self._waiting = self._waiting, []
-            for message in waiting:
-                if self._is_early(message[1]):
-                    self._waiting.append(message)
-                else:
-                    self._write(*message)
+        waiting, self._waiting = self._waiting, []
+        for message in waiting:
+            self._take(*message)
 
-    def _is_early(self, stamp: int) -> bool:
-        """Whether the clock is about to reach a stamp, or is not known yet."""
-        return self.newest_ns is None or self.newest_ns < stamp <= self.newest_ns + LAG_NS
+    def _take(self, connection: bags.Connection, stamp: int, data: bytes) -> None:
+        """Write a message, or let it wait for a clock that is about to reach its stamp, or that is
+        not known yet.
+        """
+        if self.newest_ns is None or self.newest_ns < stamp <= self.newest_ns + LAG_NS:
+            self._waiting.append((connection, stamp, data))
+        else:
+            self._write(connection, stamp, data)
 
     def _write(self, connection: bags.Connection, stamp: int, data: bytes) -> None:
         """Write a message with its stamp, or with the time of the clock where that is no time of
