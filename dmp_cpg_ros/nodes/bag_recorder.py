@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.framework.ticks import drain
 from dmp_cpg_ros.nodes.messages.interfaces import RECORDED, STAMPED_CMD_VEL, Interface
+from dmp_cpg_ros.nodes.messages.values import counts_message
 from dmp_cpg_ros.nodes.recording.bag_writing import STORAGES, BagWriter, RecordingError
 from dmp_cpg_ros.suite_table import RECORDER
 
@@ -104,8 +104,7 @@ class BagRecorder(SuiteNode):
 
     def _flush(self) -> None:
         self._bag.flush()
-        self._recorded.publish(JointState(
-            name=list(self._bag.counts), position=list(map(float, self._bag.counts.values()))))
+        self._recorded.publish(counts_message(self._bag.counts))
 
     def _record(self, topic: Interface, stamped: bool, clock: bool) -> Any:
         write = self._bag.add_topic(

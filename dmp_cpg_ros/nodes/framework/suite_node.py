@@ -18,7 +18,6 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.certificates.gate import shown
 from dmp_cpg_ros.core.clock import TickClock
@@ -33,7 +32,7 @@ from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePubli
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, partners
-from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.nodes.messages.values import counts_message, header_ns
 from dmp_cpg_ros.suite_table import KINDS
 
 P = TypeVar('P', bound=Parameters)
@@ -321,8 +320,7 @@ class SuiteNode(GuardedLifecycleNode):
                 callback(message)
             finally:
                 counts[topic] += 1
-                self._taken.publish(JointState(
-                    name=list(counts), position=list(map(float, counts.values()))))
+                self._taken.publish(counts_message(counts))
 
         return receive
 

@@ -11,6 +11,7 @@ import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from numpy.typing import NDArray
+from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.errors import DataError
 
@@ -75,6 +76,11 @@ def status_message(name: str, time_ns: int, message: str, values: Mapping[str, A
         values=[KeyValue(key=key, value=text(value)) for key, value in values.items()])])
     set_stamp(array.header.stamp, time_ns)
     return array
+
+
+def counts_message(counts: Mapping[str, int]) -> JointState:
+    """Counts as positions by their names."""
+    return JointState(name=list(counts), position=list(map(float, counts.values())))
 
 
 def checked(values: Array, what: str) -> Array:
