@@ -101,7 +101,7 @@ def summary(found: Inspection) -> str:
 def _draw(found: Inspection, path: Path) -> None:
     from matplotlib import image
 
-    from dmp_cpg_ros.robot.leg_picture import leg_picture
+    from dmp_cpg_ros.robot.camera import leg_picture
 
     image.imsave(path, leg_picture(found.file))
 

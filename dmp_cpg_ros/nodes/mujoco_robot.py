@@ -28,7 +28,6 @@ from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS, Interface
 from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
-from dmp_cpg_ros.robot.fallback import FallbackController
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
@@ -290,8 +289,8 @@ class MujocoRobotNode(SuiteNode):
     # Inside --------------------------------------------------------------------------------------
 
     def _new_guard(self) -> CommandWatchdog:
-        fallback = FallbackController(self._robot.description)
-        return CommandWatchdog(fallback, round(self._options.target_timeout * 1e9))
+        return CommandWatchdog(
+            self._robot.description, round(self._options.target_timeout * 1e9))
 
     def _make_robot(self) -> Robot:
         p, file = self._options, find_config(self.parameters_of(core.RobotFileParameters).robot)

@@ -8,18 +8,20 @@ import logging
 import os
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import World
+from dmp_cpg_ros.robot.leg_reader import ModelIds, find_ids, foot_position, place_robot, subtree
 from dmp_cpg_ros.robot.model_loader import load_model
-from dmp_cpg_ros.robot.model_reader import find_ids, read_description
+from dmp_cpg_ros.robot.model_reader import read_description
 from dmp_cpg_ros.robot.mujoco_import import has_screen, mujoco
 from dmp_cpg_ros.robot.port import RobotError
-from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
+from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file
+from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -32,6 +34,10 @@ AZIMUTH, ELEVATION = 140.0, -16.0  # [deg] onto the robot's right side and face
 DISTANCE_OVER_HEIGHT = 3.6  # distance of the camera over the robot's stance height
 PLAIN_SHADOW = 2048  # texels along a side of the shadow map
 FAR_CLIPPING = 400.0  # in units of the model's extent
+
+COLOURS = {'fl': (0.86, 0.15, 0.15), 'fr': (0.10, 0.38, 0.90), 'rl': (0.95, 0.60, 0.05),
+           'rr': (0.05, 0.60, 0.30)}
+"""Red, green, blue of each leg."""
 
 _log = logging.getLogger(__name__)
 
@@ -54,6 +60,8 @@ class Camera:
     ----------
     model : mujoco.MjModel
         What it draws.
+    ids : ModelIds
+        The robot's parts in the model.
     reason : str or None
         Why there are no pictures; None when there are.
 
@@ -65,21 +73,33 @@ class Camera:
 
     def __init__(self, robot_file: RobotFile | Path | str | None = None, width: int = 1280,
                  height: int = 720, world: World | None = None, plain: bool = False) -> None:
-        if not isinstance(robot_file, RobotFile):
-            robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
+        file = load_robot_file(robot_file)
         self._world = world or World()
-        self.model = load_model(robot_file.model, robot_file.base, self._world)
-        self._ids = find_ids(self.model, robot_file)
-        self._height = read_description(self.model, robot_file).stance_height
-        self._distance = DISTANCE_OVER_HEIGHT * self._height
+        self.model = load_model(file.model, file.base, self._world)
+        self.ids = find_ids(self.model, file)
+        self.description = read_description(self.model, file)
+        self._height = self.description.stance_height
         if plain:
-            _simplify(self.model)
+            quality = self.model.vis.quality
+            quality.shadowsize = min(quality.shadowsize, PLAIN_SHADOW)
+            quality.offsamples = min(quality.offsamples, 2)
+            self.model.mat_reflectance[:] = 0.0
         self._data = mujoco.MjData(self.model)
         self._renderer, self.reason = _renderer(self.model, width, height)
 
     def picture(self, base_position_in_world: ArrayLike, base_quaternion: ArrayLike,
-                joint_position: ArrayLike, azimuth: float = AZIMUTH, elevation: float = ELEVATION,
-                distance: float | None = None) -> Picture | None:
+                joint_position: ArrayLike, **view: Any) -> Picture | None:
+        """Draw one pose as :meth:`drawn` does; None where pictures cannot be drawn (see
+        ``reason``).
+        """
+        if self._renderer is None:
+            return None
+        return self.drawn(base_position_in_world, base_quaternion, joint_position, **view)
+
+    def drawn(self, base_position_in_world: ArrayLike, base_quaternion: ArrayLike,
+              joint_position: ArrayLike, azimuth: float = AZIMUTH, elevation: float = ELEVATION,
+              distance: float | None = None, mark: Mark | None = None,
+              look_at: ArrayLike | None = None) -> Picture:
         """Draw one pose.
 
         Parameters
@@ -94,31 +114,14 @@ class Camera:
             Direction in which the camera looks [deg].
         distance : float, optional
             From the camera to the robot [m]; by default the robot fills the picture well.
-
-        Returns
-        -------
-        ndarray (height, width, 3) of uint8 or None
-            None where pictures cannot be drawn (see ``reason``).
-        """
-        if self._renderer is None:
-            return None
-        return self.drawn(base_position_in_world, base_quaternion, joint_position, azimuth,
-                          elevation, distance)
-
-    def drawn(self, base_position_in_world: ArrayLike, base_quaternion: ArrayLike,
-              joint_position: ArrayLike, azimuth: float = AZIMUTH, elevation: float = ELEVATION,
-              distance: float | None = None, mark: Mark | None = None,
-              look_at: ArrayLike | None = None) -> Picture:
-        """Draw one pose as :meth:`picture` does, or raise.
-
-        Parameters
-        ----------
-        base_position_in_world, base_quaternion, joint_position, azimuth, elevation, distance
-            See :meth:`picture`.
         mark : callable (data, scene), optional
             Adds shapes of its own to the scene.
         look_at : array_like (3,), optional
             Place of the base at which the camera looks [m]; by default the one it draws.
+
+        Returns
+        -------
+        ndarray (height, width, 3) of uint8
 
         Raises
         ------
@@ -128,21 +131,16 @@ class Camera:
         if self._renderer is None:
             raise RobotError(str(self.reason))
         model, data = self.model, self._data
-        start = int(model.jnt_qposadr[self._ids.free_joint])
-        place = np.asarray(base_position_in_world, dtype=float)
-        data.qpos[start:start + 3] = place
-        data.qpos[start + 3:start + 7] = np.roll(np.asarray(base_quaternion, dtype=float), 1)
-        data.qpos[model.jnt_qposadr[self._ids.joints]] = joint_position
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
+        place_robot(model, data, self.ids, base_position_in_world,
+                    np.roll(np.asarray(base_quaternion, dtype=float), 1), joint_position)
         mujoco.mj_camlight(model, data)
         view = mujoco.MjvCamera()
         view.type = mujoco.mjtCamera.mjCAMERA_FREE
-        x, y, z = place if look_at is None else np.asarray(look_at, dtype=float)
+        x, y, z = np.asarray(base_position_in_world if look_at is None else look_at, dtype=float)
         ground = float(self._world.height_at(x, y))
         view.lookat[:] = (x, y, z - 0.38 * (self._height if look_at is not None else z - ground))
         view.azimuth, view.elevation = azimuth, elevation
-        view.distance = self._distance if distance is None else distance
+        view.distance = DISTANCE_OVER_HEIGHT * self._height if distance is None else distance
         self._renderer.update_scene(data, view)
         if mark is not None:
             mark(data, self._renderer.scene)
@@ -158,16 +156,14 @@ class Camera:
         """Return the camera."""
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close the camera."""
         self.close()
 
 
 def pose_pictures(robot_file: RobotFile | Path | str | None, base_positions_in_world: ArrayLike,
                   base_quaternions: ArrayLike, joint_positions: ArrayLike, width: int = 1280,
-                  height: int = 720, world: World | None = None,
-                  **view: float) -> list[Picture]:
+                  height: int = 720, world: World | None = None) -> list[Picture]:
     """Draw recorded poses, without simulating them again.
 
     Parameters
@@ -184,20 +180,65 @@ def pose_pictures(robot_file: RobotFile | Path | str | None, base_positions_in_w
         [pixels]
     world : World, optional
         What it walks on; the flat floor without.
-    **view
-        ``azimuth``, ``elevation`` [deg], ``distance`` [m] as in :meth:`Camera.picture`.
 
     Returns
     -------
     list of ndarray (height, width, 3) of uint8
         Empty where pictures cannot be drawn; the reason is logged.
     """
+    poses = zip(np.asarray(base_positions_in_world), np.asarray(base_quaternions),
+                np.asarray(joint_positions), strict=True)
     with Camera(robot_file, width, height, world) as camera:
-        pictures = [camera.picture(place, quaternion, joints, **view)
-                    for place, quaternion, joints in zip(
-                        np.asarray(base_positions_in_world), np.asarray(base_quaternions),
-                        np.asarray(joint_positions), strict=True)]
-    return [picture for picture in pictures if picture is not None]
+        return [camera.drawn(*pose) for pose in poses if camera.reason is None]
+
+
+def leg_picture(file: RobotFile, width: int = 1280, height: int = 800) -> Picture:
+    """Draw a robot that stands, legs coloured as in ``COLOURS`` and named at their hips.
+
+    Parameters
+    ----------
+    file : RobotFile
+        The robot.
+    width, height : int
+        Size of the picture [pixels].
+
+    Returns
+    -------
+    ndarray (height, width, 3) of uint8
+
+    Raises
+    ------
+    RobotError
+        If OpenGL cannot draw here.
+    MissingFileError, ParameterError
+        If the robot's files cannot be used.
+    """
+    with Camera(file, width, height) as camera:
+        model, ids, description = camera.model, camera.ids, camera.description
+        for leg, abduction in zip(LEGS, ids.joints[::3], strict=True):
+            geoms = np.isin(model.geom_bodyid, list(subtree(model, model.jnt_bodyid[abduction])))
+            model.geom_matid[geoms] = -1
+            shade = np.linspace(0.75, 1.0, int(geoms.sum()))[:, None]
+            model.geom_rgba[geoms, :3] = shade * COLOURS[leg]
+        return camera.drawn((0.0, 0.0, description.stance_height), (0.0, 0.0, 0.0, 1.0),
+                            home_joint_position(description), elevation=-22.0,
+                            mark=lambda data, scene: _label(data, scene, ids))
+
+
+def _label(data: mujoco.MjData, scene: mujoco.MjvScene, ids: ModelIds) -> None:
+    """Name each leg over its hip, and put a ball onto its foot."""
+    for leg, hip, foot in zip(LEGS, ids.joints[1::3], ids.feet, strict=True):
+        for kind, place, text in (
+            (mujoco.mjtGeom.mjGEOM_LABEL, data.xanchor[hip] + (0.0, 0.0, 0.12), leg),
+            (mujoco.mjtGeom.mjGEOM_SPHERE, foot_position(data, foot), ''),
+        ):
+            if scene.ngeom >= scene.maxgeom:
+                return
+            geom = scene.geoms[scene.ngeom]
+            mujoco.mjv_initGeom(geom, kind, np.full(3, 1.15 * max(foot.radius, 0.01)), place,
+                                np.eye(3).ravel(), np.array((*COLOURS[leg], 1.0), np.float32))
+            geom.label = text
+            scene.ngeom += 1
 
 
 def open_viewer(robot: MujocoRobot) -> Any | None:
@@ -229,12 +270,6 @@ def open_viewer(robot: MujocoRobot) -> Any | None:
         window.cam.azimuth, window.cam.elevation = AZIMUTH, ELEVATION
         window.cam.distance = DISTANCE_OVER_HEIGHT * robot.description.stance_height
     return window
-
-
-def _simplify(model: mujoco.MjModel) -> None:
-    model.vis.quality.shadowsize = min(model.vis.quality.shadowsize, PLAIN_SHADOW)
-    model.vis.quality.offsamples = min(model.vis.quality.offsamples, 2)
-    model.mat_reflectance[:] = 0.0
 
 
 def _renderer(model: mujoco.MjModel, width: int, height: int) -> tuple[Any | None, str | None]:

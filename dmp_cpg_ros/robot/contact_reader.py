@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.robot.leg_reader import foot_position
-from dmp_cpg_ros.robot.model_reader import ModelIds
+from dmp_cpg_ros.robot.leg_reader import ModelIds, foot_position
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 _FOOT, _SHANK, _BASE, _OUTSIDE, _OTHER = range(5)
@@ -20,9 +19,8 @@ class ContactReader:
     """Reads contacts between the robot and its surroundings from MuJoCo's data."""
 
     def __init__(self, model: mujoco.MjModel, ids: ModelIds) -> None:
-        self._model, self._feet = model, ids.feet
-        kind = np.full(model.ngeom, _OTHER)
-        leg = np.zeros(model.ngeom, dtype=int)
+        self._model, self._feet, self._wrench = model, ids.feet, np.zeros(6)
+        kind, leg = np.full(model.ngeom, _OTHER), np.zeros(model.ngeom, dtype=int)
         kind[model.body_rootid[model.geom_bodyid] != model.body_rootid[ids.base]] = _OUTSIDE
         kind[model.geom_bodyid == ids.base] = _BASE
         shanks = model.jnt_bodyid[ids.joints[2::3]]
@@ -30,9 +28,7 @@ class ContactReader:
             lower_leg = np.isin(model.geom_bodyid, (shank, foot.body))
             kind[lower_leg], leg[lower_leg] = _SHANK, i
             kind[list(foot.geoms)] = _FOOT
-        self._kind: list[int] = kind.tolist()
-        self._leg: list[int] = leg.tolist()
-        self._wrench = np.zeros(6)
+        self._kind, self._leg = kind.tolist(), leg.tolist()
 
     def foot_force(self, data: mujoco.MjData) -> NDArray[np.float64]:
         """Return the normal force of each foot (4,), summed over its contacts [N].
@@ -47,15 +43,12 @@ class ContactReader:
             if self._kind[other] != _OUTSIDE or self._kind[geom] not in (_FOOT, _SHANK):
                 continue
             leg = self._leg[geom]
-            if self._kind[geom] == _FOOT or self._is_near_foot(data, i, leg):
+            if self._kind[geom] == _FOOT or np.linalg.norm(
+                    data.contact.pos[i] - foot_position(data, self._feet[leg])
+                    ) < NEAR_FOOT * self._feet[leg].radius:
                 mujoco.mj_contactForce(self._model, data, i, self._wrench)
                 force[leg] += float(self._wrench[0])
         return np.array(force)
-
-    def _is_near_foot(self, data: mujoco.MjData, contact: int, leg: int) -> bool:
-        foot = self._feet[leg]
-        distance = np.linalg.norm(data.contact.pos[contact] - foot_position(data, foot))
-        return bool(distance < NEAR_FOOT * foot.radius)
 
     def base_touches(self, data: mujoco.MjData) -> bool:
         """Return whether the base body touches the surroundings."""

@@ -4,16 +4,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.robot.leg_reader import find_foot
+from dmp_cpg_ros.robot import leg_reader
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
@@ -21,9 +22,6 @@ from dmp_cpg_ros.robot.robot_file import RobotFile
 
 AXIS_COSINE = 0.95
 """A joint turns about x, y or z of the base when the cosine between the axes is at least this."""
-
-LEG_AXES = 'xyy'
-"""Axes of abduction, hip and knee."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +64,6 @@ def inspect_model(path: Path | str) -> Inspection:
         the text says what was found.
     """
     path = Path(path).expanduser()
-    if not path.is_file():
-        raise MissingFileError(f"model '{path}' does not exist")
     model = load_model(path, '')
     base = _base(model, path)
     data = mujoco.MjData(model)
@@ -75,21 +71,22 @@ def inspect_model(path: Path | str) -> Inspection:
     data.qpos[:] = 0.0
     data.qpos[start + 3] = 1.0
     mujoco.mj_kinematics(model, data)
-    chains = _chains(model, base)
-    legs = [chain for chain in chains if _axes(model, data, chain) == LEG_AXES]
-    placed = _placed(data, legs)
-    if len(legs) != 4 or placed is None:
+    chains = list(filter(None, (_chain(model, child) for child in _children(model, base))))
+    legs = [chain for chain in chains if _axes(model, data, chain) == leg_reader.LEG_AXES]
+    places = {('f' if data.xanchor[leg[1], 0] > 0.0 else 'r')
+              + ('l' if data.xanchor[leg[1], 1] > 0.0 else 'r'): leg for leg in legs}
+    if not len(legs) == len(places) == 4:
         raise ParameterError(f"model '{path}' is no quadruped that this package drives: it takes "
                              'four chains abduction (x), hip (y), knee (y), one under each corner '
                              f'of the base. {_found(model, data, base, chains)}')
+    placed = [places[name] for name in LEGS]
     file = RobotFile(
         model=path.resolve(), base=model.body(base).name,
-        joints=tuple((model.joint(leg[0]).name, model.joint(leg[1]).name, model.joint(leg[2]).name)
-                     for leg in placed),
+        joints=tuple((model.joint(a).name, model.joint(b).name, model.joint(c).name)
+                     for a, b, c in placed),
         feet=tuple(_foot_name(model, data, leg) for leg in placed))
-    used = {base_joint for leg in placed for base_joint in leg}
-    others = tuple(model.joint(j).name or f'joint {j}' for j in range(model.njnt)
-                   if j not in used and j != model.body_jntadr[base])
+    used = {*sum(placed, []), int(model.body_jntadr[base])}
+    others = tuple(_joint_name(model, j) for j in range(model.njnt) if j not in used)
     return Inspection(file, read_description(model, file), others)
 
 
@@ -107,23 +104,14 @@ def _base(model: mujoco.MjModel, path: Path) -> int:
     return max(free, key=lambda body: int((roots == model.body_rootid[body]).sum()))
 
 
-def _chains(model: mujoco.MjModel, base: int) -> list[list[int]]:
-    """Joints of every subtree of the base in order; a subtree whose joints branch is cut there."""
-    chains = []
-    for child in range(base + 1, model.nbody):
-        if model.body_parentid[child] == base:
-            chain = _down(model, child)
-            if chain:
-                chains.append(chain)
-    return chains
+def _children(model: mujoco.MjModel, body: int) -> list[int]:
+    return [child for child in range(body + 1, model.nbody) if model.body_parentid[child] == body]
 
 
-def _down(model: mujoco.MjModel, body: int) -> list[int]:
-    first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-    own = list(range(first, first + count))
-    below = [chain for child in range(body + 1, model.nbody)
-             if model.body_parentid[child] == body and (chain := _down(model, child))]
-    return own + (below[0] if len(below) == 1 else [])
+def _chain(model: mujoco.MjModel, body: int) -> list[int]:
+    """Joints of a body and what hangs on it, in order; cut where they branch."""
+    below = list(filter(None, (_chain(model, child) for child in _children(model, body))))
+    return leg_reader.joints_of(model, body) + (below[0] if len(below) == 1 else [])
 
 
 def _axes(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> str:
@@ -137,48 +125,35 @@ def _axes(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> str:
     return letters
 
 
-def _placed(data: mujoco.MjData, legs: list[list[int]]) -> list[list[int]] | None:
-    """Legs in the order fl, fr, rl, rr; None unless there is one in each place."""
-    places: dict[str, list[int]] = {}
-    for leg in legs:
-        x, y, _ = data.xanchor[leg[1]]
-        places[('f' if x > 0.0 else 'r') + ('l' if y > 0.0 else 'r')] = leg
-    return [places[name] for name in LEGS] if len(places) == len(legs) == 4 else None
-
-
 def _foot_name(model: mujoco.MjModel, data: mujoco.MjData, leg: list[int]) -> str:
     """Name by which :func:`~dmp_cpg_ros.robot.leg_reader.find_foot` finds the foot of a leg."""
     knee = data.xanchor[leg[2]]
-    below = _subtree(model, int(model.jnt_bodyid[leg[2]]))
-    touching = [g for g in range(model.ngeom) if model.geom_bodyid[g] in below
-                and (model.geom_contype[g] or model.geom_conaffinity[g])]
-    spheres = [g for g in touching if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_SPHERE]
+    below = leg_reader.subtree(model, model.jnt_bodyid[leg[2]])
+    touching, spheres = leg_reader.touching_geoms(model, below)
 
     def far(place: NDArray[np.float64]) -> float:
         return float(np.linalg.norm(place - knee))
 
+    def farthest(candidates: Iterable[int], places: NDArray[np.float64]) -> list[int]:
+        return sorted(candidates, key=lambda i: -far(places[i]))
+
+    bodies = {int(model.geom_bodyid[g]) for g in spheres or touching}
     sites = [s for s in range(model.nsite) if model.site_bodyid[s] in below]
-    choices = [model.geom(g).name for g in sorted(spheres, key=lambda g: -far(data.geom_xpos[g]))]
-    choices += [model.body(b).name for b in sorted(below, key=lambda b: -far(data.xpos[b]))
-                if any(model.geom_bodyid[g] == b for g in spheres or touching)]
-    choices += [model.site(s).name for s in sorted(sites, key=lambda s: -far(data.site_xpos[s]))]
+    choices = [*(model.geom(g).name for g in farthest(spheres, data.geom_xpos)),
+               *(model.body(b).name for b in farthest(sorted(bodies), data.xpos)),
+               *(model.site(s).name for s in farthest(sites, data.site_xpos))]
     best = max((far(data.geom_xpos[g]) for g in spheres), default=0.0)
     for name in filter(None, choices):
-        foot = find_foot(model, name)
-        place = data.xpos[foot.body] + data.xmat[foot.body].reshape(3, 3) @ foot.point_in_body
-        if foot.body in below and far(place) > 0.5 * best + 0.02:
+        foot = leg_reader.find_foot(model, name)
+        if foot.body in below and far(leg_reader.foot_position(data, foot)) > 0.5 * best + 0.02:
             return str(name)
     raise ParameterError(
         f"no foot was found on the leg of joint '{model.joint(leg[2]).name}': below the knee "
         'there is neither a sphere that touches nor a site, or they bear no names; name one')
 
 
-def _subtree(model: mujoco.MjModel, root: int) -> set[int]:
-    bodies = {root}
-    for body in range(root + 1, model.nbody):
-        if int(model.body_parentid[body]) in bodies:
-            bodies.add(body)
-    return bodies
+def _joint_name(model: mujoco.MjModel, joint: int) -> str:
+    return model.joint(joint).name or f'joint {joint}'
 
 
 def _found(model: mujoco.MjModel, data: mujoco.MjData, base: int,
@@ -186,6 +161,6 @@ def _found(model: mujoco.MjModel, data: mujoco.MjData, base: int,
     """Say which chains there are, with their axes."""
     if not chains:
         return f"Found: base '{model.body(base).name}' without any joint below it"
-    described = (f"{' > '.join(model.joint(j).name or f'joint {j}' for j in chain)} "
+    described = (f"{' > '.join(_joint_name(model, joint) for joint in chain)} "
                  f'(axes {_axes(model, data, chain)})' for chain in chains)
     return f"Found below base '{model.body(base).name}': {'; '.join(described)}"

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Joint torques in MuJoCo: through the model's motors, else as generalised forces."""
+"""Joint torques in MuJoCo: how they are applied, and those that hold a standing robot."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.robot.leg_reader import actuator_of, is_motor, motor_ratio
+from dmp_cpg_ros.robot.leg_reader import ModelIds, actuator_of, foot_position, motor_ratio
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 Places = slice | NDArray[np.integer[Any]]
@@ -34,19 +34,15 @@ class JointActuators:
     """
 
     def __init__(self, model: mujoco.MjModel, joints: NDArray[np.int64]) -> None:
-        actuators = [actuator_of(model, int(joint)) for joint in joints]
-        motors = [a for a in actuators if a is not None and is_motor(model, a)
-                  and motor_ratio(model, a) != 0.0]
-        self._through_motors = len(motors) == len(joints)
+        found = (actuator_of(model, int(joint)) for joint in joints)
+        actuators = [actuator for actuator in found if actuator is not None]
+        ratios = np.array([motor_ratio(model, actuator) for actuator in actuators])
+        self._through_motors = len(actuators) == len(joints) and bool(ratios.all())
         if self._through_motors:
-            self._index = as_slice(np.array(motors))
-            self._per_torque = 1.0 / np.array([motor_ratio(model, a) for a in motors])
+            self._index, self._per_torque = as_slice(np.array(actuators)), 1.0 / ratios
             return
         self._index = as_slice(model.jnt_dofadr[joints])
-        for actuator in actuators:
-            if actuator is not None:
-                model.actuator_gainprm[actuator] = 0.0
-                model.actuator_biasprm[actuator] = 0.0
+        model.actuator_gainprm[actuators] = model.actuator_biasprm[actuators] = 0.0
 
     def apply(self, data: mujoco.MjData, torque: NDArray[np.float64]) -> None:
         """Set the torques (12,) [N m] of the coming physics step."""
@@ -54,3 +50,37 @@ class JointActuators:
             data.ctrl[self._index] = torque * self._per_torque
         else:
             data.qfrc_applied[self._index] = torque
+
+
+def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,
+                    dof: Places) -> NDArray[np.float64]:
+    """Return the torques of statics, τ = h(q) − Σ J_iᵀ f_i, with vertical foot forces f_i.
+
+    The forces carry the weight and have no moment about the centre of mass; of all such forces
+    those of least norm are taken.
+
+    Parameters
+    ----------
+    model, data
+        MuJoCo's, after mj_forward, at rest.
+    ids : ModelIds
+        Base and feet.
+    dof : ndarray (12,) or slice
+        Degrees of freedom of the joints.
+
+    Returns
+    -------
+    ndarray (12,)
+        [N m].
+    """
+    places = np.array([foot_position(data, foot) for foot in ids.feet])
+    arms = places - data.subtree_com[ids.base]
+    weight = -model.body_subtreemass[ids.base] * model.opt.gravity[2]
+    balance = np.array([np.ones(4), arms[:, 0], arms[:, 1]])
+    force = np.linalg.lstsq(balance, np.array([weight, 0.0, 0.0]), rcond=None)[0]
+    torque: NDArray[np.float64] = data.qfrc_bias.copy()
+    J = np.zeros((3, model.nv))
+    for foot, place, f in zip(ids.feet, places, force, strict=True):
+        mujoco.mj_jac(model, data, J, None, place, foot.body)
+        torque -= J[2] * f
+    return torque[dof]

@@ -43,15 +43,13 @@ class JointDrive:
 
     def __init__(self, description: RobotDescription, steps: int, step_s: float,
                  damping: ArrayLike = 0.0) -> None:
-        self._kp = np.tile(description.kp, 4)
-        self._kd = np.tile(description.kd, 4)
+        self._kp, self._kd = np.tile(description.kp, 4), np.tile(description.kd, 4)
         self._limit = np.concatenate([leg.torque_limit for leg in description.legs])
         speed = np.concatenate([leg.velocity_limit for leg in description.legs])
         self._slope = self._limit / (speed * (1.0 - ROLL_OFF_FROM))  # [N m s/rad]
         self._stall = self._limit / (1.0 - ROLL_OFF_FROM)  # the falling line at zero speed
         self._forward = self._kd + (self._kp > 0.0) * np.asarray(damping, dtype=float)
-        self._steps, self._step_s = steps, step_s
-        self._new = np.zeros(12)
+        self._steps, self._step_s, self._new = steps, step_s, np.zeros(12)
         self._ahead = step_s * np.arange(steps)[:, None]  # (steps, 1) [s]
         self.reset()
 
@@ -104,8 +102,8 @@ class JointDrive:
         ndarray (12,)
             [N m].
         """
-        wanted = self._command[step] - self._kp * position - self._kd * velocity
-        return self.limited(wanted, velocity)
+        return self.limited(
+            self._command[step] - self._kp * position - self._kd * velocity, velocity)
 
     def limited(self, torque: Vector, velocity: Vector) -> Vector:
         """Clip torques (12,) to what the actuators can give at these speeds.
@@ -128,22 +126,16 @@ def checked_targets(targets: JointTargets) -> NDArray[np.float64]:
     DataError
         If an array has another shape or holds a value that is not finite.
     """
+    named = vars(targets)
     try:
-        stacked = np.array((targets.position, targets.velocity, targets.effort), dtype=float)
+        stacked = np.array([*named.values()], dtype=float)
     except (TypeError, ValueError):
         stacked = np.empty(0)
     if stacked.shape != _STACKED:
-        _refuse_shapes(targets)
+        name = next(name for name, value in named.items() if np.shape(value) != _STACKED[1:])
+        raise DataError(f'joint targets: {name} has shape {np.shape(named[name])}, it must be '
+                        f'{_STACKED[1:]}')
     if not isfinite(float(stacked.sum())) and not np.isfinite(stacked).all():
         bad = [JOINT_NAMES[i] for i in np.flatnonzero(~np.isfinite(stacked).all(axis=0))]
         raise DataError(f"joint targets: the values for {', '.join(bad)} are not finite")
     return stacked
-
-
-def _refuse_shapes(targets: JointTargets) -> None:
-    shape = (len(JOINT_NAMES),)
-    for name, value in (('position', targets.position), ('velocity', targets.velocity),
-                        ('effort', targets.effort)):
-        if np.shape(value) != shape:
-            raise DataError(
-                f'joint targets: {name} has shape {np.shape(value)}, it must be {shape}')

@@ -1,22 +1,25 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One leg's joints, foot and geometry, read from a compiled model at zero joint angles."""
+"""The base, joints, feet and actuators of a robot in its compiled model."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG
 from dmp_cpg_ros.robot.mujoco_import import mujoco
+from dmp_cpg_ros.robot.robot_file import RobotFile
 
 Vector = NDArray[np.float64]
 
-_AXES = {'abduction': 'x', 'hip': 'y', 'knee': 'y'}
+LEG_AXES = 'xyy'
+"""Axes of abduction, hip and knee."""
+
 _AXIS_TOLERANCE = 0.02  # [rad] of an axis from x or y
 
 
@@ -30,13 +33,66 @@ class Foot:
     geoms: tuple[int, ...]
 
 
-def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, what: str) -> int:
-    """Return the id of a named object; raises ParameterError that lists the names there are."""
+@dataclass(frozen=True)
+class ModelIds:
+    """Where in the model is what a robot file names.
+
+    Attributes
+    ----------
+    base : int
+        Body.
+    base_qpos, base_dof : int
+        Where position and velocity of its free joint begin.
+    joints : ndarray (12,) of int
+        Joints in the order of ``JOINT_NAMES``.
+    feet : tuple of Foot
+        In the order fl, fr, rl, rr.
+    """
+
+    base: int
+    base_qpos: int
+    base_dof: int
+    joints: NDArray[np.int64]
+    feet: tuple[Foot, ...]
+
+
+def find_ids(model: mujoco.MjModel, file: RobotFile) -> ModelIds:
+    """Find base, joints and feet in a model.
+
+    Raises
+    ------
+    ParameterError
+        If a name is not in the model (those there are get listed), or the base cannot move freely.
+    """
+    base = _find(model, mujoco.mjtObj.mjOBJ_BODY, file.base, 'body')
+    free = int(model.body_jntadr[base])
+    if free < 0 or model.jnt_type[free] != mujoco.mjtJoint.mjJNT_FREE:
+        raise ParameterError(f"the base '{file.base}' must have a free joint")
+    joints = [_find(model, mujoco.mjtObj.mjOBJ_JOINT, name, 'joint')
+              for leg in file.joints for name in leg]
+    if len(set(joints)) != len(joints):
+        raise ParameterError(f'the twelve joints must differ; named are {file.joints}')
+    return ModelIds(base, int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free]),
+                    np.array(joints), tuple(find_foot(model, name) for name in file.feet))
+
+
+def place_robot(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds, place: ArrayLike,
+                quaternion: ArrayLike, joint_position: ArrayLike) -> None:
+    """Put the base at a place [m] and quaternion (w, x, y, z), the joints at their angles (12,)
+    [rad], and compute where all bodies are.
+    """
+    b = ids.base_qpos
+    data.qpos[b:b + 3], data.qpos[b + 3:b + 7] = place, quaternion
+    data.qpos[model.jnt_qposadr[ids.joints]] = joint_position
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+
+
+def _find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str, what: str) -> int:
     number = mujoco.mj_name2id(model, kind, name)
     if number < 0:
-        count = model.njnt if kind == mujoco.mjtObj.mjOBJ_JOINT else model.nbody
-        names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
-        valid = ', '.join(entry for entry in names if entry)
+        count = model.njnt if what == 'joint' else model.nbody
+        valid = ', '.join(filter(None, (mujoco.mj_id2name(model, kind, i) for i in range(count))))
         raise ParameterError(f"the model has no {what} '{name}'; it has {valid}")
     return int(number)
 
@@ -52,18 +108,15 @@ def find_foot(model: mujoco.MjModel, name: str) -> Foot:
     ParameterError
         If nothing bears the name.
     """
-    geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
+    geom, site, body = (mujoco.mj_name2id(model, kind, name) for kind in (
+        mujoco.mjtObj.mjOBJ_GEOM, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY))
     if geom >= 0:
         return _foot_of_geom(model, geom)
-    site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
     if site < 0 and body < 0:
         raise ParameterError(f"the model has no geom, site or body '{name}' that could be a foot")
     point = model.site_pos[site].copy() if site >= 0 else np.zeros(3)
     body = int(model.site_bodyid[site]) if site >= 0 else body
-    touching = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body
-                and (model.geom_contype[g] or model.geom_conaffinity[g])]
-    spheres = [g for g in touching if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_SPHERE]
+    touching, spheres = touching_geoms(model, [body])
     if spheres:
         return _foot_of_geom(model, min(
             spheres, key=lambda g: float(np.linalg.norm(model.geom_pos[g] - point))))
@@ -74,6 +127,24 @@ def _foot_of_geom(model: mujoco.MjModel, geom: int) -> Foot:
     is_sphere = model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_SPHERE
     radius = model.geom_size[geom, 0] if is_sphere else model.geom_aabb[geom, 3:].min()
     return Foot(int(model.geom_bodyid[geom]), model.geom_pos[geom].copy(), float(radius), (geom,))
+
+
+def touching_geoms(model: mujoco.MjModel, bodies: Collection[int]
+                   ) -> tuple[list[int], list[int]]:
+    """Shapes of some bodies that can touch, and those of them that are spheres."""
+    touching = [g for g in range(model.ngeom) if model.geom_bodyid[g] in bodies
+                and (model.geom_contype[g] or model.geom_conaffinity[g])]
+    sphere = mujoco.mjtGeom.mjGEOM_SPHERE
+    return touching, [g for g in touching if model.geom_type[g] == sphere]
+
+
+def subtree(model: mujoco.MjModel, root: int) -> set[int]:
+    """Return a body with all that hang on it."""
+    bodies = {int(root)}
+    for body in range(root + 1, model.nbody):
+        if int(model.body_parentid[body]) in bodies:
+            bodies.add(body)
+    return bodies
 
 
 def foot_position(data: mujoco.MjData, foot: Foot) -> Vector:
@@ -97,55 +168,51 @@ def check_leg(model: mujoco.MjModel, data: mujoco.MjData, leg: str, joints: list
         That names the joint and says what was found.
     """
     signs = np.zeros(3)
-    for i, (role, joint) in enumerate(zip(JOINTS_OF_LEG, joints, strict=True)):
-        name = model.joint(joint).name
+    for i, (role, joint, letter) in enumerate(zip(JOINTS_OF_LEG, joints, LEG_AXES, strict=True)):
+        name, axis = model.joint(joint).name, data.xaxis[joint]
         if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
             raise ParameterError(f"joint '{name}' ({role} of leg {leg}) is not a hinge")
-        axis = data.xaxis[joint]
-        wanted = 'xyz'.index(_AXES[role])
-        if np.arccos(min(1.0, abs(axis[wanted]))) > _AXIS_TOLERANCE:
+        along = axis['xyz'.index(letter)]
+        if np.arccos(min(1.0, abs(along))) > _AXIS_TOLERANCE:
             raise ParameterError(
-                f"joint '{name}' ({role} of leg {leg}) must turn about {_AXES[role]} of the base "
+                f"joint '{name}' ({role} of leg {leg}) must turn about {letter} of the base "
                 f'when all joints are at zero; its axis is '
                 f'[{axis[0]:.3f}, {axis[1]:.3f}, {axis[2]:.3f}]')
-        signs[i] = np.sign(axis[wanted])
-    found = _joints_up_to(model, foot.body, base)
+        signs[i] = np.sign(along)
+    found, body = [], foot.body
+    while body not in (0, base):
+        found += joints_of(model, body)[::-1]
+        body = int(model.body_parentid[body])
     if found != joints[::-1]:
-        raise ParameterError(
-            f'leg {leg}: from the foot up to the base the model has the joints '
-            f"{', '.join(model.joint(j).name for j in found) or '(none)'}; expected are "
-            f"{', '.join(model.joint(j).name for j in joints[::-1])} (knee, hip, abduction)")
+        there, expected = (', '.join(model.joint(j).name for j in chain) or '(none)'
+                           for chain in (found, joints[::-1]))
+        raise ParameterError(f'leg {leg}: from the foot up to the base the model has the joints '
+                             f'{there}; expected are {expected} (knee, hip, abduction)')
     return signs
 
 
-def _joints_up_to(model: mujoco.MjModel, body: int, base: int) -> list[int]:
-    found: list[int] = []
-    while body not in (0, base):
-        first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
-        found.extend(reversed(range(first, first + count)))
-        body = int(model.body_parentid[body])
-    return found
+def joints_of(model: mujoco.MjModel, body: int) -> list[int]:
+    """Return the joints between a body and its parent, in the model's order."""
+    first = int(model.body_jntadr[body])
+    return list(range(first, first + int(model.body_jntnum[body])))
 
 
 def actuator_of(model: mujoco.MjModel, joint: int) -> int | None:
     """Return the actuator that drives a joint directly, or None."""
-    for i in range(model.nu):
-        if (model.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_JOINT
-                and model.actuator_trnid[i, 0] == joint):
-            return i
-    return None
-
-
-def is_motor(model: mujoco.MjModel, actuator: int) -> bool:
-    """Return whether an actuator is a plain motor: force = gain · control."""
-    return bool(model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_FIXED
-                and model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE
-                and model.actuator_dyntype[actuator] == mujoco.mjtDyn.mjDYN_NONE)
+    drives = ((model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT)
+              & (model.actuator_trnid[:, 0] == joint))
+    return int(drives.argmax()) if drives.any() else None
 
 
 def motor_ratio(model: mujoco.MjModel, actuator: int) -> float:
-    """Return joint torque per unit of control of a plain motor."""
-    return float(model.actuator_gear[actuator, 0] * model.actuator_gainprm[actuator, 0])
+    """Return joint torque per unit of control of a plain motor (force = gain · control); 0 for any
+    other actuator.
+    """
+    is_motor = (model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_FIXED
+                and model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE
+                and model.actuator_dyntype[actuator] == mujoco.mjtDyn.mjDYN_NONE)
+    ratio = model.actuator_gear[actuator, 0] * model.actuator_gainprm[actuator, 0]
+    return float(ratio) if is_motor else 0.0
 
 
 def torque_limit(model: mujoco.MjModel, joint: int) -> float:
@@ -156,20 +223,15 @@ def torque_limit(model: mujoco.MjModel, joint: int) -> float:
     ParameterError
         If the model limits neither.
     """
-    limits: list[float] = []
-
-    def add(limited: Any, bounds: Vector, factor: float) -> None:
-        if limited:
-            limits.append(float(np.abs(bounds).min() * abs(factor)))
-
-    add(model.jnt_actfrclimited[joint], model.jnt_actfrcrange[joint], 1.0)
-    actuator = actuator_of(model, joint)
-    if actuator is not None:
-        add(model.actuator_forcelimited[actuator], model.actuator_forcerange[actuator],
-            model.actuator_gear[actuator, 0])
-        if is_motor(model, actuator):
-            add(model.actuator_ctrllimited[actuator], model.actuator_ctrlrange[actuator],
-                motor_ratio(model, actuator))
+    bounds = [(model.jnt_actfrclimited[joint], model.jnt_actfrcrange[joint], 1.0)]
+    a = actuator_of(model, joint)
+    if a is not None:
+        bounds += [(model.actuator_forcelimited[a], model.actuator_forcerange[a],
+                    model.actuator_gear[a, 0]),
+                   (model.actuator_ctrllimited[a], model.actuator_ctrlrange[a],
+                    motor_ratio(model, a))]
+    limits = [float(np.abs(values).min() * abs(ratio)) for limited, values, ratio in bounds
+              if limited and ratio]
     if not limits:
         raise ParameterError(
             f"the model gives no torque limit for joint '{model.joint(joint).name}' (ctrlrange, "

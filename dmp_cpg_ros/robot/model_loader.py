@@ -1,23 +1,26 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From an MJCF file to a compiled model that stands on a floor and steps often enough."""
+"""From an MJCF file to a compiled model that stands on a floor and steps often enough, with a
+world of :mod:`dmp_cpg_ros.core.robot_model.world` under it.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+
+import numpy as np
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.robot.mujoco_import import mujoco
-from dmp_cpg_ros.robot.worlds import add_world, set_friction
 
 LONGEST_PHYSICS_STEP = 0.001  # [s] the joint drive runs at 1 kHz or faster
 
-_GROUND = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+_PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 _SKY = mujoco.mjtTexture.mjTEXTURE_SKYBOX
-_GRADIENT = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
-_CHECKER = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
+_LOW, _HIGH = np.array((0.52, 0.56, 0.52, 1.0)), np.array((0.80, 0.76, 0.66, 1.0))
+_CONTACT = ('friction', 'solref', 'solimp', 'condim', 'contype', 'conaffinity', 'priority',
+            'solmix', 'margin', 'gap')
 
 
 def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjModel:
@@ -47,34 +50,50 @@ def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjMo
         raise MissingFileError(f"model '{path}' does not exist")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
-        if not any(geom.type in _GROUND for geom in spec.worldbody.geoms):
+        if not any(geom.type in (_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+                   for geom in spec.worldbody.geoms):
             _add_floor(spec)
         if world is not None:
-            add_world(spec, world)
+            _add_world(spec, world)
         if not spec.lights and (body := spec.body(base)) is not None:
-            _add_light(body)
+            body.add_light(name='added_light', mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
+                           type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=[-0.5, -0.4, 2.5],
+                           dir=[0.2, 0.16, -1.0])
         if not any(texture.type == _SKY for texture in spec.textures):
-            spec.add_texture(name='added_sky', type=_SKY, builtin=_GRADIENT, width=256,
-                             height=1536, rgb1=[0.36, 0.56, 0.80], rgb2=[0.86, 0.92, 0.97])
+            spec.add_texture(name='added_sky', type=_SKY, width=256, height=1536,
+                             builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+                             rgb1=[0.36, 0.56, 0.80], rgb2=[0.86, 0.92, 0.97])
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise ParameterError(f"model '{path}' cannot be compiled: {error}") from error
-    if world is not None:
-        set_friction(model, world)
+    if world is not None and world.friction > 0.0:  # MuJoCo takes the larger of two geoms'
+        model.geom_friction[:, 0] = model.pair_friction[:, :2] = world.friction
     model.opt.timestep = min(model.opt.timestep, LONGEST_PHYSICS_STEP)
     return model
 
 
 def _add_floor(spec: mujoco.MjSpec) -> None:
-    spec.add_texture(name='added_floor', type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=_CHECKER,
-                     rgb1=[0.80, 0.82, 0.84], rgb2=[0.70, 0.73, 0.76], width=512, height=512)
+    spec.add_texture(name='added_floor', type=mujoco.mjtTexture.mjTEXTURE_2D,
+                     builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER, rgb1=[0.80, 0.82, 0.84],
+                     rgb2=[0.70, 0.73, 0.76], width=512, height=512)
     material = spec.add_material(name='added_floor', texrepeat=[2, 2], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = 'added_floor'
-    spec.worldbody.add_geom(name='added_floor', type=mujoco.mjtGeom.mjGEOM_PLANE,
-                            size=[0.0, 0.0, 0.25], material='added_floor')
+    spec.worldbody.add_geom(name='added_floor', type=_PLANE, size=[0.0, 0.0, 0.25],
+                            material='added_floor')
 
 
-def _add_light(body: Any) -> None:
-    body.add_light(name='added_light', mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
-                   type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=[-0.5, -0.4, 2.5],
-                   dir=[0.2, 0.16, -1.0])
+def _add_world(spec: mujoco.MjSpec, world: World) -> None:
+    """Move the floor to its height, and add what stands on it with the floor's contacts."""
+    floor = next((geom for geom in spec.worldbody.geoms if geom.type == _PLANE), None)
+    if floor is not None:
+        floor.pos = [floor.pos[0], floor.pos[1], floor.pos[2] + world.floor]
+    boxes = world.boxes()
+    tops = np.array([box.centre[2] + box.half_size[2] for box in boxes])
+    for i, box in enumerate(boxes):
+        share, half = (tops[i] - tops.min()) / max(np.ptp(tops), 1e-9), 0.5 * box.pitch
+        geom = spec.worldbody.add_geom(
+            name=f'terrain_{i}', type=mujoco.mjtGeom.mjGEOM_BOX, pos=list(box.centre),
+            size=list(box.half_size), quat=[np.cos(half), 0.0, np.sin(half), 0.0],
+            rgba=_LOW + share * (_HIGH - _LOW))
+        for part in _CONTACT if floor is not None else ():
+            setattr(geom, part, getattr(floor, part))

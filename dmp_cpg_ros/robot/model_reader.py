@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +12,14 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.robot.leg_reader import (
-    Foot,
-    check_leg,
-    find,
-    find_foot,
-    foot_position,
-    torque_limit,
-)
+from dmp_cpg_ros.robot import leg_reader
+from dmp_cpg_ros.robot.leg_reader import ModelIds, foot_position
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.mujoco_import import mujoco
-from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
+from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 Vector = NDArray[np.float64]
@@ -37,26 +32,6 @@ _PLACE_OF_LEG = {'fl': (1, 1), 'fr': (1, -1), 'rl': (-1, 1), 'rr': (-1, -1)}  # 
 
 BISECTIONS = 30
 """Of the search for the rolling radius of the feet."""
-
-
-@dataclass(frozen=True)
-class ModelIds:
-    """Ids in the model of what a robot file names.
-
-    Attributes
-    ----------
-    base, free_joint : int
-        Body and its free joint.
-    joints : ndarray (12,) of int
-        Joints in the order of ``JOINT_NAMES``.
-    feet : tuple of Foot
-        In the order fl, fr, rl, rr.
-    """
-
-    base: int
-    free_joint: int
-    joints: NDArray[np.int64]
-    feet: tuple[Foot, ...]
 
 
 def load_description(path: Path | str | None = None) -> RobotDescription:
@@ -72,38 +47,14 @@ def load_description(path: Path | str | None = None) -> RobotDescription:
     MissingFileError, ParameterError
         If a file is missing, or the model is no quadruped of the kind that this package drives.
     """
-    file = own_robot_file() if path is None else load_robot_file(path)
+    file = load_robot_file(path)
     return read_description(load_model(file.model, file.base), file)
-
-
-def find_ids(model: mujoco.MjModel, file: RobotFile) -> ModelIds:
-    """Find base, joints and feet in a model.
-
-    Raises
-    ------
-    ParameterError
-        If a name is not in the model (those there are get listed), or the base cannot move freely.
-    """
-    base = find(model, mujoco.mjtObj.mjOBJ_BODY, file.base, 'body')
-    free = int(model.body_jntadr[base])
-    if free < 0 or model.jnt_type[free] != mujoco.mjtJoint.mjJNT_FREE:
-        raise ParameterError(f"the base '{file.base}' must have a free joint")
-    joints = [find(model, mujoco.mjtObj.mjOBJ_JOINT, name, 'joint')
-              for leg in file.joints for name in leg]
-    if len(set(joints)) != len(joints):
-        raise ParameterError(f'the twelve joints must differ; named are {file.joints}')
-    feet = tuple(find_foot(model, name) for name in file.feet)
-    return ModelIds(base, free, np.array(joints), feet)
 
 
 def pose(model: mujoco.MjModel, ids: ModelIds, joint_position: Vector) -> mujoco.MjData:
     """Return data with the base at the origin, the joints as given, and kinematics computed."""
     data = mujoco.MjData(model)
-    start = int(model.jnt_qposadr[ids.free_joint])
-    data.qpos[start:start + 7] = (0, 0, 0, 1, 0, 0, 0)
-    data.qpos[model.jnt_qposadr[ids.joints]] = joint_position
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
+    leg_reader.place_robot(model, data, ids, np.zeros(3), (1, 0, 0, 0), joint_position)
     return data
 
 
@@ -122,23 +73,24 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
     ParameterError
         If a name is not in the model, or a leg is not abduction (x), hip (y), knee (y).
     """
-    ids = find_ids(model, file)
-    at_zero = pose(model, ids, np.zeros(12))
-    home = _home_keyframe(model, ids)
+    ids = leg_reader.find_ids(model, file)
+    at_zero, home = pose(model, ids, np.zeros(12)), None
+    if (key := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, 'home')) >= 0:
+        home = model.key_qpos[key, model.jnt_qposadr[ids.joints]]
     legs = tuple(_read_leg(model, at_zero, ids, i, file, home) for i in range(4))
     leg_length = float(np.mean([np.linalg.norm(leg.thigh) + np.linalg.norm(leg.shank)
                                 for leg in legs]))
     mass = float(model.body_subtreemass[ids.base])
-    height = file.stance_height or _stance_height(model, ids, legs, leg_length, home)
     kp = file.kp or (GAIN_OVER_WEIGHT * mass * GRAVITY * leg_length,) * 3
     kd = file.kd or tuple(DAMPING_TIME * np.sqrt(leg_length / GRAVITY) * gain for gain in kp)
     description = RobotDescription(
         name=file.model.stem, legs=legs, mass=mass, base_inertia=np.zeros((3, 3)),
-        com_in_base=np.zeros(3), stance_height=height, kp=np.array(kp), kd=np.array(kd),
-        belly_depth=_belly_depth(model, ids.base))
+        com_in_base=np.zeros(3), kp=np.array(kp), kd=np.array(kd),
+        stance_height=file.stance_height or _stance_height(model, ids, legs, leg_length, home),
+        belly_depth=_belly_depth(model, ids.base, at_zero))
     standing = pose(model, ids, home_joint_position(description))
     com, inertia = _composite_inertia(model, standing, ids.base)
-    radius = _rolling_radius(model, standing, int(model.jnt_qposadr[ids.free_joint]), ids.feet)
+    radius = _rolling_radius(model, standing, ids)
     if radius is not None:
         legs = tuple(replace(leg, foot_radius=radius) for leg in legs)
     return replace(description, legs=legs, base_inertia=inertia, com_in_base=com)
@@ -148,21 +100,22 @@ def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, inde
               file: RobotFile, home: Vector | None) -> LegGeometry:
     name, foot = LEGS[index], ids.feet[index]
     joints = [int(joint) for joint in ids.joints[3 * index:3 * index + 3]]
-    sign = check_leg(model, at_zero, name, joints, foot, ids.base)
-    anchor = at_zero.xanchor[joints]
-    if tuple(np.sign(anchor[1, :2])) != _PLACE_OF_LEG[name]:
+    sign = leg_reader.check_leg(model, at_zero, name, joints, foot, ids.base)
+    abduction, hip, knee = at_zero.xanchor[joints]
+    if tuple(np.sign(hip[:2])) != _PLACE_OF_LEG[name]:
         raise ParameterError(
             f'leg {name} is not where its name says: with x forward and y left its hip joint is '
-            f'at x = {anchor[1, 0]:.3f} m, y = {anchor[1, 1]:.3f} m')
+            f'at x = {hip[0]:.3f} m, y = {hip[1]:.3f} m')
     limited = model.jnt_limited[joints].astype(bool)
-    bounds = np.where(limited[:, None], model.jnt_range[joints], (-np.pi, np.pi))
-    thigh, shank = anchor[2] - anchor[1], foot_position(at_zero, foot) - anchor[2]
-    knee = bounds[2].mean() if home is None else home[3 * index + 2]
+    lower, upper = np.where(limited[:, None], model.jnt_range[joints], (-np.pi, np.pi)).T.copy()
+    thigh, shank = knee - hip, foot_position(at_zero, foot) - knee
+    angle = 0.5 * (lower[2] + upper[2]) if home is None else home[3 * index + 2]
     return LegGeometry(
-        name=name, hip_in_base=anchor[0].copy(), hip_offset=anchor[1] - anchor[0], thigh=thigh,
-        shank=shank, axis_sign=sign, knee_sign=_knee_sign(name, thigh, shank, sign[2] * knee),
-        position_lower=bounds[:, 0].copy(), position_upper=bounds[:, 1].copy(),
-        torque_limit=np.array(file.torque_limit or [torque_limit(model, j) for j in joints]),
+        name=name, hip_in_base=abduction, hip_offset=hip - abduction, thigh=thigh, shank=shank,
+        axis_sign=sign, knee_sign=_knee_sign(name, thigh, shank, sign[2] * angle),
+        position_lower=lower, position_upper=upper,
+        torque_limit=np.array(
+            file.torque_limit or [leg_reader.torque_limit(model, joint) for joint in joints]),
         velocity_limit=np.array(file.velocity_limit or (USUAL_VELOCITY_LIMIT,) * 3),
         rotor_inertia=model.dof_armature[model.jnt_dofadr[joints]].copy(), foot_radius=foot.radius)
 
@@ -178,12 +131,6 @@ def _knee_sign(leg: str, thigh: Vector, shank: Vector, angle: float) -> int:
     return int(np.sign(bend))
 
 
-def _home_keyframe(model: mujoco.MjModel, ids: ModelIds) -> Vector | None:
-    """Return the joint angles (12,) of the keyframe ``home``, or None."""
-    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, 'home')
-    return None if key < 0 else model.key_qpos[key, model.jnt_qposadr[ids.joints]].copy()
-
-
 def _stance_height(model: mujoco.MjModel, ids: ModelIds, legs: tuple[LegGeometry, ...],
                    leg_length: float, home: Vector | None) -> float:
     """Return the height at which the home keyframe's feet touch, or 0.7 of the leg's length."""
@@ -196,7 +143,7 @@ def _stance_height(model: mujoco.MjModel, ids: ModelIds, legs: tuple[LegGeometry
     return height if 0.6 * usual < height < 1.3 * usual else usual
 
 
-def _belly_depth(model: mujoco.MjModel, base: int) -> float:
+def _belly_depth(model: mujoco.MjModel, base: int, at_zero: mujoco.MjData) -> float:
     """Return how far the base body's colliding shapes reach below its origin [m].
 
     A base without any (some models let only the legs collide) is taken by its visible shapes.
@@ -205,11 +152,9 @@ def _belly_depth(model: mujoco.MjModel, base: int) -> float:
     colliding = geoms[(model.geom_contype[geoms] | model.geom_conaffinity[geoms]) != 0]
     depth = 0.0
     for geom in colliding if len(colliding) else geoms:
-        R = np.zeros(9)
-        mujoco.mju_quat2Mat(R, model.geom_quat[geom])
-        down = R.reshape(3, 3)[2]
+        down = at_zero.geom_xmat[geom].reshape(3, 3)[2]
         centre, half = model.geom_aabb[geom, :3], model.geom_aabb[geom, 3:]
-        lowest = model.geom_pos[geom, 2] + down @ centre - np.abs(down) @ half
+        lowest = at_zero.geom_xpos[geom, 2] + down @ centre - np.abs(down) @ half
         depth = max(depth, -float(lowest))
     return depth
 
@@ -229,8 +174,7 @@ def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData,
     return com, inertia
 
 
-def _rolling_radius(model: mujoco.MjModel, data: mujoco.MjData, base_qpos: int,
-                  feet: tuple[Foot, ...]) -> float | None:
+def _rolling_radius(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds) -> float | None:
     """Distance from the feet's centres to where they touch while the robot stands on them.
 
     Some models have soft feet (centimetres), which roll on a smaller radius than their shape says;
@@ -242,44 +186,32 @@ def _rolling_radius(model: mujoco.MjModel, data: mujoco.MjData, base_qpos: int,
     ----------
     model, data
         MuJoCo's, the joints in the home pose; the base is moved.
-    base_qpos : int
-        Where the base's position is in ``qpos``.
-    feet : tuple of Foot
-        The feet.
+    ids : ModelIds
+        Base and feet.
 
     Returns
     -------
     float or None
         [m]; None where the feet have no contact sphere, or sink in to their centres.
     """
-    radius = float(np.mean([foot.radius for foot in feet]))
+    radius = float(np.mean([foot.radius for foot in ids.feet]))
     if radius == 0.0:
         return None
-    body = int(model.body_rootid[feet[0].body])
-    weight = -float(model.body_subtreemass[body] * model.opt.gravity[2])
-    data.qvel[:], data.qacc[:] = 0.0, 0.0
+    weight = -float(model.body_subtreemass[model.body_rootid[ids.base]] * model.opt.gravity[2])
+    data.qvel[:] = data.qacc[:] = 0.0
+    wrench = np.zeros(6)
 
-    def carried(centre: float) -> float:
+    def carried(centre: float) -> bool:
         mujoco.mj_kinematics(model, data)
-        heights = [float(foot_position(data, foot)[2]) for foot in feet]
-        data.qpos[base_qpos + 2] += centre - np.mean(heights)
+        heights = [float(foot_position(data, foot)[2]) for foot in ids.feet]
+        data.qpos[ids.base_qpos + 2] += centre - np.mean(heights)
         mujoco.mj_inverse(model, data)
-        return _normal_force(model, data)
+        force = 0.0
+        for i in range(data.ncon):
+            mujoco.mj_contactForce(model, data, i, wrench)
+            force += float(wrench[0])
+        return force > weight
 
-    low, high = 0.0, radius
-    if not carried(low) > weight > carried(high):
+    if not carried(0.0) or carried(radius):
         return None
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if carried(middle) > weight else (low, middle)
-    return 0.5 * (radius + high)
-
-
-def _normal_force(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Sum of the normal forces of all contacts [N]."""
-    wrench: Vector = np.zeros(6)
-    total = 0.0
-    for i in range(data.ncon):
-        mujoco.mj_contactForce(model, data, i, wrench)
-        total += float(wrench[0])
-    return total
+    return 0.5 * (radius + last_that_holds(lambda c: not carried(c), radius, 0.0, BISECTIONS))

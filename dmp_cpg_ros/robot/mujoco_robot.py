@@ -19,17 +19,16 @@ from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import World, height_over_ground
 from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue
 from dmp_cpg_ros.robot.contact_reader import ContactReader
-from dmp_cpg_ros.robot.joint_actuators import JointActuators, as_slice
+from dmp_cpg_ros.robot.joint_actuators import JointActuators, as_slice, standing_torque
 from dmp_cpg_ros.robot.joint_drive import JointDrive
+from dmp_cpg_ros.robot.leg_reader import find_ids, place_robot
 from dmp_cpg_ros.robot.model_loader import load_model
-from dmp_cpg_ros.robot.model_reader import find_ids, read_description
+from dmp_cpg_ros.robot.model_reader import read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.port import RobotError, steps_per_tick
-from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file, own_robot_file
+from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file
 from dmp_cpg_ros.robot.sensor_noise import SensorNoise
-from dmp_cpg_ros.robot.standing_torque import standing_torque
-from dmp_cpg_ros.robot.start_pose import StartPose, home_joint_position
-from dmp_cpg_ros.robot.start_pose import start_pose as pose_of
+from dmp_cpg_ros.robot.start_pose import UPRIGHT, StartPose, home_joint_position, start_pose_of
 
 Vector = NDArray[np.float64]
 
@@ -85,47 +84,41 @@ class MujocoRobot:
                  seed: int = 0, initial_spread: float = 0.0,
                  initial_height: float | None = None, world: World | None = None,
                  sensors: SensorParameters | None = None, start_pose: str = 'standing') -> None:
-        if not isinstance(robot_file, RobotFile):
-            robot_file = own_robot_file() if robot_file is None else load_robot_file(robot_file)
+        file = load_robot_file(robot_file)
         self.world = world = world or World()
-        self.model = model = load_model(robot_file.model, robot_file.base, world)
+        self.model = model = load_model(file.model, file.base, world)
         # what the controllers know of the robot does not depend on the world, not in the last bit
         self.description: RobotDescription = read_description(
-            model if world == World() else load_model(robot_file.model, robot_file.base),
-            robot_file)
-        self.tick_ns = tick_ns
-        self._step_ns = round(model.opt.timestep * 1e9)
+            model if world == World() else load_model(file.model, file.base), file)
+        self.tick_ns, self._step_s = tick_ns, model.opt.timestep
+        self._step_ns = round(self._step_s * 1e9)
         self._steps = steps_per_tick(tick_ns, self._step_ns)
         # A silent restart of the simulation on bad numbers would look like a jump of the robot.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-        self._ids = find_ids(model, robot_file)
-        self.base = int(self._ids.base)
-        self._qpos = as_slice(model.jnt_qposadr[self._ids.joints])
-        self._dof = as_slice(model.jnt_dofadr[self._ids.joints])
-        self._step_s, self._gravity = model.opt.timestep, model.opt.gravity.copy()
-        self._base_qpos = int(model.jnt_qposadr[self._ids.free_joint])
-        self._base_dof = int(model.jnt_dofadr[self._ids.free_joint])
-        self._actuators = JointActuators(model, self._ids.joints)
+        self._ids = ids = find_ids(model, file)
+        self.base = ids.base
+        self._qpos = as_slice(model.jnt_qposadr[ids.joints])
+        self._dof = as_slice(model.jnt_dofadr[ids.joints])
+        self._gravity = model.opt.gravity.copy()
+        self._actuators = JointActuators(model, ids.joints)
         self._drive = JointDrive(
-            self.description, self._steps, model.opt.timestep,
-            model.dof_damping[self._dof])
-        self._contacts = ContactReader(model, self._ids)
-        self._home = home_joint_position(self.description)
+            self.description, self._steps, self._step_s, model.dof_damping[self._dof])
+        self._contacts = ContactReader(model, ids)
         self._hips_in_base = np.array([leg.hip_in_base for leg in self.description.legs])
         if not (np.isfinite(initial_spread) and initial_spread >= 0.0):
             raise ParameterError(f'initial_spread = {initial_spread!r} must be at least 0 rad')
-        self._seed, self._spread = seed, initial_spread
-        self._initial_height = initial_height
         self._sensors = None if sensors is None else SensorNoise(sensors, seed, tick_ns)
-        self._start = (
-            None if start_pose == 'standing' else pose_of(start_pose, self.description, seed))
+        if start_pose == 'standing':
+            spread = np.random.default_rng(seed).uniform(-1.0, 1.0, 12) * initial_spread
+            height = self.description.stance_height - INITIAL_PENETRATION
+            self._start = StartPose(
+                np.array((0.0, 0.0, height if initial_height is None else initial_height)),
+                UPRIGHT, home_joint_position(self.description) + spread)
+        else:
+            self._start = start_pose_of(start_pose, self.description, seed)
         self.data = mujoco.MjData(model)
         self._torques = np.zeros((self._steps, 12))  # of each physics step of the tick
         self._rates = np.zeros((self._steps + 1, 12))  # before each of them and after the last
-        self._tick = 0
-        self._push: tuple[Vector, int] = (np.zeros(3), 0)
-        self._pushing = False
-        self._pushes = PushQueue()
         self.reset()
 
     def reset(self, time_ns: int = 0) -> RobotState:
@@ -134,51 +127,32 @@ class MujocoRobot:
         A standing robot is in its home pose, held by the torques that standing takes; the other
         poses come to rest before that time.
         """
-        self._push, self._pushes = (np.zeros(3), 0), PushQueue()
-        if self._start is None:
-            self._reset_standing()
-        else:
-            self._reset_down(self._start)
-        self._tick, self.data.time = time_ns // self.tick_ns, time_ns * 1e-9
-        return self._state()
-
-    def _reset_down(self, start: StartPose) -> None:
-        data, b = self.data, self._base_qpos
-        mujoco.mj_resetData(self.model, data)
-        self._drive.reset()
-        self._work = np.zeros(12)
-        data.qpos[b:b + 3] = start.base_position
-        data.qpos[b + 3:b + 7] = start.base_quaternion
-        data.qpos[self._qpos] = held = start.joint_position
-        mujoco.mj_forward(self.model, data)
-        for _ in range(round(start.settling_s * 1e9 / self.tick_ns)):
-            state = self.step(JointTargets(held, np.zeros(12), np.zeros(12)))
-            held = state.joint_position if start.limp else held
-        self._drive.reset()
-        self._work = np.zeros(12)
-
-    def _reset_standing(self) -> None:
-        data, model = self.data, self.model
+        data, model, start = self.data, self.model, self._start
+        self._push_force, self._push_steps, self._pushes = np.zeros(3), -1, PushQueue()
+        self._tick, self._work = 0, np.zeros(12)
         mujoco.mj_resetData(model, data)
         self._drive.reset()
-        if self._sensors is not None:
+        if self._sensors is not None and not start.settling_s:
             self._sensors.reset()
-        spread = np.random.default_rng(self._seed).uniform(-1.0, 1.0, 12) * self._spread
-        height = self._initial_height
-        if height is None:
-            height = self.description.stance_height - INITIAL_PENETRATION
-        b = self._base_qpos
-        data.qpos[b:b + 7] = (0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0)
-        data.qpos[self._qpos] = self._home + spread
+        held = start.joint_position
+        place_robot(model, data, self._ids, start.base_position, start.base_quaternion, held)
         mujoco.mj_forward(model, data)
-        holding = standing_torque(model, data, self._ids, self._dof)
-        self._effort = self._drive.limited(holding, np.zeros(12))
-        self._peak_effort, self._work = np.abs(self._effort), np.zeros(12)
-        self._actuators.apply(data, self._effort)
-        mujoco.mj_forward(model, data)
-        # As held at rest: the first instant of the contacts is nothing that a sensor would show.
-        R_world_base = data.xmat[self._ids.base].reshape(3, 3)
-        self._specific_force = -self._gravity @ R_world_base
+        if start.settling_s:
+            for _ in range(round(start.settling_s * 1e9 / self.tick_ns)):
+                state = self.step(JointTargets(held, np.zeros(12), np.zeros(12)))
+                held = state.joint_position if start.limp else held
+            self._drive.reset()
+            self._work = np.zeros(12)
+        else:
+            holding = standing_torque(model, data, self._ids, self._dof)
+            self._effort = self._drive.limited(holding, np.zeros(12))
+            self._peak_effort = np.abs(self._effort)
+            self._actuators.apply(data, self._effort)
+            mujoco.mj_forward(model, data)
+            # As held at rest: the first instant of the contacts is nothing a sensor would show.
+            self._specific_force = -self._gravity @ data.xmat[self.base].reshape(3, 3)
+        self._tick, data.time = time_ns // self.tick_ns, time_ns * 1e-9
+        return self._state()
 
     def step(self, targets: JointTargets) -> RobotState:
         """Advance by one control tick.
@@ -194,8 +168,8 @@ class MujocoRobot:
         self._begin_push()
         model, data, drive = self.model, self.data, self._drive
         qpos, qvel, step = data.qpos, data.qvel, mujoco.mj_step
-        d, specific_force = self._base_dof, np.zeros(3)
-        R_world_base = data.xmat[self._ids.base].reshape(3, 3)  # a view, of the step's begin
+        d, specific_force = self._ids.base_dof, np.zeros(3)
+        R_world_base = data.xmat[self.base].reshape(3, 3)  # a view, of the step's begin
         base_velocity = qvel[d:d + 3]
         torques, rates = self._torques, self._rates
         for i in range(self._steps):
@@ -234,8 +208,8 @@ class MujocoRobot:
         if force.shape != (3,) or not np.isfinite(force).all():
             raise ParameterError(
                 f'a push must be three finite numbers [N], not {force_in_world!r}')
-        self._push = (force, steps_per_tick(duration_ns, self._step_ns))
-        self._pushing = True
+        self._push_steps = steps_per_tick(duration_ns, self._step_ns)
+        self._push_force = force
 
     def take_push(self, force: PushForce) -> None:
         """Let a force act from its time on, for ``HOLD_NS`` or until the next one."""
@@ -246,38 +220,37 @@ class MujocoRobot:
         """What takes the events of a scenario that are for the robot, by kind, for
         :func:`~dmp_cpg_ros.core.scenario.scenario.play`.
         """
-        def push(value: Push) -> None:
-            for force in value.forces(self._tick * self.tick_ns, self.tick_ns):
-                self.take_push(force)
+        return {'push': self._take_all}
 
-        return {'push': push}
+    def _take_all(self, push: Push) -> None:
+        for force in push.forces(self._tick * self.tick_ns, self.tick_ns):
+            self.take_push(force)
 
     def _begin_push(self) -> None:
         """Start the force whose time has come at the beginning of this tick."""
         force = self._pushes.due(self._tick * self.tick_ns)
         if force is not None:
-            b = self._base_qpos
-            quaternion = _xyzw(self.data.qpos[b + 3:b + 7])
             steps = -(-HOLD_NS // self._step_ns)
-            self.apply_push(force.in_world(quaternion), steps * self._step_ns)
+            self.apply_push(force.in_world(_xyzw(self._base_pose[3:])), steps * self._step_ns)
 
     def _push_on(self) -> None:
-        if not self._pushing:
-            return
-        force, left = self._push
-        if left:
-            self.data.xfrc_applied[self._ids.base, :3] = force
-            self._push = (force, left - 1)
-        else:
-            self.data.xfrc_applied[self._ids.base, :3] = 0.0
-            self._pushing = False
+        """Set the force of one physics step; after the last one it is zero."""
+        if self._push_steps >= 0:
+            self.data.xfrc_applied[self.base, :3] = self._push_force if self._push_steps else 0.0
+            self._push_steps -= 1
+
+    @property
+    def _base_pose(self) -> Vector:
+        """Position and quaternion (w, x, y, z) of the base, a view of (7,)."""
+        pose: Vector = self.data.qpos[self._ids.base_qpos:self._ids.base_qpos + 7]
+        return pose
 
     @property
     def fallen(self) -> bool:
         """Whether the base is below half its height over the ground, tilted by over 60°, or lies
         on the ground.
         """
-        R_world_base = _rotation(self.data.qpos[self._base_qpos + 3:self._base_qpos + 7])
+        R_world_base = _rotation(self._base_pose[3:])
         height = self.height_over_ground / self.description.stance_height
         upright = float(R_world_base[2, 2])  # cosine between the base's z and the world's
         lies = self._contacts.base_touches(self.data) and (
@@ -287,34 +260,27 @@ class MujocoRobot:
     @property
     def height_over_ground(self) -> float:
         """Height of the base over the ground below its hips [m]."""
-        b = self._base_qpos
-        place = self.data.qpos[b:b + 3]
+        place, quaternion = self._base_pose[:3], self._base_pose[3:]
         if self.world.is_flat:
             return float(place[2])
-        hips = place + self._hips_in_base @ _rotation(self.data.qpos[b + 3:b + 7]).T
+        hips = place + self._hips_in_base @ _rotation(quaternion).T
         return float(height_over_ground(self.world, place, hips))
 
     def close(self) -> None:
         """Nothing to release; here because a robot has it."""
 
     def _state(self) -> RobotState:
-        data, b, d = self.data, self._base_qpos, self._base_dof
-        qpos, qvel = data.qpos, data.qvel
-        quaternion = qpos[b + 3:b + 7]
-        R_world_base = _rotation(quaternion)
+        qvel, d, pose = self.data.qvel, self._ids.base_dof, self._base_pose
         state = RobotState(
             time_ns=self._tick * self.tick_ns,
-            joint_position=qpos[self._qpos].copy(),
-            joint_velocity=qvel[self._dof].copy(),
-            joint_effort=self._effort.copy(),
-            base_position_in_world=qpos[b:b + 3].copy(),
-            base_quaternion=_xyzw(quaternion),
-            base_velocity_in_base=qvel[d:d + 3] @ R_world_base,
+            joint_position=self.data.qpos[self._qpos].copy(),
+            joint_velocity=qvel[self._dof].copy(), joint_effort=self._effort.copy(),
+            base_position_in_world=pose[:3].copy(), base_quaternion=_xyzw(pose[3:]),
+            base_velocity_in_base=qvel[d:d + 3] @ _rotation(pose[3:]),
             base_rate_in_base=qvel[d + 3:d + 6].copy(),
             acceleration_in_base=self._specific_force.copy(),
-            foot_force=self._contacts.foot_force(data),
-            joint_work=self._work,
-            joint_peak_effort=self._peak_effort)
+            foot_force=self._contacts.foot_force(self.data),
+            joint_work=self._work, joint_peak_effort=self._peak_effort)
         return state if self._sensors is None else self._sensors.measured(state)
 
 

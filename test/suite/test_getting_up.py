@@ -17,7 +17,6 @@ from dmp_cpg_ros.core.modes.motion_library import Movements
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 
 pytest.importorskip('mujoco')
-from dmp_cpg_ros.robot.fallback import FallbackController
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 
@@ -144,7 +143,7 @@ def test_a_start_pose_that_is_none_is_refused() -> None:
 def left_alone(life: Life, seconds: float, prepare: Callable[[Life], None]) -> CommandWatchdog:
     """Let the legs fall silent and the robot look after itself."""
     prepare(life)
-    guard = CommandWatchdog(FallbackController(life.robot.description), HOLD_NS)
+    guard = CommandWatchdog(life.robot.description, HOLD_NS)
     for i, leg in enumerate(LEGS):
         joints = slice(3 * i, 3 * i + 3)
         targets = life.loop.tick(life.states[-1]).targets

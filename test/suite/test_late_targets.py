@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
-from dmp_cpg_ros.robot.fallback import FallbackController
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.watchdog import CARRIED_NS, CommandWatchdog
 from dmp_cpg_ros.suite import load_gaits, load_suite
@@ -28,9 +28,9 @@ LONGEST = CARRIED_NS // TICK_NS
 SUITE = load_suite(None, {'auto_inhibit': False, 'cmd_vel_timeout': 0.0})
 
 
-def make_guard(description: object) -> CommandWatchdog:
+def make_guard(description: RobotDescription) -> CommandWatchdog:
     timeout_ns = round(1e9 * RobotParameters().target_timeout)
-    return CommandWatchdog(FallbackController(description), timeout_ns)
+    return CommandWatchdog(description, timeout_ns)
 
 
 def accept(guard: CommandWatchdog, stamp_ns: int, targets: JointTargets) -> None:
