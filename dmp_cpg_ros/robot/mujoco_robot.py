@@ -132,7 +132,7 @@ class MujocoRobot:
         self._tick, self._work = 0, np.zeros(12)
         mujoco.mj_resetData(model, data)
         self._drive.reset()
-        if self._sensors is not None and not start.settling_s:
+        if self._sensors is not None:
             self._sensors.reset()
         held = start.joint_position
         place_robot(model, data, self._ids, start.base_position, start.base_quaternion, held)

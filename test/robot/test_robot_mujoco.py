@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -78,6 +79,13 @@ def test_two_runs_from_reset_are_identical_bit_for_bit(robot):
             value = np.asarray(getattr(one, field.name))
             assert value.tobytes() == np.asarray(getattr(again, field.name)).tobytes()
             assert value.tobytes() == np.asarray(getattr(elsewhere, field.name)).tobytes()
+
+
+def test_a_robot_that_lies_repeats_itself_with_the_noise_of_its_sensors():
+    robot = MujocoRobot(sensors=SensorParameters(), start_pose='lying')
+    first, again = (robot.reset() for _ in range(2))
+    for field in fields(RobotState):
+        np.testing.assert_array_equal(getattr(first, field.name), getattr(again, field.name))
 
 
 def test_states_do_not_change_behind_ones_back(robot):
