@@ -34,7 +34,7 @@ from dmp_cpg_ros.core.contraction.voting import (
     rest_threshold,
 )
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.threshold import VoteClamp, majority, vote_clamp
+from dmp_cpg_ros.core.inhibition.voting import VoteClamp, majority, vote_clamp
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS

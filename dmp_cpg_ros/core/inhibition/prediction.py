@@ -22,12 +22,10 @@ from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 Array = NDArray[np.float64]
 
 
-def predict(
-    supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
-    state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
-    command: tuple[float, float, float], dt: float, horizon: float = 10.0,
-    body_mode: str = 'standing',
-) -> float:
+def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
+            state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
+            command: tuple[float, float, float], dt: float, horizon: float = 10.0,
+            body_mode: str = 'standing') -> float:
     """Time from now to rest (of a requested stop) or to phase lock (of a start).
 
     Parameters
@@ -64,8 +62,7 @@ def predict(
         canon = canonical.step(canon, r, inhibition, dt)
         state = supervisor.step(
             state, start_ns + k * tick_ns, canonical.network(canon.gait), canon.x, canon.x_dot,
-            r, command, body_mode=body_mode,
-        )
+            r, command, body_mode=body_mode)
         inhibition = supervisor.inhibition(state)
         if state.word in ('at_rest', 'walking', 'free'):
             return k * dt

@@ -137,26 +137,17 @@ class GaitSupervisor:
         Rate of the legs' swing activity [1/s].
     """
 
-    def __init__(
-        self, parameters: InhibitionParameters, voting: VotingParameters, activity_rate: float,
-    ) -> None:
+    def __init__(self, parameters: InhibitionParameters, voting: VotingParameters,
+                 activity_rate: float) -> None:
         """Keep the parts."""
         self.parameters, self.voting, self.activity_rate = parameters, voting, activity_rate
 
     def initial_state(self, time_ns: int = 0) -> SupervisorState:
         """At rest, or free when ``start_inhibited`` is false."""
         stopped = self.parameters.start_inhibited
-        return SupervisorState(
-            time_ns,
-            'at_rest' if stopped else 'free',
-            stopped,
-            True,
-            time_ns,
-            stopped,
-            np.zeros(4) if stopped else np.ones(4),
-            measured_s=0.0,
-            asked=stopped,
-        )
+        return SupervisorState(time_ns, 'at_rest' if stopped else 'free', stopped, True, time_ns,
+                               stopped, np.full(len(LEGS), 0.0 if stopped else 1.0),
+                               measured_s=0.0, asked=stopped)
 
     def inhibition(self, state: SupervisorState) -> Inhibition:
         """Inhibition that the canonical system applies at the tick after ``state``.
@@ -164,9 +155,8 @@ class GaitSupervisor:
         Votes that do not stop the gait act weakly while it walks. In a stop the larger acts on
         each leg of what was asked for and what was voted, once the reference is slow.
         """
-        gains = self._gains(state, state.armed)
-        at_rest = state.word == 'at_rest'
-        return Inhibition(state.requested, gains, self.parameters.region_radius, at_rest)
+        return Inhibition(state.requested, self._gains(state, state.armed),
+                          self.parameters.region_radius, state.word == 'at_rest')
 
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
         if not state.requested:
@@ -174,9 +164,8 @@ class GaitSupervisor:
         gains = self.parameters.armed_gains if armed and state.asked else np.zeros(len(LEGS))
         return np.maximum(gains, state.vote_gains) if armed and state.voted else gains
 
-    def request(
-        self, state: SupervisorState, stop: bool, automatic: bool = False,
-    ) -> SupervisorState:
+    def request(self, state: SupervisorState, stop: bool, automatic: bool = False
+                ) -> SupervisorState:
         """Ask for a stop or a start; asking for what is already asked changes nothing but its
         origin.
 
@@ -185,11 +174,9 @@ class GaitSupervisor:
         voted = state.voted and (stop or automatic or state.tally.alive)
         return self._turned(updated(state, asked=stop, automatic=automatic, voted=voted))
 
-    def step(
-        self, state: SupervisorState, time_ns: int, network: GaitNetwork, x: Array, x_dot: Array,
-        r: Array, command: tuple[float, float, float], tally: Tally | None = None,
-        body_mode: str = 'standing',
-    ) -> SupervisorState:
+    def step(self, state: SupervisorState, time_ns: int, network: GaitNetwork, x: Array,
+             x_dot: Array, r: Array, command: tuple[float, float, float],
+             tally: Tally | None = None, body_mode: str = 'standing') -> SupervisorState:
         """Advance by one tick.
 
         Parameters
@@ -219,32 +206,21 @@ class GaitSupervisor:
         gait, rates = network.gait, scalar_phase_rates(x, x_dot)
         speed = network.scale.foot_speed(*r.tolist())
         omega, more = gait.omega(speed, network.scale), gait.rest_rate
-        activity = activities_step(
-            state.activity,
-            [rate + more for rate in rates],
-            gait.own_omegas(omega),
-            self.activity_rate,
-            dt,
-        )
+        activity = activities_step(state.activity, [rate + more for rate in rates],
+                                   gait.own_omegas(omega), self.activity_rate, dt)
         state = updated(state, time_ns=time_ns, activity=activity)
-        if body_mode == 'standing':
-            state = self._automatic(state, command)
-        else:
+        if body_mode != 'standing':
             state = self._barred(state, body_mode)
+        elif self.parameters.auto_inhibit:
+            state = self._automatic(state, any(command))
         state = self._voted(state, tally or state.tally)
         if state.requested:
             return self._stopping(state, network, x, rates, speed)
         return self._running(state, network.phase_errors(x), speed)
 
-    def _automatic(
-        self, state: SupervisorState, command: tuple[float, float, float],
-    ) -> SupervisorState:
-        """Stop after a time of zero command, and start at a command, when ``auto_inhibit`` is
-        on.
-        """
-        if not self.parameters.auto_inhibit:
-            return state
-        if any(command):
+    def _automatic(self, state: SupervisorState, commanded: bool) -> SupervisorState:
+        """Stop after a time of zero command, and start at a command."""
+        if commanded:
             if state.idle_ns >= 0:
                 state = updated(state, idle_ns=-1)
             return self.request(state, False, True) if state.asked and state.automatic else state
@@ -275,15 +251,8 @@ class GaitSupervisor:
         stop = state.asked or state.voted
         if stop == state.requested:
             return state
-        return updated(
-            state,
-            word='waiting' if stop else 'releasing',
-            requested=stop,
-            request_ns=state.time_ns,
-            armed=False,
-            measured_s=float('nan'),
-            idle_ns=-1,
-        )
+        return updated(state, word='waiting' if stop else 'releasing', requested=stop,
+                       request_ns=state.time_ns, armed=False, measured_s=float('nan'), idle_ns=-1)
 
     def _barred(self, state: SupervisorState, body_mode: str) -> SupervisorState:
         """Stop because the robot does not stand; after a fall no command starts it again."""
@@ -292,28 +261,19 @@ class GaitSupervisor:
             return self.request(state, True, automatic)
         return updated(state, automatic=state.automatic and automatic, idle_ns=-1)
 
-    def _stopping(
-        self, state: SupervisorState, network: GaitNetwork, x: Array, rates: list[float],
-        speed: float,
-    ) -> SupervisorState:
-        inside = self._acts(state, network.target, x)
+    def _stopping(self, state: SupervisorState, network: GaitNetwork, x: Array,
+                  rates: list[float], speed: float) -> SupervisorState:
+        # whether inhibition acts here once it is armed
+        once_armed = Inhibition(True, self._gains(state, True), self.parameters.region_radius)
+        inside = bool(once_armed.acting_gains(x, network.target).any())
         armed = (state.armed and inside) or (
             speed <= self.parameters.capture_speed and self.in_places(network, x))
         if not (armed and inside):
             return updated(state, armed=armed, word='waiting')
-        if (
-            max(map(abs, rates)) > REST_PHASE_RATE
-            or speed > REST_SPEED
-            or max(state.activity.tolist()) > REST_ACTIVITY
-        ):
+        if (max(map(abs, rates)) > REST_PHASE_RATE or speed > REST_SPEED
+                or max(state.activity.tolist()) > REST_ACTIVITY):
             return updated(state, armed=armed, word='captured')
         return updated(state, armed=armed, word='at_rest', measured_s=self._measured(state))
-
-    def _acts(self, state: SupervisorState, target: Array, x: Array) -> bool:
-        """Whether inhibition acts at a state once it is armed."""
-        gains = self._gains(state, True)
-        inhibition = Inhibition(True, gains, self.parameters.region_radius)
-        return bool(inhibition.acting_gains(x, target).any())
 
     def in_places(self, network: GaitNetwork, x: Array) -> bool:
         """Whether legs and radii are as close to their places as capture takes for granted."""

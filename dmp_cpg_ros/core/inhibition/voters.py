@@ -130,10 +130,9 @@ class FootWatch:
     walking_ns: int = NEVER
 
 
-def watch_feet(
-    state: FootWatch, parameters: VoteSourceParameters, time_ns: int, walking: bool,
-    position: Array, duty: float, omega: float, load: Array,
-) -> tuple[FootWatch, Mask, Mask]:
+def watch_feet(state: FootWatch, parameters: VoteSourceParameters, time_ns: int, walking: bool,
+               position: Array, duty: float, omega: float, load: Array
+               ) -> tuple[FootWatch, Mask, Mask]:
     """Compare what the feet feel with where their legs are in the cycle.
 
     Parameters
@@ -170,11 +169,9 @@ def watch_feet(
     lost = _since(state.lost_ns, standing & (load < p.footing_load), time_ns)
     hit = _since(state.hit_ns, swinging & (load > p.collision_load), time_ns)
     stance_ns = 2e9 * pi * duty / omega
-    return (
-        FootWatch(lost, hit, walking_ns),
-        (lost != NEVER) & (time_ns - lost >= p.footing_share * stance_ns),
-        (hit != NEVER) & (time_ns - hit >= round(p.collision_time * 1e9)),
-    )
+    return (FootWatch(lost, hit, walking_ns),
+            (lost != NEVER) & (time_ns - lost >= p.footing_share * stance_ns),
+            (hit != NEVER) & (time_ns - hit >= round(p.collision_time * 1e9)))
 
 
 def _since(before: Stamps, now: Mask, time_ns: int) -> Stamps:

@@ -17,15 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.inhibition.voting_parameters import SUM
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 
-FOOTING, COLLISION, TILT, SILENCE = 'footing', 'collision', 'tilt', 'silence'
-
-OWN_SOURCES = (FOOTING, COLLISION, TILT, SILENCE)
+OWN_SOURCES = ('footing', 'collision', 'tilt', 'silence')
 """Names of the sources inside the suite."""
 
 ANONYMOUS = 'user'
@@ -67,21 +64,17 @@ class VoteInbox:
         voter = voter or ANONYMOUS
         if not weights or not set(weights) <= set(LEGS):
             raise DataError(
-                f'votes for {list(weights)} must name one or more of the legs {", ".join(LEGS)}'
-            )
+                f'votes for {list(weights)} must name one or more of the legs {", ".join(LEGS)}')
         for leg, weight in weights.items():
             if not (isfinite(weight) and weight >= 0.0):
                 raise DataError(f'vote of {leg} = {weight} must be finite and at least 0')
         if voter in OWN_SOURCES or not voter.isprintable() or len(voter) > 40 or '+' in voter:
             raise DataError(
                 f'{voter!r} cannot be the name of a voter: it must be printable, of at most 40 '
-                f'characters, without +, and none of {", ".join(OWN_SOURCES)}'
-            )
+                f'characters, without +, and none of {", ".join(OWN_SOURCES)}')
         if voter not in self._voters and len(self._voters) >= MOST_VOTERS:
-            raise DataError(
-                f"'{voter}' is one voter too many; the {MOST_VOTERS} that can vote are "
-                f'{", ".join(sorted(self._voters))}'
-            )
+            raise DataError(f"'{voter}' is one voter too many; the {MOST_VOTERS} that can vote "
+                            f'are {", ".join(sorted(self._voters))}')
         self._voters.add(voter)
         self._waiting.append((voter, tuple(weights.get(leg, float('nan')) for leg in LEGS)))
 
@@ -116,11 +109,9 @@ class VoteMemory:
     def left(self, time_ns: int, fade_ns: int) -> dict[str, Array]:
         """Weights that are left of each source's votes, which fade within ``fade_ns`` [ns]."""
         return {
-            source: weights
-            * np.maximum(0, FADE_STEPS - FADE_STEPS * (time_ns - asked_ns) // fade_ns)
-            / FADE_STEPS
-            for source, (weights, asked_ns) in self.asks.items()
-        }
+            source: weights * np.maximum(
+                0, FADE_STEPS - FADE_STEPS * (time_ns - asked_ns) // fade_ns) / FADE_STEPS
+            for source, (weights, asked_ns) in self.asks.items()}
 
     def alive(self, time_ns: int, fade_ns: int) -> VoteMemory:
         """Memory without the sources of which nothing is left."""
@@ -134,9 +125,8 @@ class VoteMemory:
     def causes(self, time_ns: int, fade_ns: int) -> tuple[str, ...]:
         """Names of the sources behind each leg's vote, joined by ``+``; empty without a vote."""
         left = sorted(self.left(time_ns, fade_ns).items())
-        return tuple(
-            '+'.join(name for name, weights in left if weights[i] > 0.0) for i in range(len(LEGS))
-        )
+        return tuple('+'.join(name for name, weights in left if weights[i] > 0.0)
+                     for i in range(len(LEGS)))
 
 
 @dataclass(frozen=True)
@@ -174,28 +164,3 @@ class Tally:
 
 NO_VOTES = Tally()
 """Nobody votes."""
-
-
-def acting_gains(weights: Array, inhibition_gain: float, rule: str) -> Array:
-    """Gains that the weights make act.
-
-    Parameters
-    ----------
-    weights : ndarray (N,)
-        Clamped weights α_i.
-    inhibition_gain : float
-        k_inh [1/s].
-    rule : str
-        ``sum``: every leg's vote acts on its own oscillator. ``winner_take_all``: the largest
-        alone gets its gain, the first of equal ones (the stable state of a winner-take-all
-        network; Rutishauser, Douglas and Slotine 2010).
-
-    Returns
-    -------
-    ndarray (N,)
-        [1/s]
-    """
-    gains: Array = inhibition_gain * weights
-    if rule == SUM:
-        return gains
-    return np.where(np.arange(len(gains)) == np.argmax(gains), gains, 0.0)

@@ -4,7 +4,10 @@
 
 Every source asks with weights for legs; a leg's weight α_i is the sum of what is left of its
 votes, clamped to [0, α_max]; its oscillator is inhibited with k_inh α_i in its own region C_i. A
-few votes slow the oscillators there and no more. Votes that overcome the threshold stop the gait.
+few votes slow the oscillators there and no more. Votes that overcome the threshold stop the gait:
+N rotors that want to turn at ω are held at rest by forces α_i k_inh |x_{i,d} − x_i|, each of which
+ends at the edge of its region, so that the voters' equilibrium must lie inside their regions. With
+stiff couplings that is Σ k_inh α_i > N ω r / r0, whoever votes.
 """
 
 from __future__ import annotations
@@ -16,36 +19,147 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
+from dmp_cpg_ros.core.contraction.voting import MajorityClamp, majority_clamp
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.threshold import VoteClamp, holds_at_rest, vote_clamp
-from dmp_cpg_ros.core.inhibition.voters import (
-    NEVER,
-    FootWatch,
-    LastGood,
-    UpFilter,
-    VoteSensors,
-    watch_feet,
-)
-from dmp_cpg_ros.core.inhibition.votes import (
-    COLLISION,
-    FOOTING,
-    NO_VOTES,
-    SILENCE,
-    TILT,
-    Tally,
-    Vote,
-    VoteMemory,
-    acting_gains,
-)
+from dmp_cpg_ros.core.inhibition import voters, voting_parameters
+from dmp_cpg_ros.core.inhibition.voters import NEVER, FootWatch, LastGood, UpFilter, VoteSensors
+from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, OWN_SOURCES, Tally, Vote, VoteMemory
 from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.core.reference.operating_range import operating_range
+from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
 
 FRESH_NS = 20_000_000
 """Age up to which contacts are compared with the phase of the tick [ns]."""
+
+ROOM = 2.0
+"""Factor over the certified threshold that a computed clamp has at most."""
+
+LEAST_ROOM = 1.1
+"""The same factor where fewer votes than the majority suffice too."""
+
+
+@dataclass(frozen=True)
+class VoteClamp:
+    """The clamp of one leg's vote, and what it is computed from.
+
+    Attributes
+    ----------
+    gain : float
+        Largest gain of one leg's vote, k_inh α_max [1/s].
+    limit : float
+        Largest weight α_max.
+    window : MajorityClamp
+        Gains for which the majority stops the gait and fewer do not.
+    """
+
+    gain: float
+    limit: float
+    window: MajorityClamp
+
+
+def majority(parameters: VotingParameters) -> int:
+    """Number of legs that stop the gait: one alone where the winner takes all."""
+    alone = parameters.vote_rule == voting_parameters.WINNER_TAKE_ALL
+    return 1 if alone else parameters.vote_majority
+
+
+def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: VotingParameters,
+               span: OperatingRange) -> VoteClamp:
+    """Clamp of the votes, from ``vote_limit`` or computed.
+
+    A majority must stop the gait at every cadence at which inhibition is armed; fewer must not
+    hold it at any cadence.
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        Oscillators.
+    inhibition : InhibitionParameters
+        Gain and region.
+    voting : VotingParameters
+        Rule, majority, limit.
+    span : OperatingRange
+        Cadences.
+
+    Returns
+    -------
+    VoteClamp
+        The computed clamp is the geometric mean of the window; without a window a little over what
+        is certified for the majority, and the whole k_inh where nothing is.
+    """
+    window = majority_clamp(network.system, span.omega_armed[1], inhibition.region_radius,
+                            majority(voting), span.omega[0])
+    k_inh = inhibition.inhibition_gain
+    if voting.vote_limit > 0.0 or k_inh == 0.0:
+        return VoteClamp(voting.vote_limit * k_inh, voting.vote_limit, window)
+    if not np.isfinite(window.lowest):
+        return VoteClamp(k_inh, 1.0, window)
+    gain = float(np.sqrt(window.lowest * min(window.highest, ROOM**2 * window.lowest)))
+    gain = gain if window.possible else LEAST_ROOM * window.lowest
+    return VoteClamp(gain, gain / k_inh, window)
+
+
+def holds_at_rest(system: CanonicalSystem, omega: float, gains: Array,
+                  region_radius: float) -> bool:
+    """Whether votes overcome the threshold: they can hold the gait at rest.
+
+    Parameters
+    ----------
+    system : CanonicalSystem
+        Oscillators.
+    omega : float
+        Angular frequency [rad/s].
+    gains : ndarray (N,)
+        Gains k_inh α_i [1/s].
+    region_radius : float
+        r0 of the regions C_i.
+
+    Returns
+    -------
+    bool
+        Whether there is a stable equilibrium with every node that acts inside its region; a vote
+        whose node would rest outside its own does not act.
+    """
+    acting = np.asarray(gains, dtype=float)
+    while acting.any():
+        rest = inhibited_equilibrium(system, omega, acting)
+        if rest is None or not rest.slowest_rate > 0.0:
+            return False
+        outside = (acting > 0.0) & (rest.distance > region_radius)
+        if not outside.any():
+            return True
+        acting = np.where(outside, 0.0, acting)
+    return False
+
+
+def acting_gains(weights: Array, inhibition_gain: float, rule: str) -> Array:
+    """Gains that the weights make act.
+
+    Parameters
+    ----------
+    weights : ndarray (N,)
+        Clamped weights α_i.
+    inhibition_gain : float
+        k_inh [1/s].
+    rule : str
+        ``sum``: every leg's vote acts on its own oscillator. ``winner_take_all``: the largest
+        alone gets its gain, the first of equal ones (the stable state of a winner-take-all
+        network; Rutishauser, Douglas and Slotine 2010).
+
+    Returns
+    -------
+    ndarray (N,)
+        [1/s]
+    """
+    gains: Array = inhibition_gain * weights
+    if rule == voting_parameters.SUM:
+        return gains
+    return np.where(np.arange(len(gains)) == np.argmax(gains), gains, 0.0)
 
 
 @dataclass(frozen=True)
@@ -166,18 +280,19 @@ class Voting:
             return state
         if state.time_ns == NEVER or time_ns < state.time_ns:
             state = VotingState(last_good=LastGood.at(time_ns), clamp=state.clamp)
-        p, memory = self.sources, state.memory
-        last_good = state.last_good.after(sensors)
-        feet, lost, hit = self._feet(state.feet, time_ns, network, sensors, x, r, walking)
+        p, memory, gait = self.sources, state.memory, network.gait
+        last_good, up = state.last_good.after(sensors), state.up.after(sensors)
+        fresh = time_ns - sensors.contact_ns <= FRESH_NS
+        speed = network.scale.foot_speed(*r.tolist())
+        feet, lost, hit = voters.watch_feet(
+            state.feet, p, time_ns, walking, gait.cycle_position(phase(x)),
+            gait.duty(speed, network.scale), network.omega(r),
+            sensors.foot_force / self._weight if fresh else np.full(len(LEGS), np.nan))
         silent, blind = last_good.silent(time_ns, round(p.silence_time * 1e9))
-        up = state.up.after(sensors)
-        tilted = up.tilt > p.tilt_limit and not blind
-        for source, legs, weight in (
-            (FOOTING, lost, p.footing_weight),
-            (COLLISION, hit, p.collision_weight),
-            (TILT, np.full(len(LEGS), tilted), p.tilt_weight),
-            (SILENCE, silent | blind, p.silence_weight),
-        ):
+        tilted = np.full(len(LEGS), up.tilt > p.tilt_limit and not blind)
+        asking = lost, hit, tilted, silent | blind
+        weights_of = p.footing_weight, p.collision_weight, p.tilt_weight, p.silence_weight
+        for source, legs, weight in zip(OWN_SOURCES, asking, weights_of, strict=True):
             if weight > 0.0 and legs.any():
                 memory = memory.heard(source, np.where(legs, weight, np.nan), time_ns)
         for voter, weights in votes:
@@ -200,17 +315,6 @@ class Voting:
         span = operating_range(network, self.inhibition, self.reference)
         clamp = vote_clamp(network, self.inhibition, self.voting, span)
         return ClampInForce(clamp, omega, omega, rules)
-
-    def _feet(self, feet: FootWatch, time_ns: int, network: GaitNetwork, sensors: VoteSensors,
-              x: Array, r: Array, walking: bool
-              ) -> tuple[FootWatch, NDArray[np.bool_], NDArray[np.bool_]]:
-        load = sensors.foot_force / self._weight
-        if time_ns - sensors.contact_ns > FRESH_NS:
-            load = np.full(len(LEGS), np.nan)
-        speed = network.scale.foot_speed(float(r[0]), float(r[1]), float(r[2]))
-        return watch_feet(
-            feet, self.sources, time_ns, walking, network.gait.cycle_position(phase(x)),
-            network.gait.duty(speed, network.scale), network.omega(r), load)
 
     def _count(self, before: Tally, memory: VoteMemory, time_ns: int, fade_ns: int,
                network: GaitNetwork, limit: float) -> Tally:

@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.inhibition.threshold import VoteClamp, holds_at_rest, vote_clamp
 from dmp_cpg_ros.core.inhibition.voters import (
     FootWatch,
     LastGood,
@@ -30,9 +29,14 @@ from dmp_cpg_ros.core.inhibition.votes import (
     NO_VOTES,
     VoteInbox,
     VoteMemory,
-    acting_gains,
 )
-from dmp_cpg_ros.core.inhibition.voting import Voting
+from dmp_cpg_ros.core.inhibition.voting import (
+    VoteClamp,
+    Voting,
+    acting_gains,
+    holds_at_rest,
+    vote_clamp,
+)
 from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
