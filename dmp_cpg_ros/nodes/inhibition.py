@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
 from dmp_cpg_ros.core.gait.running import CanonicalState
@@ -23,9 +24,13 @@ from dmp_cpg_ros.core.inhibition.voting import Voting
 from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
-from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.suite_parameters import INHIBITION, VOTE_SOURCES, TickParameters
+from dmp_cpg_ros.core.suite_parameters import (
+    INHIBITION,
+    VOTE_SOURCES,
+    SuiteParameters,
+    TickParameters,
+)
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
@@ -177,12 +182,11 @@ class InhibitionNode(SuiteNode):
 
     def _bound_by_votes(self) -> float:
         """Bound on the time from now to rest under the votes [s]."""
-        reference, p = self.parameters_of(ReferenceParameters), self._supervisor.parameters
-        gains = self._supervisor.inhibition(replace(self._state, armed=True)).gains
-        return vote_bound(
-            self._network, gains, p.region_radius, operating_range(self._network, p, reference),
-            reference.alpha_r, self._supervisor.activity_rate,
-            self.parameters_of(TickParameters).tick_ns * 1e-9)
+        of = self.parameters_of
+        suite = SuiteParameters(reference=of(ReferenceParameters), leg=of(LegParameters),
+                                inhibition=self._supervisor.parameters)
+        return vote_bound(Setting.of(self._network, suite, of(TickParameters).tick_ns * 1e-9),
+                          self._supervisor.inhibition(replace(self._state, armed=True)).gains)
 
     # What is told ------------------------------------------------------------------------------
 

@@ -22,25 +22,15 @@ from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
-from dmp_cpg_ros.core.certificates.inequality import Inequality
-from dmp_cpg_ros.core.certificates.network import (
-    analyse_network,
-    contact_limits,
-    later_stop,
-    network_inequalities,
-    slowest_cadence,
-)
+from dmp_cpg_ros.core.certificates import network as of_network
+from dmp_cpg_ros.core.certificates.inequality import Inequality, finite
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.step import step_inequalities
-from dmp_cpg_ros.core.certificates.timing import time_to_rest, time_to_walking
+from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest, time_to_walking
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
+from dmp_cpg_ros.core.contraction import hierarchy
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.finding import PROVED, weakest
-from dmp_cpg_ros.core.contraction.hierarchy import (
-    CONTRACTING,
-    TRANSVERSE,
-    Part,
-    coupled_primitives,
-)
 from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_contraction
 from dmp_cpg_ros.core.contraction.region import Annulus
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
@@ -50,14 +40,12 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
+from dmp_cpg_ros.core.reference.operating_range import OperatingRange
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 Array = NDArray[np.float64]
-
-LONGEST_STOP = 10.0
-"""Time within which a stop and a start must be bounded; predictions look as far ahead [s]."""
 
 
 @dataclass(frozen=True)
@@ -122,18 +110,12 @@ class Certificate:
         """``proved`` when every required inequality is, else ``sampled``."""
         return weakest(tuple(entry.grade for entry in self.inequalities if entry.required))
 
-    def as_rows(self) -> list[tuple[str, ...]]:
-        """Rows of a table: name, verdict, left side, right side, unit, margin, grade, sentence."""
-        return [(entry.name, _verdict(entry), f'{entry.left_is} = {entry.left:.4g}',
-                 f'{entry.right_is} = {entry.right:.4g}', entry.unit, f'{entry.margin:.4g}',
-                 entry.grade, entry.sentence) for entry in self.inequalities]
-
     def as_mapping(self) -> dict[str, object]:
         """Return everything as values that strict JSON can write, for ``metrics.json``."""
         return {
             'holds': self.holds, 'grade': self.grade, 'contraction_grade': self.contraction_grade,
-            'omega_max': self.omega_max, 'time_to_rest_s': _finite(self.time_to_rest),
-            'time_to_walking_s': _finite(self.time_to_walking),
+            'omega_max': self.omega_max, 'time_to_rest_s': finite(self.time_to_rest),
+            'time_to_walking_s': finite(self.time_to_walking),
             'rest_phase_rad': list(self.rest_phase), 'rest_radius': list(self.rest_radius),
             'sampled': list(self.sampled), 'failing': [entry.name for entry in self.failing],
             'inequalities': {entry.name: entry.as_mapping() for entry in self.inequalities}}
@@ -177,58 +159,38 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     ParameterError
         If the tick is not positive and finite.
     """
-    if not (np.isfinite(tick_s) and tick_s > 0.0):
-        raise ParameterError(f'tick = {tick_s!r} s must be positive and finite')
-    span = span or operating_range(network, inhibition, reference)
-    analysis = analyse_network(network, inhibition, span)
-    p, found = network.parameters, analysis.found
-    rates = (found.rate, max(analysis.contraction.rate, analysis.capture.rate),
-             2.0 * p.rho * p.radius**2)
+    parts = SuiteParameters(reference=reference, inhibition=inhibition, leg=leg, posture=posture,
+                            voting=voting or VotingParameters())
+    return certificate_of(Setting.of(network, parts, tick_s, span))
+
+
+def certificate_of(s: Setting) -> Certificate:
+    """Compute the certificate of a setting."""
+    p, network = s.network.parameters, s.network
+    analysis = of_network.analyse_network(network, s.parameters.inhibition, s.span)
+    found, contraction, rest = analysis.found, analysis.contraction, analysis.rest
+    rates = (found.rate, max(contraction.rate, analysis.capture.rate), 2.0 * p.rho * p.radius**2)
     slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
-    stop = time_to_rest(network, analysis.capture, analysis.rest, span, reference.alpha_r,
-                        leg.activity_rate, inhibition.region_radius, tick_s)
-    start = time_to_walking(network, found, analysis.rest, span, leg.activity_rate, tick_s)
+    stop = time_to_rest(s, analysis.capture, rest)
+    start = time_to_walking(s, found, rest)
+    *rows, mismatch = of_network.network_inequalities(s, analysis)
+    rows += [*step_inequalities(s, slowest), *hierarchy_inequalities(s, found),
+             *rest_inequalities(s, rest), mismatch]
     contact = None
     if p.contact_feedback:
-        contact, contact_row = contact_limits(network, analysis, span,
-                                              inhibition.region_radius, start)
-        stop += later_stop(span, tick_s)
-    network_rows = network_inequalities(network, inhibition, span, analysis)
-    rows = [entry for entry in network_rows if entry.name != 'frequency_mismatch']
-    rows += step_inequalities(p.rho, p.radius, span.omega[1], slowest, inhibition.region_radius,
-                              tick_s)
-    rows += hierarchy_inequalities(reference, leg, posture, found, p.rho, p.radius,
-                                   slowest_cadence(span, p))
-    rows += rest_inequalities(network, leg, analysis.rest)
-    rows += [entry for entry in network_rows if entry.name == 'frequency_mismatch']
-    rows += [contact_row] if p.contact_feedback else []
-    rows += _time_inequalities(stop, start)
-    if voting is not None:
-        rows += vote_inequalities(network, inhibition, voting, span, reference.alpha_r,
-                                  leg.activity_rate, tick_s)
-    rest = analysis.rest
-    return Certificate(
-        tuple(rows), analysis.contraction.reach, span.omega[1], stop, start,
-        () if rest is None else tuple(float(a) for a in rest.phase_ahead),
-        () if rest is None else tuple(float(a) for a in rest.radius), contact)
-
-
-def _time_inequalities(stop: float, start: float) -> list[Inequality]:
-    return [
+        contact, row = of_network.contact_limits(s, found, start)
+        stop += of_network.later_stop(s)
+        rows.append(row)
+    rows += [
         Inequality('time_to_rest', stop, LONGEST_STOP, 's', 'bound', 'longest stop', PROVED,
                    'from a request at any phase of the locked gait, at any speed, to rest'),
         Inequality('time_to_walking', start, LONGEST_STOP, 's', 'bound', 'longest start', PROVED,
-                   'from release at rest to locked phases and full swings', required=False)]
-
-
-def _verdict(entry: Inequality) -> str:
-    if entry.holds:
-        return 'holds'
-    return 'FAILS' if entry.required else 'no'
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+                   'from release at rest to locked phases and full swings', required=False),
+        *vote_inequalities(s)]
+    return Certificate(
+        tuple(rows), contraction.reach, s.span.omega[1], stop, start,
+        () if rest is None else tuple(rest.phase_ahead.tolist()),
+        () if rest is None else tuple(rest.radius.tolist()), contact)
 
 
 GROUND = 0.01
@@ -238,8 +200,7 @@ SMALLEST_RADIUS = 0.5
 """Radius that every oscillator must keep at rest for its phase to be sound, as a fraction of r."""
 
 
-def rest_inequalities(network: GaitNetwork, leg: LegParameters,
-                      rest: InhibitedEquilibrium | None) -> list[Inequality]:
+def rest_inequalities(s: Setting, rest: InhibitedEquilibrium | None) -> list[Inequality]:
     """Inequalities (f): feet on the ground and sound phases at the inhibited equilibrium.
 
     The clearance of a swing is scaled by an activity that vanishes with the phase's speed. At rest
@@ -248,10 +209,8 @@ def rest_inequalities(network: GaitNetwork, leg: LegParameters,
 
     Parameters
     ----------
-    network : GaitNetwork
-        Gait and oscillators.
-    leg : LegParameters
-        For the clearance.
+    s : Setting
+        Gait and clearance.
     rest : InhibitedEquilibrium or None
         Equilibrium at zero reference; None when there is none.
 
@@ -259,25 +218,22 @@ def rest_inequalities(network: GaitNetwork, leg: LegParameters,
     -------
     list of Inequality
     """
-    height = float('inf') if rest is None else max(_heights(network, leg, rest))
-    radius = 0.0 if rest is None else float(rest.radius.min()) / network.parameters.radius
-    ahead = 'there is no equilibrium' if rest is None else (
-        'legs rest ' + ', '.join(f'{np.degrees(a):.1f}' for a in rest.phase_ahead)
-        + ' degrees ahead of their places')
+    height, radius, ahead = math.inf, 0.0, 'there is no equilibrium'
+    if rest is not None:
+        gait = s.network.gait
+        path = FootPath((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 1.0, gait.duty(0.0, s.network.scale),
+                        s.parameters.leg.clearance * REST_ACTIVITY)
+        height = max(float(path.at(float(position))[0][2])
+                     for position in gait.cycle_position(phase(rest.state)))
+        radius = float(rest.radius.min()) / s.network.parameters.radius
+        degrees = ', '.join(f'{np.degrees(a):.1f}' for a in rest.phase_ahead)
+        ahead = f'legs rest {degrees} degrees ahead of their places'
     return [
         Inequality('rest_posture', height, GROUND, '', 'highest foot', 'on the ground', PROVED,
                    f'as fractions of the standing height, when rest is declared; {ahead}'),
         Inequality('rest_radius', SMALLEST_RADIUS, radius, '', 'sound radius',
                    'smallest |x_i|/r at rest', PROVED,
                    'every oscillator at rest is far from the origin, so that its phase is sound')]
-
-
-def _heights(network: GaitNetwork, leg: LegParameters, rest: InhibitedEquilibrium) -> list[float]:
-    """Heights of the feet at rest, as fractions of the standing height."""
-    duty = network.gait.duty(0.0, network.scale)
-    path = FootPath((0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 1.0, duty, leg.clearance * REST_ACTIVITY)
-    positions = network.gait.cycle_position(phase(rest.state))
-    return [float(path.at(float(position))[0][2]) for position in positions]
 
 
 _CRITICAL = 1e-3  # share of the rate that is given away where no metric attains it
@@ -309,34 +265,24 @@ def spring_damper_contraction(stiffness: float, damping: float) -> tuple[float, 
     return rate, np.array([[s, 0.0], [half, 1.0]])
 
 
-def hierarchy_inequalities(reference: ReferenceParameters, leg: LegParameters,
-                           posture: PostureParameters, found: Synchronisation, rho: float,
-                           radius: float, omega: float) -> list[Inequality]:
-    """Inequalities (e): rates of the driving and the driven systems, and Theorem 4 for the whole.
-
-    Parameters
-    ----------
-    reference, leg, posture : ReferenceParameters, LegParameters, PostureParameters
-        Parameters of the systems.
-    found : Synchronisation
-        Of the oscillators.
-    rho, radius, omega : float
-        Parameters of the oscillators, the smallest ω.
-
-    Returns
-    -------
-    list of Inequality
+def hierarchy_inequalities(s: Setting, found: Synchronisation) -> list[Inequality]:
+    """Inequalities (e): rates of the driving and the driven systems, and Theorem 4 for the whole,
+    with the synchronisation of the oscillators.
     """
+    leg, p = s.parameters.leg, s.network.parameters
     spring, _ = spring_damper_contraction(leg.stiffness, leg.damping)
-    filters = min(leg.activity_rate, leg.placement_rate, posture.activity_rate)
-    oscillator = transverse_contraction(AndronovHopf(rho, radius), omega,
-                                        Annulus(_INNER * radius, radius))
-    whole = coupled_primitives(
-        Part('reference', CONTRACTING, reference.alpha_r),
-        Part('oscillator', TRANSVERSE, oscillator.rate), found,
-        [Part('swing filters', CONTRACTING, filters), Part('joints', CONTRACTING, spring)])
+    filters = min(leg.activity_rate, leg.placement_rate, s.parameters.posture.activity_rate)
+    oscillator = transverse_contraction(
+        AndronovHopf(p.rho, p.radius), of_network.slowest_cadence(s),
+        Annulus(_INNER * p.radius, p.radius))
+    alpha_r = s.parameters.reference.alpha_r
+    whole = hierarchy.coupled_primitives(
+        hierarchy.Part('reference', hierarchy.CONTRACTING, alpha_r),
+        hierarchy.Part('oscillator', hierarchy.TRANSVERSE, oscillator.rate), found,
+        [hierarchy.Part('swing filters', hierarchy.CONTRACTING, filters),
+         hierarchy.Part('joints', hierarchy.CONTRACTING, spring)])
     return [
-        Inequality('reference', 0.0, reference.alpha_r, '1/s', 'zero', 'alpha_r', PROVED,
+        Inequality('reference', 0.0, alpha_r, '1/s', 'zero', 'alpha_r', PROVED,
                    'the reference forgets how it was commanded before, but while its acceleration '
                    'is limited'),
         Inequality('transformation', 0.0, spring, '1/s', 'zero', 'rate of the joints', PROVED,

@@ -16,8 +16,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.certify import Certificate, certificate_of
 from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction.finding import PROVED
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
@@ -25,6 +26,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import CADENCE_RATE
 from dmp_cpg_ros.core.gait.transition import SETTLING_RATE, STANDING, GaitTransition
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
@@ -64,20 +66,20 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     ways = [GaitTransition(one, other) for one, other in combinations(gaits, 2)]
     share = max((way.fastest(rate) for way in ways), default=0.0)
     span = _widened(p, networks, share)
-    whole = certify(networks[0], p.inhibition, p.reference, p.leg, p.posture, tick_s, span)
+    unvoted = replace(p, voting=VotingParameters())
+    whole = certificate_of(Setting.of(networks[0], unvoted, tick_s, span))
     pause = 0.0 if not ways else (
         math.log(span.omega[1] / (STANDING * span.omega[0])) / SETTLING_RATE + tick_s)
     bound = whole.time_to_rest + pause + arriving
     rows = [_changed(row, bound, p.leg, 'gait' if ways else 'cadence')
             for row in whole.inequalities]
     rows += _votes(p, networks, tick_s)
-    if not ways:
-        return replace(whole, inequalities=tuple(rows), time_to_rest=bound)
-    rows.append(Inequality(
-        'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
-        'fastest offset', 'tolerated mismatch', PROVED,
-        'the legs would keep their places even if the moving offsets were not fed forward',
-        required=False))
+    if ways:
+        rows.append(Inequality(
+            'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
+            'fastest offset', 'tolerated mismatch', PROVED,
+            'the legs would keep their places even if the moving offsets were not fed forward',
+            required=False))
     return replace(whole, inequalities=tuple(rows), time_to_rest=bound)
 
 
@@ -109,10 +111,7 @@ def _votes(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: float
     """
     worst: dict[str, Inequality] = {}
     for network in networks:
-        for row in vote_inequalities(
-                network, p.inhibition, p.voting,
-                operating_range(network, p.inhibition, p.reference),
-                p.reference.alpha_r, p.leg.activity_rate, tick_s):
+        for row in vote_inequalities(Setting.of(network, p, tick_s)):
             known = worst.get(row.name)
             if known is None or not row.margin > known.margin:
                 worst[row.name] = replace(row, sentence=f'{row.sentence}, in {network.gait.name}')

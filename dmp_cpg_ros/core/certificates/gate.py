@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.certify import Certificate, certificate_of
 from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.suggest import nearest_value
 from dmp_cpg_ros.core.certificates.timing import later_arming
 from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE, capture_set
@@ -82,8 +83,7 @@ class Running:
             return certify_changes(p, (self.gait, *self.others), self.scale, self.tick_s,
                                    self.acting_cadence if self.moving else None)
         network = GaitNetwork(p.canonical, self.gait, self.scale)
-        return certify(network, p.inhibition, p.reference, p.leg, p.posture, self.tick_s,
-                       voting=p.voting)
+        return certificate_of(Setting.of(network, p, self.tick_s))
 
     @property
     def moving(self) -> bool:
@@ -100,10 +100,8 @@ class Running:
         x, r : ndarray (4, 2), (3,)
             States and reference.
         """
-        p = self.parameters
         return self.certificate().time_to_rest + later_arming(
-            network, p.inhibition, operating_range(network, p.inhibition, p.reference),
-            p.reference.alpha_r, x, r)
+            Setting.of(network, self.parameters, self.tick_s), x, r)
 
     def refused_now(self, before: Running, network: GaitNetwork, inhibition: Inhibition,
                     x: Array) -> str:

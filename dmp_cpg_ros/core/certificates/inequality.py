@@ -79,8 +79,8 @@ class Inequality:
     def as_mapping(self) -> dict[str, object]:
         """Return everything as values that strict JSON can write; None for what is not finite."""
         return {'name': self.name, 'holds': self.holds, 'required': self.required,
-                'left': _finite(self.left), 'right': _finite(self.right),
-                'margin': _finite(self.margin), 'unit': self.unit, 'left_is': self.left_is,
+                'left': finite(self.left), 'right': finite(self.right),
+                'margin': finite(self.margin), 'unit': self.unit, 'left_is': self.left_is,
                 'right_is': self.right_is, 'grade': self.grade, 'sentence': self.sentence}
 
     def explained(self) -> str:
@@ -91,5 +91,6 @@ class Inequality:
                 f'= {self.right:.4g}{unit}; {told}{self.sentence}')
 
 
-def _finite(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """Return a value that strict JSON can write; None for what is not finite."""
     return float(value) if math.isfinite(value) else None

@@ -1,9 +1,12 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Inequalities of the oscillators: synchronisation, inhibition, capture, mismatch."""
+"""What a certificate is computed from, and the inequalities of the oscillators: synchronisation,
+inhibition, capture, mismatch.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,30 +14,72 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.contraction import inhibited
 from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set
 from dmp_cpg_ros.core.contraction.capture_anywhere import needed_gain_anywhere
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium, inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import PROVED
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound, mismatch_margin
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
-from dmp_cpg_ros.core.contraction.inhibited import (
-    GLOBAL,
-    NONE,
-    InhibitedContraction,
-    inhibited_contraction,
-)
+from dmp_cpg_ros.core.contraction.inhibited import InhibitedContraction
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
-from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, entry_tolerances
 from dmp_cpg_ros.core.maths.roots import last_that_holds
-from dmp_cpg_ros.core.reference.operating_range import OperatingRange
+from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 
 Array = NDArray[np.float64]
 
 EXPECTED_MISMATCH = 0.05
 """Difference of the legs' frequencies that should be tolerated, as a share of the highest."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a certificate is computed from.
+
+    Attributes
+    ----------
+    network : GaitNetwork
+        Oscillators, couplings, gait and the robot's scale.
+    parameters : SuiteParameters
+        Of the other parts: inhibition, reference, legs, posture, voting.
+    tick_s : float
+        Control tick [s].
+    span : OperatingRange
+        Speeds and cadences to hold for.
+    """
+
+    network: GaitNetwork
+    parameters: SuiteParameters
+    tick_s: float
+    span: OperatingRange
+
+    @classmethod
+    def of(cls, network: GaitNetwork, parameters: SuiteParameters, tick_s: float,
+           span: OperatingRange | None = None) -> Setting:
+        """Setting of running parameters, by default with the speeds and cadences of the gait.
+
+        Raises
+        ------
+        ParameterError
+            If the tick is not positive and finite.
+        """
+        if not (np.isfinite(tick_s) and tick_s > 0.0):
+            raise ParameterError(f'tick = {tick_s!r} s must be positive and finite')
+        p = parameters
+        span = span or operating_range(network, p.inhibition, p.reference)
+        return cls(network, p, tick_s, span)
+
+    @property
+    def arc(self) -> float:
+        """Arc of the limit cycle that lies in C [rad]."""
+        r0, radius = self.parameters.inhibition.region_radius, self.network.parameters.radius
+        return 4.0 * math.asin(min(1.0, r0 / (2.0 * radius)))
 
 
 @dataclass(frozen=True)
@@ -62,52 +107,22 @@ class NetworkAnalysis:
 
 def analyse_network(network: GaitNetwork, inhibition: InhibitionParameters,
                     span: OperatingRange) -> NetworkAnalysis:
-    """Apply the theorems to the network of a gait.
-
-    Parameters
-    ----------
-    network : GaitNetwork
-        Oscillators.
-    inhibition : InhibitionParameters
-        Gain, region and legs.
-    span : OperatingRange
-        Cadences.
-
-    Returns
-    -------
-    NetworkAnalysis
-    """
+    """Apply the theorems to the network of a gait at the cadences of a range."""
     system = network.system
     everywhere = float(growth(system.rho, system.radius).max())
     # A gain of zero holds nothing; the smallest positive one says so in numbers.
     acting = np.where(_chosen(inhibition), max(inhibition.inhibition_gain, 1e-9), 0.0)
     capture = capture_set(system, span.omega[1], acting, inhibition.region_radius)
     return NetworkAnalysis(
-        synchronisation(system.graph, everywhere), capture, inhibited_contraction(system, capture),
+        synchronisation(system.graph, everywhere), capture,
+        inhibited.inhibited_contraction(system, capture),
         inhibited_equilibrium(system, span.omega_at_rest, acting),
         inhibited_equilibrium(system, span.omega[1], acting))
 
 
-def network_inequalities(network: GaitNetwork, inhibition: InhibitionParameters,
-                         span: OperatingRange, analysis: NetworkAnalysis) -> list[Inequality]:
-    """Inequalities (a), (b), (c) and (g).
-
-    Parameters
-    ----------
-    network : GaitNetwork
-        Oscillators.
-    inhibition : InhibitionParameters
-        Gain, region and legs.
-    span : OperatingRange
-        Cadences.
-    analysis : NetworkAnalysis
-        Of the same network.
-
-    Returns
-    -------
-    list of Inequality
-    """
-    found, p = analysis.found, network.parameters
+def network_inequalities(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
+    """Inequalities (a), (b), (c) and (g) of a setting."""
+    found, p, span = analysis.found, s.network.parameters, s.span
     margin = mismatch_margin(found, p.rho, p.radius, LOCKED_PHASE_ERROR)
     return [
         Inequality('synchronisation', found.growth, found.connectivity, '1/s', 'rho r^2',
@@ -115,30 +130,28 @@ def network_inequalities(network: GaitNetwork, inhibition: InhibitionParameters,
                    f'from every state the legs find their places, at {found.rate:.4g} 1/s '
                    f'({found.method} bound)'),
         _contraction(analysis.contraction),
-        *_capture(network, inhibition, span, analysis),
+        *_capture(s, analysis),
         Inequality('frequency_mismatch', EXPECTED_MISMATCH * span.omega[1], margin, 'rad/s',
                    f'{EXPECTED_MISMATCH:.0%} of omega_max', 'tolerated mismatch', PROVED,
                    f'legs whose own frequencies differ stay within {LOCKED_PHASE_ERROR:g} rad of '
                    'their places', required=False)]
 
 
-def _contraction(contraction: InhibitedContraction) -> Inequality:
-    where = {GLOBAL: 'from every state', NONE: 'and comes to rest'}.get(
-        contraction.reach, 'inside the capture set, which leaves the origin out')
-    return Inequality(
-        'contraction', contraction.growth, contraction.inhibition_rate, '1/s',
-        'rho r^2' if contraction.reach == GLOBAL else 'growth on the capture set',
-        'connectivity of L_K + k_inh E', PROVED,
-        f'the inhibited network contracts {where}' + (
-            '' if contraction.reach == NONE else
-            f' ({contraction.reach} grade), at {contraction.rate:.4g} 1/s'))
+def _contraction(found: InhibitedContraction) -> Inequality:
+    left_is = 'rho r^2' if found.reach == inhibited.GLOBAL else 'growth on the capture set'
+    grade = f' ({found.reach} grade), at {found.rate:.4g} 1/s'
+    where = {inhibited.GLOBAL: 'from every state' + grade,
+             inhibited.NONE: 'and comes to rest'}.get(
+        found.reach, 'inside the capture set, which leaves the origin out' + grade)
+    return Inequality('contraction', found.growth, found.inhibition_rate, '1/s', left_is,
+                      'connectivity of L_K + k_inh E', PROVED,
+                      f'the inhibited network contracts {where}')
 
 
-def _capture(network: GaitNetwork, inhibition: InhibitionParameters, span: OperatingRange,
-             analysis: NetworkAnalysis) -> list[Inequality]:
+def _capture(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
     """Inequalities (c): C is not left again, by those in their places and by anyone."""
-    held = _chosen(inhibition)
-    gain, r0 = inhibition.inhibition_gain, inhibition.region_radius
+    p, span, network = s.parameters.inhibition, s.span, s.network
+    held, gain, r0 = _chosen(p), p.inhibition_gain, p.region_radius
     needed = float(analysis.capture.needed_gain[held].max())
     rest = analysis.rest_at_speed
     distance = float('inf') if rest is None or not rest.slowest_rate > 0.0 else float(
@@ -166,8 +179,7 @@ def _chosen(inhibition: InhibitionParameters) -> NDArray[np.bool_]:
     return np.array([leg in inhibition.inhibited_legs for leg in LEGS])
 
 
-def contact_margin(found: Synchronisation, rho: float, radius: float,
-                   tolerances: tuple[float, float]) -> float:
+def contact_margin(s: Setting, found: Synchronisation) -> float:
     """Largest δ for which frequencies in [ω − δ, ω + δ] leave walking and stopping as certified.
 
     For all times after the legs were in their places, their phases stay within the error that
@@ -176,20 +188,18 @@ def contact_margin(found: Synchronisation, rho: float, radius: float,
 
     Parameters
     ----------
+    s : Setting
+        Oscillators and region.
     found : Synchronisation
         Of the free network.
-    rho, radius : float
-        Parameters of the oscillators.
-    tolerances : tuple of float
-        Of places and radii, at which inhibition may set in
-        (:func:`~dmp_cpg_ros.core.inhibition.supervisor.entry_tolerances`).
 
     Returns
     -------
     float
         [rad/s]; 0 when nothing is certified.
     """
-    places, radii = tolerances
+    rho, radius = s.network.parameters.rho, s.network.parameters.radius
+    places, radii = entry_tolerances(s.network, s.parameters.inhibition.region_radius)
 
     def within(delta: float) -> bool:
         bound = mismatch_bound(found, rho, radius, delta)
@@ -199,48 +209,28 @@ def contact_margin(found: Synchronisation, rho: float, radius: float,
     return last_that_holds(within, 0.0, max(found.rate, 0.0), 30)
 
 
-def contact_limits(network: GaitNetwork, analysis: NetworkAnalysis, span: OperatingRange,
-                   region_radius: float, start: float) -> tuple[ContactLimits, Inequality]:
-    """Limits of the feedback, and the inequality that they keep.
-
-    Parameters
-    ----------
-    network : GaitNetwork
-        Oscillators, with the share of the margin.
-    analysis : NetworkAnalysis
-        Of the network.
-    span : OperatingRange
-        Cadences.
-    region_radius : float
-        r0 of C.
-    start : float
-        Bound on the time from a release to phase lock [s].
-
-    Returns
-    -------
-    limits : ContactLimits
-    inequality : Inequality
+def contact_limits(s: Setting, found: Synchronisation, start: float
+                   ) -> tuple[ContactLimits, Inequality]:
+    """Limits of the feedback and the inequality that they keep, with a bound on the time from a
+    release to phase lock [s].
     """
-    p = network.parameters
-    margin = contact_margin(analysis.found, p.rho, p.radius,
-                            entry_tolerances(network, region_radius))
-    own = p.margin_share * margin
-    return ContactLimits(own, span.omega[1], start), Inequality(
-        'contact_feedback', own, margin, 'rad/s', f'{p.margin_share:.0%} of it',
+    share, margin = s.network.parameters.margin_share, contact_margin(s, found)
+    return ContactLimits(share * margin, s.span.omega[1], start), Inequality(
+        'contact_feedback', share * margin, margin, 'rad/s', f'{share:.0%} of it',
         'margin for unequal leg frequencies', PROVED,
         'however the feet touch down, the legs stay in their places and near their cycle')
 
 
-def slowest_cadence(span: OperatingRange, parameters: CanonicalParameters) -> float:
+def slowest_cadence(s: Setting) -> float:
     """Slowest ω, where late feet may hold the phase back [rad/s]."""
-    hold = parameters.contact_hold if parameters.contact_feedback else 0.0
-    return (1.0 - hold) * span.omega[0]
+    p = s.network.parameters
+    return (1.0 - (p.contact_hold if p.contact_feedback else 0.0)) * s.span.omega[0]
 
 
-def later_stop(span: OperatingRange, tick_s: float) -> float:
+def later_stop(s: Setting) -> float:
     """What feedback adds to the bound on the time to rest [s].
 
     The tick in which a request is on its way may still be shifted, and the stop begins with a leg
     that is as far behind its place as phase lock allows.
     """
-    return tick_s + LOCKED_PHASE_ERROR / span.omega_armed[0]
+    return s.tick_s + LOCKED_PHASE_ERROR / s.span.omega_armed[0]

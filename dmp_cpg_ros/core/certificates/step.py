@@ -11,6 +11,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.contraction.capture import radius_tolerance
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
@@ -99,33 +100,29 @@ def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -
     return abs(cycle / radius - 1.0)
 
 
-def step_inequalities(rho: float, radius: float, omega: float, rate: float, region_radius: float,
-                      tick_s: float) -> list[Inequality]:
+def step_inequalities(s: Setting, rate: float) -> list[Inequality]:
     """Inequalities (d): the tick against the mild part, and against the region C.
 
     Parameters
     ----------
-    rho, radius, omega : float
-        Parameters of the oscillators, the largest ω.
+    s : Setting
+        Oscillators, region and tick.
     rate : float
         Slowest certified rate of the network [1/s].
-    region_radius : float
-        r0 of C.
-    tick_s : float
-        Control tick [s].
 
     Returns
     -------
     list of Inequality
     """
+    rho, radius = s.network.parameters.rho, s.network.parameters.radius
+    omega, tick_s, r0 = s.span.omega[1], s.tick_s, s.parameters.inhibition.region_radius
     limit = longest_step(rho, radius, omega, rate)
-    arc = 4.0 * math.asin(min(1.0, region_radius / (2.0 * radius)))
     return [
         Inequality('time_step', tick_s, limit, 's', 'tick', 'longest stable step', SAMPLED,
                    'what decays in the equations decays in their numerical integration'),
         Inequality('cycle_radius', cycle_radius_error(rho, radius, omega, tick_s),
-                   radius_tolerance(radius, region_radius) / radius, '',
+                   radius_tolerance(radius, r0) / radius, '',
                    '|R/r - 1| as integrated', 'what capture allows', PROVED,
                    'the integration keeps the radius of the limit cycle'),
-        Inequality('region_per_tick', omega * tick_s, arc, 'rad', 'omega_max tick', 'arc of C',
+        Inequality('region_per_tick', omega * tick_s, s.arc, 'rad', 'omega_max tick', 'arc of C',
                    PROVED, 'an oscillator cannot step over the region C between two ticks')]

@@ -19,7 +19,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
@@ -28,48 +28,33 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
     comparison_laplacian,
     synchronisation,
 )
-from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.supervisor import (
-    LOCKED_ACTIVITY,
-    LOCKED_PHASE_ERROR,
-    REST_ACTIVITY,
-    REST_PHASE_RATE,
-    REST_SPEED,
-    entry_tolerances,
-)
+from dmp_cpg_ros.core.inhibition import supervisor
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.maths.exponential import phi_functions
-from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 
 Array = NDArray[np.float64]
 
 DELAY_TICKS = 6
 """Ticks that requests, arming and sampling may add to the continuous bound."""
 
+LONGEST_STOP = 10.0
+"""Time within which a stop and a start must be bounded; predictions look as far ahead [s]."""
+
 _STEP = 0.01  # [s]
 _HORIZON = 10.0  # [s] beyond it a bound is of no use
 
 
-def time_to_rest(network: GaitNetwork, capture: CaptureSet, rest: InhibitedEquilibrium | None,
-                 span: OperatingRange, alpha_r: float, activity_rate: float, region_radius: float,
-                 tick_s: float) -> float:
+def time_to_rest(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium | None) -> float:
     """Bound on the time from a request to rest, for a gait whose legs are in their places.
 
     Parameters
     ----------
-    network : GaitNetwork
-        Oscillators and gait.
+    s : Setting
+        What runs.
     capture : CaptureSet
         Invariant set under inhibition.
     rest : InhibitedEquilibrium or None
         Equilibrium at zero reference.
-    span : OperatingRange
-        Speeds and cadences.
-    alpha_r, activity_rate : float
-        Rates of the reference and of the swings' activity [1/s].
-    region_radius : float
-        r0 of C.
-    tick_s : float
-        Control tick [s].
 
     Returns
     -------
@@ -78,21 +63,18 @@ def time_to_rest(network: GaitNetwork, capture: CaptureSet, rest: InhibitedEquil
     """
     if not capture.holds or not capture.rate > 0.0 or rest is None:
         return math.inf
+    span, alpha_r = s.span, s.parameters.reference.alpha_r
     if not span.armed_speed > 0.0 < span.foot_speed:
         arming = 0.0 if span.foot_speed == 0.0 else math.inf
     else:
         arming = math.log(span.foot_speed / span.armed_speed) / alpha_r
-    radius = network.parameters.radius
-    arc = 4.0 * math.asin(min(1.0, region_radius / (2.0 * radius)))
-    arriving = (2.0 * math.pi - arc) / span.omega_armed[0]
-    settling = _settling(network, capture, rest, span, alpha_r, activity_rate,
-                         span.armed_speed * math.exp(-alpha_r * arriving))
-    return arming + arriving + settling + DELAY_TICKS * tick_s
+    arriving = (2.0 * math.pi - s.arc) / span.omega_armed[0]
+    settling = _settling(s, capture, rest, span.armed_speed * math.exp(-alpha_r * arriving))
+    return arming + arriving + settling + DELAY_TICKS * s.tick_s
 
 
-def time_to_walking(network: GaitNetwork, found: Synchronisation,
-                    rest: InhibitedEquilibrium | None, span: OperatingRange, activity_rate: float,
-                    tick_s: float) -> float:
+def time_to_walking(s: Setting, found: Synchronisation, rest: InhibitedEquilibrium | None
+                    ) -> float:
     """Bound on the time from the release of a resting gait to phase lock and full swings.
 
     Disagreement shrinks at Theorem 4's rate, the smallest n·x_i over a direction n that turns with
@@ -100,18 +82,12 @@ def time_to_walking(network: GaitNetwork, found: Synchronisation,
 
     Parameters
     ----------
-    network : GaitNetwork
-        Oscillators and gait.
+    s : Setting
+        What runs.
     found : Synchronisation
         Of the free network.
     rest : InhibitedEquilibrium or None
         Where it starts.
-    span : OperatingRange
-        Cadences.
-    activity_rate : float
-        Rate of the swings' activity [1/s].
-    tick_s : float
-        Control tick [s].
 
     Returns
     -------
@@ -121,26 +97,34 @@ def time_to_walking(network: GaitNetwork, found: Synchronisation,
     if rest is None or not found.synchronises or found.weights is None:
         return math.inf
     z = rest.radius * np.exp(1j * rest.phase_ahead)
-    mean = complex(found.weights @ z)
+    mean, epsilon, pair, _ = _disagreement(found.weights, z)
     inner = float(np.real(z * np.conj(mean)).min()) / max(abs(mean), 1e-300)
     if not inner > 0.0:
         return math.inf
-    disagreement = math.sqrt(float(found.weights @ np.abs(z - mean) ** 2))
-    pair = disagreement * math.sqrt(float(np.sum(1.0 / np.sort(found.weights)[:2])))
-    coupling = float(np.diag(comparison_laplacian(network.system.graph)).max())
-    activity = 0.0
+    coupling = float(np.diag(comparison_laplacian(s.network.system.graph)).max())
+    kept, activity = math.exp(-s.parameters.leg.activity_rate * _STEP), 0.0
     for k in range(int(_HORIZON / _STEP)):
-        distance = pair * math.exp(-found.rate * k * _STEP)
+        distance = epsilon * pair * math.exp(-found.rate * k * _STEP)
         spread = math.pi if distance >= 2.0 * inner else 2.0 * math.asin(distance / (2.0 * inner))
-        if spread <= LOCKED_PHASE_ERROR and activity >= LOCKED_ACTIVITY:
-            return k * _STEP + DELAY_TICKS * tick_s
-        wanted = max(0.0, 1.0 - coupling * distance / (inner * span.omega[0]))
-        activity = wanted + (activity - wanted) * math.exp(-activity_rate * _STEP)
+        if spread <= LOCKED_PHASE_ERROR and activity >= supervisor.LOCKED_ACTIVITY:
+            return k * _STEP + DELAY_TICKS * s.tick_s
+        wanted = max(0.0, 1.0 - coupling * distance / (inner * s.span.omega[0]))
+        activity = wanted + (activity - wanted) * kept
     return math.inf
 
 
-def time_to_places(network: GaitNetwork, found: Synchronisation, x: Array,
-                   tolerances: tuple[float, float]) -> float:
+def _disagreement(weights: Array, z: NDArray[np.complex128]
+                  ) -> tuple[complex, float, float, float]:
+    """Mean of locked coordinates and ε = (Σ ξ_i |z_i − z̄|²)^½, with the largest distance of two of
+    them and of one from the mean, as multiples of ε.
+    """
+    mean = complex(weights @ z)
+    smallest, second = np.sort(weights)[:2].tolist()
+    return (mean, math.sqrt(float(weights @ np.abs(z - mean) ** 2)),
+            math.sqrt(1.0 / smallest + 1.0 / second), math.sqrt(1.0 / smallest - 1.0))
+
+
+def time_to_places(s: Setting, x: Array) -> float:
     """Bound on the time in which free legs come to their places, from a state that is known.
 
     Disagreement shrinks at Theorem 4's rate, and the mean of the locked coordinates obeys
@@ -148,32 +132,25 @@ def time_to_places(network: GaitNetwork, found: Synchronisation, x: Array,
 
     Parameters
     ----------
-    network : GaitNetwork
-        Oscillators and gait.
-    found : Synchronisation
-        Of the free network.
+    s : Setting
+        What runs.
     x : ndarray (4, 2)
         States.
-    tolerances : tuple of float
-        Of places and radii (:func:`~dmp_cpg_ros.core.inhibition.supervisor.entry_tolerances`).
 
     Returns
     -------
     float
         [s]; 0 for legs in their places, infinite when the bound does not come down.
     """
-    p, (places, radii) = network.parameters, tolerances
+    p, network, r0 = s.network.parameters, s.network, s.parameters.inhibition.region_radius
+    found = synchronisation(network.system.graph, float(growth(p.rho, p.radius)))
     if not found.synchronises or found.weights is None or not found.free_mean:
         return math.inf
-    z = np.exp(1j * network.gait.phases) * (x[:, 0] + 1j * x[:, 1])
-    if (np.abs(z[:, None] - z).max() <= places
-            and np.abs(np.abs(z) - p.radius).max() <= radii):
+    if supervisor.in_places(network, x, r0):
         return 0.0
-    mean = complex(found.weights @ z)
-    R, epsilon = abs(mean), math.sqrt(float(found.weights @ np.abs(z - mean) ** 2))
-    smallest, second = np.sort(found.weights)[:2].tolist()
-    pair, single = math.sqrt(1.0 / smallest + 1.0 / second), math.sqrt(1.0 / smallest - 1.0)
-    step = min(_STEP, 0.1 / (p.rho * p.radius**2))
+    places, radii = supervisor.entry_tolerances(network, r0)
+    mean, epsilon, pair, single = _disagreement(found.weights, supervisor.locked(network, x))
+    R, step = abs(mean), min(_STEP, 0.1 / (p.rho * p.radius**2))
     for k in range(round(_HORIZON / _STEP)):
         if epsilon * pair <= places and R - epsilon * single >= p.radius - radii:
             return k * step
@@ -184,42 +161,33 @@ def time_to_places(network: GaitNetwork, found: Synchronisation, x: Array,
     return math.inf
 
 
-def later_arming(network: GaitNetwork, inhibition: InhibitionParameters, span: OperatingRange,
-                 alpha_r: float, x: Array, r: Array) -> float:
+def later_arming(s: Setting, x: Array, r: Array) -> float:
     """What a state that is faster than the limits, or whose legs are not in their places, adds to
     :func:`time_to_rest` [s].
 
     Parameters
     ----------
-    network : GaitNetwork
-        Oscillators and gait.
-    inhibition : InhibitionParameters
-        For the region.
-    span : OperatingRange
-        Speeds and cadences of the bound.
-    alpha_r : float
-        Rate of the reference [1/s].
+    s : Setting
+        What runs, and what the bound holds for.
     x, r : ndarray (4, 2), (3,)
         States and reference at the request.
     """
-    tolerances = entry_tolerances(network, inhibition.region_radius)
-    p = network.parameters
-    everywhere = float(growth(p.rho, p.radius))
-    locking = time_to_places(network, synchronisation(network.system.graph, everywhere), x,
-                             tolerances)
+    span, radius = s.span, s.network.parameters.radius
+    locking = time_to_places(s, x)
     if locking > 0.0:
-        locking += tolerances[0] / (p.radius * span.omega_armed[0])
-    speed, limit = network.scale.foot_speed(*r.tolist()), max(span.foot_speed, span.armed_speed)
-    slowing = math.log(speed / limit) / alpha_r if speed > limit > 0.0 else (
-        math.inf if speed > limit else 0.0)
+        places, _ = supervisor.entry_tolerances(s.network, s.parameters.inhibition.region_radius)
+        locking += places / (radius * span.omega_armed[0])
+    speed, limit = s.network.scale.foot_speed(*r.tolist()), max(span.foot_speed, span.armed_speed)
+    if not speed > limit:
+        return locking
+    slowing = math.log(speed / limit) / s.parameters.reference.alpha_r if limit > 0.0 else math.inf
     return max(locking, slowing)
 
 
-def _settling(network: GaitNetwork, capture: CaptureSet, rest: InhibitedEquilibrium,
-              span: OperatingRange, alpha_r: float, activity_rate: float, speed: float) -> float:
+def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed: float) -> float:
     """Time from any state in the capture set to the thresholds of rest [s]."""
-    system, r = network.system, network.parameters.radius
-    L = comparison_laplacian(network.system.graph)
+    system, r, span = s.network.system, s.network.parameters.radius, s.span
+    alpha_r, L = s.parameters.reference.alpha_r, comparison_laplacian(system.graph)
     K = L + np.diag(capture.gains) - np.diag(growth(system.rho, system.radius,
                                                     capture.smallest_radius))
     phi = phi_functions(-K * _STEP, 1)
@@ -232,13 +200,14 @@ def _settling(network: GaitNetwork, capture: CaptureSet, rest: InhibitedEquilibr
                + np.diag(L) * (u + u.max()))
     v = max(float((fastest / shape).max()), turning) * shape
     e = max(float((2.0 * u / shape).max()), away) * shape
-    fade, swing_fade = math.exp(-alpha_r * _STEP), math.exp(-activity_rate * _STEP)
+    fade, swing_fade = math.exp(-alpha_r * _STEP), math.exp(
+        -s.parameters.leg.activity_rate * _STEP)
     activity = np.ones(len(K))
     for k in range(int(_HORIZON / _STEP)):
         inner = np.maximum(capture.smallest_radius, rest.radius - e)
         phase_rate = np.divide(v, inner, out=np.full_like(v, np.inf), where=inner > 1e-12)
-        if (phase_rate.max() <= REST_PHASE_RATE and speed <= REST_SPEED
-                and activity.max() <= REST_ACTIVITY):
+        if (phase_rate.max() <= supervisor.REST_PHASE_RATE and speed <= supervisor.REST_SPEED
+                and activity.max() <= supervisor.REST_ACTIVITY):
             return k * _STEP
         wanted = np.minimum(1.0, phase_rate / span.omega_armed[0])
         activity = wanted + (activity - wanted) * swing_fade

@@ -18,16 +18,12 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.inequality import Inequality
-from dmp_cpg_ros.core.certificates.timing import time_to_rest
+from dmp_cpg_ros.core.certificates.network import Setting
+from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest
+from dmp_cpg_ros.core.contraction import inhibited
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
-from dmp_cpg_ros.core.contraction.inhibited import (
-    GLOBAL,
-    NONE,
-    InhibitedContraction,
-    inhibited_contraction,
-)
 from dmp_cpg_ros.core.contraction.voting import (
     certified_threshold,
     different_voters,
@@ -40,9 +36,6 @@ from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
-
-LONGEST_STOP = 10.0
-"""Time within which a stop by votes must be bounded [s]."""
 
 
 @dataclass(frozen=True)
@@ -104,89 +97,62 @@ def votes_needed(network: GaitNetwork, inhibition: InhibitionParameters, voting:
                   for voters in different_voters(system, count)) for count in counts))
 
 
-def vote_bound(network: GaitNetwork, gains: Array, region_radius: float, span: OperatingRange,
-               alpha_r: float, activity_rate: float, tick_s: float) -> float:
+def vote_bound(s: Setting, gains: Array) -> float:
     """Bound on the time from the vote that stops the gait to rest.
 
     Parameters
     ----------
-    network : GaitNetwork
-        Oscillators.
+    s : Setting
+        What runs.
     gains : ndarray (4,)
         Gains k_inh α_i [1/s].
-    region_radius : float
-        r0 of the regions.
-    span : OperatingRange
-        Speeds and cadences.
-    alpha_r, activity_rate : float
-        Rates of the reference and of the swings' activity [1/s].
-    tick_s : float
-        Control tick [s].
 
     Returns
     -------
     float
         [s], for legs that are in their places; infinite without a certificate.
     """
-    capture = capture_set(network.system, span.omega_armed[1], gains, region_radius)
-    if inhibited_contraction(network.system, capture).reach == NONE:
-        return math.inf
-    rest = inhibited_equilibrium(network.system, span.omega_at_rest, gains)
-    return time_to_rest(network, capture, rest, span, alpha_r, activity_rate, region_radius,
-                        tick_s)
+    return _under(s, gains)[2]
 
 
-def vote_inequalities(network: GaitNetwork, inhibition: InhibitionParameters,
-                      voting: VotingParameters, span: OperatingRange, alpha_r: float,
-                      activity_rate: float, tick_s: float) -> list[Inequality]:
-    """Inequalities of voting; none when there is no voting.
+def _under(s: Setting, gains: Array) -> tuple[float, inhibited.InhibitedContraction, float]:
+    """Gain that capture needs, contraction, and bound on the time to rest under some votes."""
+    system = s.network.system
+    capture = capture_set(system, s.span.omega_armed[1], gains,
+                          s.parameters.inhibition.region_radius)
+    found = inhibited.inhibited_contraction(system, capture)
+    bound = math.inf if found.reach == inhibited.NONE else time_to_rest(
+        s, capture, inhibited_equilibrium(system, s.span.omega_at_rest, gains))
+    return float(np.nanmax(capture.needed_gain)), found, bound
 
-    Parameters
-    ----------
-    network, inhibition, voting, span
-        As of :func:`votes_needed`.
-    alpha_r, activity_rate, tick_s : float
-        As of :func:`vote_bound`.
 
-    Returns
-    -------
-    list of Inequality
-        All required: who lets legs vote relies on them.
+def vote_inequalities(s: Setting) -> list[Inequality]:
+    """Inequalities of voting, for whoever votes; none when there is no voting. All are required:
+    who lets legs vote relies on them.
     """
+    p, voting, system = s.parameters.inhibition, s.parameters.voting, s.network.system
     if not voting.voting:
         return []
-    clamp, count = vote_clamp(network, inhibition, voting, span), majority(voting)
-    system, r0 = network.system, inhibition.region_radius
-    worst: InhibitedContraction | None = None
-    needed = bound = 0.0
-    for voters in different_voters(system, count):
-        gains = np.zeros(system.graph.size)
-        gains[list(voters)] = max(clamp.gain, 1e-9)
-        capture = capture_set(system, span.omega_armed[1], gains, r0)
-        needed = max(needed, float(np.nanmax(capture.needed_gain)))
-        found = inhibited_contraction(system, capture)
-        worst = found if worst is None or found.rate < worst.rate else worst
-        bound = max(bound, vote_bound(network, gains, r0, span, alpha_r, activity_rate, tick_s))
-    assert worst is not None
-    return _rows(clamp, count, worst, needed, bound)
-
-
-def _rows(clamp: VoteClamp, count: int, worst: InhibitedContraction, needed: float,
-          bound: float) -> list[Inequality]:
+    clamp, count = vote_clamp(s.network, p, voting, s.span), majority(voting)
+    gains = np.zeros((len(sets := different_voters(system, count)), system.graph.size))
+    for row, voters in zip(gains, sets, strict=True):
+        row[list(voters)] = max(clamp.gain, 1e-9)
+    needed, found, bounds = zip(*(_under(s, row) for row in gains), strict=True)
+    worst = min(found, key=lambda contraction: contraction.rate)
     who = 'any leg alone' if count == 1 else f'any {count} legs'
-    where = 'from every state' if worst.reach == GLOBAL else 'on the capture set'
+    where, left_is = ('from every state', 'rho r^2') if worst.reach == inhibited.GLOBAL else (
+        'on the capture set', 'growth on the capture set')
     fewer = {1: 'without a vote nothing stops', 2: 'one leg alone cannot stop'}.get(
         count, f'{count - 1} legs cannot stop')
     return [
-        Inequality('votes_contraction', worst.growth, worst.inhibition_rate, '1/s',
-                   'rho r^2' if worst.reach == GLOBAL else 'growth on the capture set',
+        Inequality('votes_contraction', worst.growth, worst.inhibition_rate, '1/s', left_is,
                    f'connectivity of L_K + k_inh alpha E_{count}', PROVED,
                    f'the network contracts {where} under the votes of {who}'),
-        Inequality('votes_suffice', needed, clamp.gain, '1/s', f'capture by {count}',
+        Inequality('votes_suffice', max(needed), clamp.gain, '1/s', f'capture by {count}',
                    'k_inh alpha_max', PROVED,
                    f'{who} can stop the gait, with weights of {clamp.limit:.4g}'),
         # There may be equilibria that do not grow out of the one without rotation.
         Inequality('votes_needed', clamp.gain, clamp.window.highest, '1/s', 'k_inh alpha_max',
                    f'rest held by {count - 1}', SAMPLED, f'{fewer} the gait'),
-        Inequality('votes_time_to_rest', bound, LONGEST_STOP, 's', 'bound', 'longest stop',
+        Inequality('votes_time_to_rest', max(bounds), LONGEST_STOP, 's', 'bound', 'longest stop',
                    PROVED, 'from the vote that stops the locked gait to rest')]

@@ -67,6 +67,18 @@ def entry_tolerances(network: GaitNetwork, region_radius: float) -> tuple[float,
             radius_tolerance(p.radius, region_radius))
 
 
+def locked(network: GaitNetwork, x: Array) -> NDArray[np.complex128]:
+    """States (4, 2) in the places' own frames, as complex numbers (4,): alike in the gait."""
+    return np.exp(1j * network.gait.phases) * (x[:, 0] + 1j * x[:, 1])
+
+
+def in_places(network: GaitNetwork, x: Array, region_radius: float) -> bool:
+    """Whether legs and radii are within :func:`entry_tolerances`."""
+    (places, radii), z = entry_tolerances(network, region_radius), locked(network, x)
+    return bool(np.abs(np.abs(z) - network.parameters.radius).max() <= radii
+                and np.abs(z[:, None] - z).max() <= places)
+
+
 @lru_cache
 def largest_degree(graph: str) -> int:
     """Largest number of legs that act on one."""
@@ -277,10 +289,7 @@ class GaitSupervisor:
 
     def in_places(self, network: GaitNetwork, x: Array) -> bool:
         """Whether legs and radii are as close to their places as capture takes for granted."""
-        places, radii = entry_tolerances(network, self.parameters.region_radius)
-        z = np.exp(1j * network.gait.phases) * (x[:, 0] + 1j * x[:, 1])
-        return bool(np.abs(np.abs(z) - network.parameters.radius).max() <= radii
-                    and np.abs(z[:, None] - z).max() <= places)
+        return in_places(network, x, self.parameters.region_radius)
 
     def _running(self, state: SupervisorState, errors: Array, speed: float) -> SupervisorState:
         locked = max(map(abs, errors.tolist())) <= LOCKED_PHASE_ERROR

@@ -15,6 +15,7 @@ from test_core_supervisor import Run, walking
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
+from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.suggest import suggest_gains
 from dmp_cpg_ros.core.certificates.votes import vote_bound, votes_needed
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
@@ -76,9 +77,7 @@ def test_a_majority_stops_it_through_the_states_of_a_requested_stop(
     assert set(words) == {'waiting', 'captured', 'at_rest'}
     assert np.abs(run.ticks[-1].r).max() < 1e-3 and np.abs(run.ticks[-1].x_dot).max() < 0.06
     p, loop = run.loop.parameters, run.loop
-    bound = vote_bound(loop.network, loop.inhibition.gains, p.inhibition.region_radius,
-                       operating_range(loop.network, p.inhibition, p.reference),
-                       p.reference.alpha_r, p.leg.activity_rate, TICK)
+    bound = vote_bound(Setting.of(loop.network, p, TICK), loop.inhibition.gains)
     assert loop.stop.measured_s <= bound
 
 
