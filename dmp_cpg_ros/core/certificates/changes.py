@@ -133,21 +133,20 @@ def _changed(row: Inequality, bound: float, leg: LegParameters, what: str) -> In
 def all_networks(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
                  acting_cadence: float | None) -> list[GaitNetwork]:
     """Networks of all gaits, at the cadence of the parameters and at the one that acts."""
-    networks = [GaitNetwork(p.canonical, gait, scale) for gait in gaits]
-    if acting_cadence is None:
-        return networks
-    acting = replace(p.canonical, cadence_scale=acting_cadence)
-    return networks + [GaitNetwork(acting, gait, scale) for gait in gaits]
+    acting = p.canonical.cadence_scale if acting_cadence is None else acting_cadence
+    return [GaitNetwork(replace(p.canonical, cadence_scale=cadence), gait, scale)
+            for cadence in dict.fromkeys((p.canonical.cadence_scale, acting)) for gait in gaits]
 
 
 def _widened(p: SuiteParameters, networks: Sequence[GaitNetwork], share: float) -> OperatingRange:
     """Range of all blends, with frequencies that differ by a share."""
     spans = [operating_range(network, p.inhibition, p.reference) for network in networks]
-    slower, faster = 1.0 - share, 1.0 + share
+
+    def widened(pairs: list[tuple[float, float]]) -> tuple[float, float]:
+        slowest, fastest = zip(*pairs, strict=True)
+        return (1.0 - share) * min(slowest), (1.0 + share) * max(fastest)
+
     return OperatingRange(
-        spans[0].foot_speed, spans[0].armed_speed,
-        (slower * min(span.omega[0] for span in spans),
-         faster * max(span.omega[1] for span in spans)),
-        (slower * min(span.omega_armed[0] for span in spans),
-         faster * max(span.omega_armed[1] for span in spans)),
+        spans[0].foot_speed, spans[0].armed_speed, widened([span.omega for span in spans]),
+        widened([span.omega_armed for span in spans]),
         max(span.omega_at_rest for span in spans), max(span.omega_slope for span in spans))

@@ -9,9 +9,8 @@ other choices for words.
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
@@ -30,7 +29,6 @@ from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, inhibited_contraction
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
 
@@ -130,19 +128,17 @@ class Running:
             return (f'{", ".join(names)} cannot change while the legs are being captured; ask '
                     'again when they are at rest')
         outside = self._outside(x, np.linalg.norm(x - network.target, axis=1))
-        if not outside:
-            return ''
-        return (f'{", ".join(names)} cannot change in this rest: {outside}; ask again while the '
-                'gait runs')
+        return outside and (f'{", ".join(names)} cannot change in this rest: {outside}; ask again '
+                            'while the gait runs')
 
     def _outside(self, x: Array, distance: Array) -> str:
         """What lies outside of the invariant set of these parameters; empty when nothing does."""
         p = self.parameters
         networks = all_networks(p, (self.gait, *self.others), self.scale, self.acting_cadence)
-        fastest = max(operating_range(network, p.inhibition, p.reference).omega[1]
-                      for network in networks)
-        system, r0 = networks[0].system, p.inhibition.region_radius
-        capture = capture_set(system, fastest, p.inhibition.armed_gains, r0)
+        fastest = max(Setting.of(network, p, self.tick_s).span.omega[1] for network in networks)
+        system = networks[0].system
+        capture = capture_set(system, fastest, p.inhibition.armed_gains,
+                              p.inhibition.region_radius)
         for leg, far, most in zip(LEGS, distance, capture.distance, strict=True):
             if far > most:
                 return (f'{leg} rests {far:.4g} from its place, and the new parameters hold it '
@@ -154,16 +150,15 @@ class Running:
 
     def differences(self, other: Running) -> dict[str, tuple[Any, Any]]:
         """Names of parameters that differ, with this value and the other one."""
-        return {
-            name: (value, other.values[name])
-            for name, value in self.values.items()
-            if value != other.values[name]
-        }
+        others = other.values
+        return {name: (value, others[name]) for name, value in self.values.items()
+                if value != others[name]}
 
     @property
     def values(self) -> dict[str, Any]:
         """All parameters by name; a name that two parts share is one parameter."""
-        return {name: value for _, name, value in _fields(self.parameters)}
+        return {name: getattr(held, name) for held in self.parameters.sets.values()
+                for name in held.__dataclass_fields__}
 
     def changed(self, values: Mapping[str, Any]) -> Running:
         """Return this with other values of some parameters.
@@ -173,13 +168,11 @@ class Running:
         ParameterError
             If a value is impossible.
         """
-        parts: dict[str, dict[str, Any]] = {}
-        for part, name, _ in _fields(self.parameters):
-            if name in values:
-                parts.setdefault(part, {})[name] = values[name]
+        parts = {part: {name: values[name] for name in held.__dataclass_fields__ if name in values}
+                 for part, held in self.parameters.sets.items()}
         return replace(self, parameters=replace(self.parameters, **{
             part: replace(getattr(self.parameters, part), **changes)
-            for part, changes in parts.items()}))
+            for part, changes in parts.items() if changes}))
 
 
 @dataclass(frozen=True)
@@ -243,8 +236,7 @@ class CertificateGate:
     def _nearest(self, present: Running, held: Certificate, proposed: Running) -> str:
         """Nearest values that work, as text."""
         differences = present.differences(proposed)
-        numbers = {name: pair for name, pair in differences.items()
-                   if isinstance(pair[0], float)}
+        numbers = {name: pair for name, pair in differences.items() if isinstance(pair[0], float)}
         words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
         if words and not self._holds(present.changed(words)):
             return self._choices(proposed, words)
@@ -252,17 +244,13 @@ class CertificateGate:
             return 'nothing nearer is known: the running parameters are not certified themselves'
 
         def between(share: float) -> dict[str, Any]:
-            return {**words, **{name: _between(share, before, after)
+            return {**words, **{name: after if share == 1.0 else before + share * (after - before)
                                 for name, (before, after) in numbers.items()}}
 
-        def works(share: float) -> bool:
-            return self._holds(present.changed(between(share)))
-
-        share = nearest_value(works, 0.0, 1.0)
+        share = nearest_value(lambda at: self._holds(present.changed(between(at))), 0.0, 1.0)
         values = ', '.join(f'{name} = {shown(_rounded(between(share)[name], before))}'
                            for name, (before, _) in numbers.items())
-        several = 's' if len(numbers) > 1 else ''
-        return f'nearest value{several} that work{"" if several else "s"}: {values}'
+        return f'nearest value{"s that work" if len(numbers) > 1 else " that works"}: {values}'
 
     def _choices(self, proposed: Running, words: Mapping[str, Any]) -> str:
         """Other words that work in place of those that were asked for."""
@@ -282,29 +270,14 @@ class CertificateGate:
             return False
 
 
-def _fields(parameters: SuiteParameters) -> Iterator[tuple[str, str, Any]]:
-    """Part, name and value of every parameter."""
-    for part, values in parameters.sets.items():
-        for entry in dataclasses.fields(values):
-            yield part, entry.name, getattr(values, entry.name)
-
-
 def _alternatives(running: Running, name: str) -> list[Any]:
     """All values of a parameter that is a choice; for several at once, one up to all of them."""
-    for values in running.parameters.sets.values():
-        for entry in dataclasses.fields(values):
-            if entry.name == name:
-                choices = entry.metadata.get('choices', ())
-                if not isinstance(entry.default, tuple):
-                    return list(choices)
-                sizes = range(1, len(choices) + 1)
-                return [some for size in sizes for some in combinations(choices, size)]
-    return []
-
-
-def _between(share: float, before: float, after: float) -> float:
-    """Value at a share of the way; exactly the second at its end."""
-    return after if share == 1.0 else before + share * (after - before)
+    entry = next(held.__dataclass_fields__[name] for held in running.parameters.sets.values()
+                 if name in held.__dataclass_fields__)
+    choices = entry.metadata['choices']
+    if not isinstance(entry.default, tuple):
+        return list(choices)
+    return [some for size in range(1, len(choices) + 1) for some in combinations(choices, size)]
 
 
 def _rounded(value: float, towards: float) -> float:

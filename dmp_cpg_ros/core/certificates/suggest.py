@@ -13,6 +13,7 @@ from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
@@ -24,7 +25,7 @@ GAIN_ROWS = ('synchronisation', 'contraction', 'capture', 'rest_in_region', 'tim
 """Inequalities that the two gains decide; the others depend on other parameters."""
 
 _LARGEST_COUPLING, _LARGEST_INHIBITION = 1e4, 1e5
-_PRECISION = 1e-3
+_HALVINGS = 10  # of the way to a wanted value
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,7 @@ class Suggestion:
 
 def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
                   reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
-                  tick_s: float, voting: VotingParameters | None = None
-                  ) -> Suggestion | None:
+                  tick_s: float, voting: VotingParameters | None = None) -> Suggestion | None:
     """Raise the gains, inhibition before coupling, until the certificate holds.
 
     Parameters are those of :func:`~dmp_cpg_ros.core.certificates.certify.certify`.
@@ -67,22 +67,24 @@ def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
                        tick_s, voting=voting)
 
     k0, k_inh0 = network.parameters.coupling_gain, inhibition.inhibition_gain
-    present = at(k0, k_inh0, voting)
+    present, k = at(k0, k_inh0, voting), k0
     if present.holds:
         return Suggestion(k0, k_inh0, present, False)
-    k = k0
     while k <= _LARGEST_COUPLING:
         k_inh = k_inh0
         while k_inh <= _LARGEST_INHIBITION:
             found = at(k, k_inh)
-            if found.holds and (k == k0 or _has_margin(found)):
+            if found.holds and (k == k0 or all(
+                    MARGIN * found[name].left <= found[name].right
+                    for name in ('synchronisation', 'contraction'))):  # those of the coupling
                 found = at(k, k_inh, voting)
                 if found.holds:
                     return Suggestion(k, k_inh, found, True)
                 break  # the votes of some legs may still need stronger couplings
             if any(entry.name not in GAIN_ROWS for entry in found.failing):
                 return None
-            k_inh = _next_inhibition(found, k_inh)
+            needed = MARGIN * found['capture'].left
+            k_inh = _rounded(max(needed, 1.0) if needed > k_inh else 1.5 * max(k_inh, 1.0))
         k = _rounded(1.3 * k)
     return None
 
@@ -111,23 +113,7 @@ def nearest_value(holds: Callable[[float], bool], working: float, wanted: float)
         raise ParameterError(f'{working:g} does not hold a certificate to start from')
     if holds(wanted):
         return wanted
-    low, high = working, wanted
-    while abs(high - low) > _PRECISION * abs(wanted - working):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
-
-
-def _has_margin(found: Certificate) -> bool:
-    """Whether the inequalities of the coupling hold by the margin."""
-    return all(MARGIN * found[name].left <= found[name].right
-               for name in ('synchronisation', 'contraction'))
-
-
-def _next_inhibition(found: Certificate, k_inh: float) -> float:
-    """Next gain to try: what capture needs with its margin, or a step on."""
-    needed = MARGIN * found['capture'].left
-    return _rounded(max(needed, 1.0) if needed > k_inh else 1.5 * max(k_inh, 1.0))
+    return last_that_holds(holds, working, wanted, _HALVINGS)
 
 
 def _rounded(gain: float) -> float:
