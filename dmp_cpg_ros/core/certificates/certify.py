@@ -83,11 +83,10 @@ class Certificate:
 
     def __getitem__(self, name: str) -> Inequality:
         """Return the inequality of a name; raises ParameterError with the names that exist."""
-        for inequality in self.inequalities:
-            if inequality.name == name:
-                return inequality
-        raise ParameterError(f"there is no inequality '{name}'; valid are "
-                             f"{', '.join(entry.name for entry in self.inequalities)}")
+        named = {entry.name: entry for entry in self.inequalities}
+        if name not in named:
+            raise ParameterError(f"there is no inequality '{name}'; valid are {', '.join(named)}")
+        return named[name]
 
     @property
     def failing(self) -> tuple[Inequality, ...]:

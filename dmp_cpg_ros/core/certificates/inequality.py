@@ -78,10 +78,8 @@ class Inequality:
 
     def as_mapping(self) -> dict[str, object]:
         """Return everything as values that strict JSON can write; None for what is not finite."""
-        return {'name': self.name, 'holds': self.holds, 'required': self.required,
-                'left': finite(self.left), 'right': finite(self.right),
-                'margin': finite(self.margin), 'unit': self.unit, 'left_is': self.left_is,
-                'right_is': self.right_is, 'grade': self.grade, 'sentence': self.sentence}
+        return {**vars(self), 'holds': self.holds, 'left': finite(self.left),
+                'right': finite(self.right), 'margin': finite(self.margin)}
 
     def explained(self) -> str:
         """Name, both sides and the sentence in one line."""

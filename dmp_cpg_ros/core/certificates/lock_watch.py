@@ -20,10 +20,10 @@ from math import asin, exp, inf, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH
-from dmp_cpg_ros.core.contraction.hopf_bounds import growth
-from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
+from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH, free_synchronisation
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.inhibition.supervisor import locked
+from dmp_cpg_ros.core.maths.updated import updated
 
 Array = NDArray[np.float64]
 
@@ -74,10 +74,6 @@ class PhaseLockWatch:
     def __init__(self) -> None:
         """Start with no network."""
         self._parameters: CanonicalParameters | None = None
-        self._found: Synchronisation | None = None
-        self._weights: list[float] = []
-        self._places: list[float] = []
-        self._turns: list[complex] = []
 
     def step(self, before: PhaseLock | None, network: GaitNetwork, r: Array, x: Array, free: bool,
              dt: float, contact: float = 0.0) -> PhaseLock:
@@ -104,19 +100,21 @@ class PhaseLockWatch:
         -------
         PhaseLock
         """
-        found, places = self._synchronisation(network), network.gait.phases
-        z = [complex(x_1, -x_2) * turn
-             for (x_1, x_2), turn in zip(x.tolist(), self._into_places(places), strict=True)]
-        error = _spread(z)
+        p, places = network.parameters, network.gait.phases
+        if p is not self._parameters and p != self._parameters:
+            self._found = free_synchronisation(network)  # to which places make no difference
+        self._parameters, found = p, self._found
+        z: list[complex] = locked(network, x).tolist()
+        error = max(abs(angle(one * other.conjugate())) for one, other in combinations(z, 2))
         if found.weights is None or not found.synchronises:
             return PhaseLock(error, pi, LOCKED, inf, places)
-        weights = self._weights
+        weights: list[float] = found.weights.tolist()
         mean = sum(weight * each for weight, each in zip(weights, z, strict=True))
         epsilon = sqrt(sum(weight * abs(each - mean) ** 2
                            for weight, each in zip(weights, z, strict=True)))
         if before is None or not free:
             return PhaseLock(error, pi, LOCKED, epsilon, places)
-        size = max(network.parameters.radius, *map(abs, z))
+        size = max(p.radius, *map(abs, z))
         steady = (EXPECTED_MISMATCH * network.omega(r) + contact) * size / found.rate
         moved = _moved(places - before.places) * size
         fade = exp(-found.rate * dt)
@@ -127,41 +125,15 @@ class PhaseLockWatch:
         return _judged(before, PhaseLock(error, bound, LOCKED, envelope, places), epsilon,
                        _phase_bound(steady, weights, abs(mean)))
 
-    def _synchronisation(self, network: GaitNetwork) -> Synchronisation:
-        """Theorem 4 for the network's parameters; places make no difference to it."""
-        p = network.parameters
-        if self._found is None or (p is not self._parameters and p != self._parameters):
-            self._found = synchronisation(network.system.graph,
-                                          float(growth(p.rho, p.radius)))
-            weights = self._found.weights
-            self._weights = [] if weights is None else weights.tolist()
-        self._parameters = p
-        return self._found
-
-    def _into_places(self, places: Array) -> list[complex]:
-        """Rotations R(−φ_i) into the places' own frames, as complex numbers."""
-        listed = places.tolist()
-        if listed != self._places:
-            self._places, self._turns = listed, np.exp(-1j * places).tolist()
-        return self._turns
-
 
 def _judged(before: PhaseLock, now: PhaseLock, epsilon: float, steady: float) -> PhaseLock:
     """Decide the level: an alarm stays until the error is within the steady bound again."""
     beyond = now.error > now.bound + _ROUNDING
     if before.level == LOCKED:
-        if not beyond:
-            return now
-        return PhaseLock(now.error, now.bound, DISTURBED, epsilon, now.places)
+        return updated(now, level=DISTURBED, envelope=epsilon) if beyond else now
     if now.error <= steady:
         return now
-    lost = before.level == LOST or beyond
-    return PhaseLock(now.error, steady, LOST if lost else DISTURBED, now.envelope, now.places)
-
-
-def _spread(z: list[complex]) -> float:
-    """Largest difference of two phases, on the circle."""
-    return max(abs(angle(one * other.conjugate())) for one, other in combinations(z, 2))
+    return updated(now, bound=steady, level=LOST if before.level == LOST or beyond else DISTURBED)
 
 
 def _moved(change: Array) -> float:

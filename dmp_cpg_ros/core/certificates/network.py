@@ -105,17 +105,21 @@ class NetworkAnalysis:
     rest_at_speed: InhibitedEquilibrium | None
 
 
+def free_synchronisation(network: GaitNetwork) -> Synchronisation:
+    """Theorem 4 for the oscillators of a gait without inhibition."""
+    everywhere = float(growth(network.parameters.rho, network.parameters.radius))
+    return synchronisation(network.system.graph, everywhere)
+
+
 def analyse_network(network: GaitNetwork, inhibition: InhibitionParameters,
                     span: OperatingRange) -> NetworkAnalysis:
     """Apply the theorems to the network of a gait at the cadences of a range."""
     system = network.system
-    everywhere = float(growth(system.rho, system.radius).max())
     # A gain of zero holds nothing; the smallest positive one says so in numbers.
     acting = np.where(_chosen(inhibition), max(inhibition.inhibition_gain, 1e-9), 0.0)
     capture = capture_set(system, span.omega[1], acting, inhibition.region_radius)
     return NetworkAnalysis(
-        synchronisation(system.graph, everywhere), capture,
-        inhibited.inhibited_contraction(system, capture),
+        free_synchronisation(network), capture, inhibited.inhibited_contraction(system, capture),
         inhibited_equilibrium(system, span.omega_at_rest, acting),
         inhibited_equilibrium(system, span.omega[1], acting))
 

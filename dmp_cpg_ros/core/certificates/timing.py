@@ -19,15 +19,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.certificates.network import Setting
+from dmp_cpg_ros.core.certificates.network import Setting, free_synchronisation
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
-from dmp_cpg_ros.core.contraction.synchronisation import (
-    Synchronisation,
-    comparison_laplacian,
-    synchronisation,
-)
+from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, comparison_laplacian
 from dmp_cpg_ros.core.inhibition import supervisor
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.maths.exponential import phi_functions
@@ -143,7 +139,7 @@ def time_to_places(s: Setting, x: Array) -> float:
         [s]; 0 for legs in their places, infinite when the bound does not come down.
     """
     p, network, r0 = s.network.parameters, s.network, s.parameters.inhibition.region_radius
-    found = synchronisation(network.system.graph, float(growth(p.rho, p.radius)))
+    found = free_synchronisation(network)
     if not found.synchronises or found.weights is None or not found.free_mean:
         return math.inf
     if supervisor.in_places(network, x, r0):

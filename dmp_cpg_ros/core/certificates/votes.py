@@ -71,30 +71,15 @@ class VotesNeeded:
 
 def votes_needed(network: GaitNetwork, inhibition: InhibitionParameters, voting: VotingParameters,
                  span: OperatingRange) -> VotesNeeded:
-    """Find out how many legs can stop the gait.
-
-    Parameters
-    ----------
-    network : GaitNetwork
-        Oscillators.
-    inhibition : InhibitionParameters
-        Gain and region.
-    voting : VotingParameters
-        Rule, majority, clamp.
-    span : OperatingRange
-        Cadences.
-
-    Returns
-    -------
-    VotesNeeded
-    """
-    system, r0, counts = network.system, inhibition.region_radius, range(1, len(LEGS) + 1)
+    """Find out how many legs can stop the gait, at the cadences of a range."""
+    system, r0 = network.system, inhibition.region_radius
+    voters = [different_voters(system, count) for count in range(1, len(LEGS) + 1)]
     return VotesNeeded(
         vote_clamp(network, inhibition, voting, span),
-        tuple(max(certified_threshold(system, span.omega_armed[1], voters, r0)
-                  for voters in different_voters(system, count)) for count in counts),
-        tuple(min(rest_threshold(system, span.omega[0], voters, r0)
-                  for voters in different_voters(system, count)) for count in counts))
+        tuple(max(certified_threshold(system, span.omega_armed[1], legs, r0) for legs in sets)
+              for sets in voters),
+        tuple(min(rest_threshold(system, span.omega[0], legs, r0) for legs in sets)
+              for sets in voters))
 
 
 def vote_bound(s: Setting, gains: Array) -> float:
