@@ -251,10 +251,9 @@ def open_viewer(robot: MujocoRobot) -> Any | None:
         syncing when ``is_running()`` turns false. None without a screen or where the window cannot
         be opened; the reason is logged.
     """
-    if not has_screen():
-        _log.warning('no window: there is no screen (DISPLAY and WAYLAND_DISPLAY are unset)')
-        return None
     try:
+        if not has_screen():
+            raise RobotError('there is no screen (DISPLAY and WAYLAND_DISPLAY are unset)')
         import mujoco.viewer as viewer
 
         # MuJoCo opens its window in a thread whose failure it would wait for without end.

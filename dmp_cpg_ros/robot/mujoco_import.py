@@ -17,9 +17,8 @@ import os
 import sys
 
 _log = logging.getLogger(__name__)
-_ON = ('', 'enable', 'enabled', 'on', 'true', '1')
-_OFF = ('disable', 'disabled', 'off', 'false', '0')
-_BACKENDS = ('glfw', 'egl', 'osmesa', 'glx', 'cgl', 'wgl')
+_KNOWN = ('', 'enable', 'enabled', 'on', 'true', '1', 'disable', 'disabled', 'off', 'false', '0',
+          'glfw', 'egl', 'osmesa', 'glx', 'cgl', 'wgl')
 _LIBRARY = {'egl': 'libEGL.so.1', 'osmesa': 'libOSMesa.so.8'}
 
 
@@ -34,7 +33,7 @@ def usable_backend(wanted: str, has_screen: bool) -> str:
         Whether there is a display to open windows on.
     """
     backend = wanted.strip().lower()
-    if backend not in _ON + _OFF + _BACKENDS:
+    if backend not in _KNOWN:
         _log.warning("MUJOCO_GL = '%s' is not known; valid are egl, osmesa, glfw, disable", wanted)
         wanted = backend = ''
     backend = backend or ('' if has_screen else 'egl')

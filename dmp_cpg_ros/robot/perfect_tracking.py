@@ -48,15 +48,14 @@ class PerfectTrackingRobot:
     def __init__(self, description: RobotDescription, tick_ns: int = 4_000_000,
                  start_pose: str = 'standing') -> None:
         steps_per_tick(tick_ns, 1)
-        self.description = description
-        self.tick_ns = tick_ns
-        self._legs = [LegKinematics(leg) for leg in description.legs]
-        self._radius = np.array([leg.foot_radius for leg in description.legs])
-        if start_pose not in ('standing', 'lying'):
+        poses = {'standing': home_joint_position, 'lying': lying_posture}
+        if start_pose not in poses:
             raise ParameterError(f"start_pose = '{start_pose}': a robot that tracks perfectly "
                                  'is standing or lying')
-        self._home = (home_joint_position(description) if start_pose == 'standing'
-                      else lying_posture(description))
+        self.description, self.tick_ns = description, tick_ns
+        self._legs = [LegKinematics(leg) for leg in description.legs]
+        self._radius = np.array([leg.foot_radius for leg in description.legs])
+        self._home = poses[start_pose](description)
         self.reset()
 
     def reset(self, time_ns: int = 0) -> RobotState:
@@ -83,8 +82,7 @@ class PerfectTrackingRobot:
         moved = _turned(shift, self._yaw)  # in the world
         velocity_in_world = np.array((*moved, height - self._height)) / tick_s
         acceleration_in_world = (velocity_in_world - self._velocity_in_world) / tick_s
-        self._place = self._place + moved
-        self._yaw += turn
+        self._place, self._yaw = self._place + moved, self._yaw + turn
         self._velocity_in_world, self._yaw_rate = velocity_in_world, turn / tick_s
         self._feet, self._height, self._standing = feet, height, standing
         self._tick += 1
@@ -105,8 +103,8 @@ class PerfectTrackingRobot:
         half = 0.5 * self._yaw
         specific_force = acceleration_in_world + (0.0, 0.0, GRAVITY)
         return RobotState(
-            time_ns=self._tick * self.tick_ns,
-            joint_position=position, joint_velocity=velocity, joint_effort=effort,
+            time_ns=self._tick * self.tick_ns, joint_position=position, joint_velocity=velocity,
+            joint_effort=effort,
             base_position_in_world=np.array((*self._place, self._height)),
             base_quaternion=np.array((0.0, 0.0, np.sin(half), np.cos(half))),
             base_velocity_in_base=_in_base(self._velocity_in_world, self._yaw),

