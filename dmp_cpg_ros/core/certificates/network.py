@@ -71,9 +71,8 @@ class Setting:
         """
         if not (np.isfinite(tick_s) and tick_s > 0.0):
             raise ParameterError(f'tick = {tick_s!r} s must be positive and finite')
-        p = parameters
-        span = span or operating_range(network, p.inhibition, p.reference)
-        return cls(network, p, tick_s, span)
+        return cls(network, parameters, tick_s, span or operating_range(
+            network, parameters.inhibition, parameters.reference))
 
     @property
     def arc(self) -> float:

@@ -30,7 +30,7 @@ from dmp_cpg_ros.core.contraction.voting import (
     rest_threshold,
 )
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.voting import VoteClamp, majority, vote_clamp
+from dmp_cpg_ros.core.inhibition.voting import VoteClamp, vote_clamp
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -118,7 +118,7 @@ def vote_inequalities(s: Setting) -> list[Inequality]:
     p, voting, system = s.parameters.inhibition, s.parameters.voting, s.network.system
     if not voting.voting:
         return []
-    clamp, count = vote_clamp(s.network, p, voting, s.span), majority(voting)
+    clamp, count = vote_clamp(s.network, p, voting, s.span), voting.majority
     gains = np.zeros((len(sets := different_voters(system, count)), system.graph.size))
     for row, voters in zip(gains, sets, strict=True):
         row[list(voters)] = max(clamp.gain, 1e-9)

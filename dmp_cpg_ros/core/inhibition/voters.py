@@ -13,14 +13,15 @@ IMU alone. It detects a fall independently of the state estimate, which balance 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import acos, cos, exp, pi, sin, sqrt
+from math import acos, exp, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import cross, triple
+from dmp_cpg_ros.core.maths.rotations import turned
+from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 
 Array = NDArray[np.float64]
@@ -63,8 +64,7 @@ class VoteSensors:
     @property
     def imu_is_good(self) -> bool:
         """Whether gyroscope and accelerometer both say something."""
-        return bool(np.isfinite(self.rate_in_base).all()
-                    and np.isfinite(self.specific_force_in_base).all())
+        return bool(np.isfinite((self.rate_in_base, self.specific_force_in_base)).all())
 
 
 def vote_sensors(state: RobotState) -> VoteSensors:
@@ -212,20 +212,10 @@ class UpFilter:
         if self.time_ns < 0 or dt > LONGEST_GAP:
             up = force / strength if plausible else self.up_in_base
             return replace(self, up_in_base=up, time_ns=sensors.imu_ns)
-        up = _turned_back(self.up_in_base, sensors.rate_in_base * dt)
+        # What stands still in the world turns back in the body.
+        turn = turned(np.array((0.0, 0.0, 0.0, 1.0)), sensors.rate_in_base * dt)
+        up = self.up_in_base @ np.array(rotation(turn.tolist()))
         if plausible:
             up = up + (force / strength - up) * (1.0 - exp(-dt / TIME_CONSTANT))
         length = sqrt(float(up @ up))
         return UpFilter(up / length if length > 1e-6 else self.up_in_base, sensors.imu_ns)
-
-
-def _turned_back(direction: Array, rotation_vector: Array) -> Array:
-    """A direction that stands still in the world, seen after the body has turned (Rodrigues)."""
-    angle = sqrt(float(rotation_vector @ rotation_vector))
-    if angle < 1e-12:
-        return direction
-    axis = rotation_vector / -angle
-    across = np.array(cross(triple(axis.tolist()), triple(direction.tolist())))
-    along = axis * (float(axis @ direction) * (1.0 - cos(angle)))
-    turned: Array = direction * cos(angle) + across * sin(angle) + along
-    return turned

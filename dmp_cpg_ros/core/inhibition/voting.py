@@ -23,10 +23,14 @@ from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.voting import MajorityClamp, majority_clamp
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition import voters, voting_parameters
+from dmp_cpg_ros.core.inhibition import voters
 from dmp_cpg_ros.core.inhibition.voters import NEVER, FootWatch, LastGood, UpFilter, VoteSensors
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, OWN_SOURCES, Tally, Vote, VoteMemory
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
+from dmp_cpg_ros.core.inhibition.voting_parameters import (
+    WINNER_TAKE_ALL,
+    VoteSourceParameters,
+    VotingParameters,
+)
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -62,12 +66,6 @@ class VoteClamp:
     window: MajorityClamp
 
 
-def majority(parameters: VotingParameters) -> int:
-    """Number of legs that stop the gait: one alone where the winner takes all."""
-    alone = parameters.vote_rule == voting_parameters.WINNER_TAKE_ALL
-    return 1 if alone else parameters.vote_majority
-
-
 def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: VotingParameters,
                span: OperatingRange) -> VoteClamp:
     """Clamp of the votes, from ``vote_limit`` or computed.
@@ -93,7 +91,7 @@ def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: V
         is certified for the majority, and the whole k_inh where nothing is.
     """
     window = majority_clamp(network.system, span.omega_armed[1], inhibition.region_radius,
-                            majority(voting), span.omega[0])
+                            voting.majority, span.omega[0])
     k_inh = inhibition.inhibition_gain
     if voting.vote_limit > 0.0 or k_inh == 0.0:
         return VoteClamp(voting.vote_limit * k_inh, voting.vote_limit, window)
@@ -130,10 +128,10 @@ def holds_at_rest(system: CanonicalSystem, omega: float, gains: Array,
         rest = inhibited_equilibrium(system, omega, acting)
         if rest is None or not rest.slowest_rate > 0.0:
             return False
-        outside = (acting > 0.0) & (rest.distance > region_radius)
-        if not outside.any():
+        inside = np.where(rest.distance > region_radius, 0.0, acting)
+        if np.array_equal(inside, acting):
             return True
-        acting = np.where(outside, 0.0, acting)
+        acting = inside
     return False
 
 
@@ -157,9 +155,8 @@ def acting_gains(weights: Array, inhibition_gain: float, rule: str) -> Array:
         [1/s]
     """
     gains: Array = inhibition_gain * weights
-    if rule == voting_parameters.SUM:
-        return gains
-    return np.where(np.arange(len(gains)) == np.argmax(gains), gains, 0.0)
+    largest = np.arange(len(gains)) == np.argmax(gains)
+    return np.where(largest, gains, 0.0) if rule == WINNER_TAKE_ALL else gains
 
 
 @dataclass(frozen=True)
@@ -313,8 +310,8 @@ class Voting:
                 omega != before.omega or omega == before.computed_at):
             return replace(before, omega=omega)
         span = operating_range(network, self.inhibition, self.reference)
-        clamp = vote_clamp(network, self.inhibition, self.voting, span)
-        return ClampInForce(clamp, omega, omega, rules)
+        return ClampInForce(
+            vote_clamp(network, self.inhibition, self.voting, span), omega, omega, rules)
 
     def _count(self, before: Tally, memory: VoteMemory, time_ns: int, fade_ns: int,
                network: GaitNetwork, limit: float) -> Tally:
@@ -327,6 +324,5 @@ class Voting:
         if np.array_equal(weights, before.weights):
             return before if causes == before.causes else replace(before, causes=causes)
         gains = acting_gains(weights, p.inhibition_gain, self.voting.vote_rule)
-        omega = network.omega(np.zeros(3))
-        stops = holds_at_rest(network.system, omega, gains, p.region_radius)
+        stops = holds_at_rest(network.system, network.omega(np.zeros(3)), gains, p.region_radius)
         return Tally(weights, gains, stops, causes)

@@ -44,6 +44,11 @@ class VotingParameters(VotingSwitch):
         False, 'whether a stop by votes ends by itself when the votes have faded; else the '
         'service resumes')
 
+    @property
+    def majority(self) -> int:
+        """Number of legs that stop the gait: one alone where the winner takes all."""
+        return 1 if self.vote_rule == WINNER_TAKE_ALL else self.vote_majority
+
 
 @dataclass(frozen=True)
 class VoteSourceParameters(Parameters):
