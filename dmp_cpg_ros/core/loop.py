@@ -30,8 +30,7 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
-from dmp_cpg_ros.core.inhibition.prediction import predict
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState, predict
 from dmp_cpg_ros.core.inhibition.voters import vote_sensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting

@@ -16,8 +16,7 @@ from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
 from dmp_cpg_ros.core.gait.running import CanonicalState
-from dmp_cpg_ros.core.inhibition.prediction import predict
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, predict
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting

@@ -67,9 +67,8 @@ def inspect_model(path: Path | str) -> Inspection:
     model = load_model(path, '')
     base = _base(model, path)
     data = mujoco.MjData(model)
-    start = int(model.jnt_qposadr[model.body_jntadr[base]])
     data.qpos[:] = 0.0
-    data.qpos[start + 3] = 1.0
+    data.qpos[model.jnt_qposadr[model.body_jntadr[base]] + 3] = 1.0
     mujoco.mj_kinematics(model, data)
     chains = list(filter(None, (_chain(model, child) for child in _children(model, base))))
     legs = [chain for chain in chains if _axes(model, data, chain) == leg_reader.LEG_AXES]
@@ -92,8 +91,7 @@ def inspect_model(path: Path | str) -> Inspection:
 
 def _base(model: mujoco.MjModel, path: Path) -> int:
     """Return the body with a free joint that carries the most joints."""
-    free = [int(model.jnt_bodyid[j]) for j in range(model.njnt)
-            if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE]
+    free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE].tolist()
     if not free:
         names = [model.body(i).name for i in range(1, min(model.nbody, 6))]
         raise ParameterError(
@@ -101,7 +99,7 @@ def _base(model: mujoco.MjModel, path: Path) -> int:
             f"{model.nbody - 1} bodies has a free joint (they are {', '.join(names) or 'none'}"
             f"{', ...' if model.nbody > 6 else ''})")
     roots = model.body_rootid[model.jnt_bodyid]
-    return max(free, key=lambda body: int((roots == model.body_rootid[body]).sum()))
+    return int(max(free, key=lambda body: (roots == model.body_rootid[body]).sum()))
 
 
 def _children(model: mujoco.MjModel, body: int) -> list[int]:
@@ -119,8 +117,8 @@ def _axes(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> str:
     letters = ''
     for joint in chain:
         axis = np.abs(data.xaxis[joint])
-        hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
         straight = 'xyz'[int(axis.argmax())] if axis.max() >= AXIS_COSINE else '?'
+        hinge = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
         letters += straight if hinge else '-'
     return letters
 

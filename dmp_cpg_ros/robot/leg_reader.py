@@ -199,9 +199,9 @@ def joints_of(model: mujoco.MjModel, body: int) -> list[int]:
 
 def actuator_of(model: mujoco.MjModel, joint: int) -> int | None:
     """Return the actuator that drives a joint directly, or None."""
-    drives = ((model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT)
-              & (model.actuator_trnid[:, 0] == joint))
-    return int(drives.argmax()) if drives.any() else None
+    of_joint = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
+    drives = np.flatnonzero(of_joint & (model.actuator_trnid[:, 0] == joint))
+    return int(drives[0]) if len(drives) else None
 
 
 def motor_ratio(model: mujoco.MjModel, actuator: int) -> float:

@@ -22,8 +22,7 @@ from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import RunningGait
-from dmp_cpg_ros.core.inhibition.prediction import predict
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, predict
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.suite import load_gait

@@ -37,7 +37,7 @@ from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, REST_ACTIVITY
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
@@ -178,7 +178,9 @@ def certificate_of(s: Setting) -> Certificate:
     contact = None
     if p.contact_feedback:
         contact, row = of_network.contact_limits(s, found, start)
-        stop += of_network.later_stop(s)
+        # The tick in which a request is on its way may still be shifted, and the stop begins with
+        # a leg that is as far behind its place as phase lock allows.
+        stop += s.tick_s + LOCKED_PHASE_ERROR / s.span.omega_armed[0]
         rows.append(row)
     rows += [
         Inequality('time_to_rest', stop, LONGEST_STOP, 's', 'bound', 'longest stop', PROVED,
@@ -271,8 +273,9 @@ def hierarchy_inequalities(s: Setting, found: Synchronisation) -> list[Inequalit
     leg, p = s.parameters.leg, s.network.parameters
     spring, _ = spring_damper_contraction(leg.stiffness, leg.damping)
     filters = min(leg.activity_rate, leg.placement_rate, s.parameters.posture.activity_rate)
+    hold = p.contact_hold if p.contact_feedback else 0.0      # late feet may hold the phase back
     oscillator = transverse_contraction(
-        AndronovHopf(p.rho, p.radius), of_network.slowest_cadence(s),
+        AndronovHopf(p.rho, p.radius), (1.0 - hold) * s.span.omega[0],
         Annulus(_INNER * p.radius, p.radius))
     alpha_r = s.parameters.reference.alpha_r
     whole = hierarchy.coupled_primitives(

@@ -60,9 +60,8 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
         If the tick is not positive and finite.
     """
     p, rate = parameters, parameters.gait_change.gait_change_rate
-    networks, arriving = all_networks(p, gaits, scale, acting_cadence), 0.0
-    if acting_cadence is not None:
-        arriving = abs(acting_cadence - p.canonical.cadence_scale) / CADENCE_RATE
+    networks, cadence = all_networks(p, gaits, scale, acting_cadence), p.canonical.cadence_scale
+    arriving = abs((acting_cadence or cadence) - cadence) / CADENCE_RATE
     ways = [GaitTransition(one, other) for one, other in combinations(gaits, 2)]
     share = max((way.fastest(rate) for way in ways), default=0.0)
     span = _widened(p, networks, share)
@@ -133,9 +132,9 @@ def _changed(row: Inequality, bound: float, leg: LegParameters, what: str) -> In
 def all_networks(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
                  acting_cadence: float | None) -> list[GaitNetwork]:
     """Networks of all gaits, at the cadence of the parameters and at the one that acts."""
-    acting = p.canonical.cadence_scale if acting_cadence is None else acting_cadence
-    return [GaitNetwork(replace(p.canonical, cadence_scale=cadence), gait, scale)
-            for cadence in dict.fromkeys((p.canonical.cadence_scale, acting)) for gait in gaits]
+    cadence = p.canonical.cadence_scale
+    return [GaitNetwork(replace(p.canonical, cadence_scale=acting), gait, scale)
+            for acting in dict.fromkeys((cadence, acting_cadence or cadence)) for gait in gaits]
 
 
 def _widened(p: SuiteParameters, networks: Sequence[GaitNetwork], share: float) -> OperatingRange:

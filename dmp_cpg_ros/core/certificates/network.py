@@ -7,10 +7,9 @@ inhibition, capture, mismatch.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.inequality import Inequality
@@ -29,10 +28,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, entry_tolerances
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
-from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
-
-Array = NDArray[np.float64]
 
 EXPECTED_MISMATCH = 0.05
 """Difference of the legs' frequencies that should be tolerated, as a share of the highest."""
@@ -115,7 +111,8 @@ def analyse_network(network: GaitNetwork, inhibition: InhibitionParameters,
     """Apply the theorems to the network of a gait at the cadences of a range."""
     system = network.system
     # A gain of zero holds nothing; the smallest positive one says so in numbers.
-    acting = np.where(_chosen(inhibition), max(inhibition.inhibition_gain, 1e-9), 0.0)
+    acting = replace(
+        inhibition, inhibition_gain=max(inhibition.inhibition_gain, 1e-9)).armed_gains
     capture = capture_set(system, span.omega[1], acting, inhibition.region_radius)
     return NetworkAnalysis(
         free_synchronisation(network), capture, inhibited.inhibited_contraction(system, capture),
@@ -142,10 +139,10 @@ def network_inequalities(s: Setting, analysis: NetworkAnalysis) -> list[Inequali
 
 def _contraction(found: InhibitedContraction) -> Inequality:
     left_is = 'rho r^2' if found.reach == inhibited.GLOBAL else 'growth on the capture set'
-    grade = f' ({found.reach} grade), at {found.rate:.4g} 1/s'
-    where = {inhibited.GLOBAL: 'from every state' + grade,
-             inhibited.NONE: 'and comes to rest'}.get(
-        found.reach, 'inside the capture set, which leaves the origin out' + grade)
+    where = {inhibited.GLOBAL: 'from every state', inhibited.NONE: 'and comes to rest'}.get(
+        found.reach, 'inside the capture set, which leaves the origin out')
+    if found.reach != inhibited.NONE:
+        where += f' ({found.reach} grade), at {found.rate:.4g} 1/s'
     return Inequality('contraction', found.growth, found.inhibition_rate, '1/s', left_is,
                       'connectivity of L_K + k_inh E', PROVED,
                       f'the inhibited network contracts {where}')
@@ -154,15 +151,14 @@ def _contraction(found: InhibitedContraction) -> Inequality:
 def _capture(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
     """Inequalities (c): C is not left again, by those in their places and by anyone."""
     p, span, network = s.parameters.inhibition, s.span, s.network
-    held, gain, r0 = _chosen(p), p.inhibition_gain, p.region_radius
+    held, gain, r0 = analysis.capture.gains > 0.0, p.inhibition_gain, p.region_radius
     needed = float(analysis.capture.needed_gain[held].max())
     rest = analysis.rest_at_speed
     distance = float('inf') if rest is None or not rest.slowest_rate > 0.0 else float(
         rest.distance[held].max())
     # The legs' oscillators are alike: only how many act on them makes a difference.
-    heard = np.array([sum(edge[0] == node for edge in network.system.graph.edges)
-                      for node in np.flatnonzero(held)])
-    different = np.flatnonzero(held)[np.unique(heard, return_index=True)[1]]
+    heard = np.bincount([node for node, _ in network.system.graph.edges], minlength=len(held))
+    different = np.flatnonzero(held)[np.unique(heard[held], return_index=True)[1]]
     anywhere = max(needed_gain_anywhere(network.system, span.omega[1], int(node), r0)
                    for node in different)
     exists = '' if np.isfinite(distance) else '; there is none, the other legs break free'
@@ -175,11 +171,6 @@ def _capture(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
         Inequality('capture_anywhere', anywhere, gain, '1/s', 'gain for any |x_j| <= r', 'k_inh',
                    PROVED, 'C cannot be left even while the other legs are out of place',
                    required=False)]
-
-
-def _chosen(inhibition: InhibitionParameters) -> NDArray[np.bool_]:
-    """Which oscillators are inhibited, whatever the gain."""
-    return np.array([leg in inhibition.inhibited_legs for leg in LEGS])
 
 
 def contact_margin(s: Setting, found: Synchronisation) -> float:
@@ -222,18 +213,3 @@ def contact_limits(s: Setting, found: Synchronisation, start: float
         'contact_feedback', share * margin, margin, 'rad/s', f'{share:.0%} of it',
         'margin for unequal leg frequencies', PROVED,
         'however the feet touch down, the legs stay in their places and near their cycle')
-
-
-def slowest_cadence(s: Setting) -> float:
-    """Slowest ω, where late feet may hold the phase back [rad/s]."""
-    p = s.network.parameters
-    return (1.0 - (p.contact_hold if p.contact_feedback else 0.0)) * s.span.omega[0]
-
-
-def later_stop(s: Setting) -> float:
-    """What feedback adds to the bound on the time to rest [s].
-
-    The tick in which a request is on its way may still be shifted, and the stop begins with a leg
-    that is as far behind its place as phase lock allows.
-    """
-    return s.tick_s + LOCKED_PHASE_ERROR / s.span.omega_armed[0]

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import isfinite
+from math import ceil, inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,11 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.contraction.capture import place_tolerance, radius_tolerance
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.running import CanonicalState, RunningGait
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
 from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
 from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import activities_step
 
@@ -199,20 +201,14 @@ class GaitSupervisor:
             Stamp of this tick [ns].
         network : GaitNetwork
             The oscillators that act, with their gait.
-        x, x_dot : ndarray (4, 2)
-            Canonical states and rates of this tick.
-        r : ndarray (3,)
-            Reference of this tick.
+        x, x_dot, r : ndarray (4, 2), (4, 2), (3,)
+            Canonical states, their rates and reference of this tick.
         command : tuple of float
             External command (v_x, v_y, γ) that acts at this tick.
         tally : Tally, optional
             Votes of this tick; those of the tick before without.
         body_mode : str
             What the body does; in every mode but ``standing`` the gait is stopped.
-
-        Returns
-        -------
-        SupervisorState
         """
         dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
         gait, rates = network.gait, scalar_phase_rates(x, x_dot)
@@ -307,3 +303,47 @@ class GaitSupervisor:
         if isfinite(state.measured_s):
             return state.measured_s
         return (state.time_ns - state.request_ns) * 1e-9
+
+
+def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
+            state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
+            command: tuple[float, float, float], dt: float, horizon: float = 10.0,
+            body_mode: str = 'standing') -> float:
+    """Time from now to rest (of a requested stop) or to phase lock (of a start) by running ahead
+    [s]; infinite when it does not happen within the horizon.
+
+    Oscillators and reference form a closed hierarchy, into which nothing of the body enters: the
+    same code that drives the legs predicts to the tick.
+
+    Parameters
+    ----------
+    supervisor, reference, canonical
+        The blocks as they run.
+    state : SupervisorState
+        Present state, the request included.
+    published : Inhibition
+        What was published before the request; it still acts at the next tick.
+    canon : CanonicalState
+        Present state of the oscillators, gait and cadence perhaps on their way to others.
+    r : ndarray (3,)
+        Present reference.
+    command : tuple of float
+        External command that is assumed to stay (v_x, v_y, γ).
+    dt, horizon : float
+        Tick, and longest time that is looked ahead [s].
+    body_mode : str
+        What the body does, assumed to stay.
+    """
+    tick_ns = round(dt * 1e9)
+    start_ns, inhibition = state.time_ns, published
+    for k in range(1, ceil(horizon / dt) + 1):
+        r_ext = np.zeros(3) if inhibition.requested else np.array(command)
+        r = reference.step(r, r_ext, dt)
+        canon = canonical.step(canon, r, inhibition, dt)
+        state = supervisor.step(
+            state, start_ns + k * tick_ns, canonical.network(canon.gait), canon.x, canon.x_dot,
+            r, command, body_mode=body_mode)
+        inhibition = supervisor.inhibition(state)
+        if state.word in ('at_rest', 'walking', 'free'):
+            return k * dt
+    return inf

@@ -9,11 +9,15 @@ with the gain k_inh α_i.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 
 SUM, WINNER_TAKE_ALL = 'sum', 'winner_take_all'
 """Rules by which votes become inhibition."""
+
+_weight = partial(parameter, minimum=0.0, maximum=10.0)
+_share = partial(parameter, minimum=0.0, maximum=1.0)
 
 
 @dataclass(frozen=True)
@@ -34,9 +38,9 @@ class VotingParameters(VotingSwitch):
     vote_majority: int = parameter(
         3, 'number of voting legs that stops the gait; one leg fewer does not',
         minimum=1, maximum=4)
-    vote_limit: float = parameter(
+    vote_limit: float = _weight(
         0.0, 'largest weight of one leg, as a fraction of inhibition_gain; 0: computed such that '
-        'vote_majority legs are needed', minimum=0.0, maximum=10.0)
+        'vote_majority legs are needed')
     vote_fade: float = parameter(
         1.0, 'time over which a vote that is not renewed fades to zero', unit='s',
         minimum=0.01, maximum=60.0)
@@ -54,36 +58,27 @@ class VotingParameters(VotingSwitch):
 class VoteSourceParameters(Parameters):
     """What makes the legs vote; a weight of zero silences a source."""
 
-    footing_weight: float = parameter(
-        1.0, 'weight of a leg that has lost its footing in stance', minimum=0.0, maximum=10.0)
-    footing_load: float = parameter(
-        0.02, 'load below which a standing foot has no footing, as a fraction of the weight',
-        minimum=0.0, maximum=1.0)
-    footing_share: float = parameter(
-        0.5, 'fraction of a stance without footing after which the leg votes',
-        minimum=0.0, maximum=1.0)
-    collision_weight: float = parameter(
-        1.0, 'weight of a leg that hits something in its swing', minimum=0.0, maximum=10.0)
-    collision_load: float = parameter(
-        0.3, 'load above which a swinging foot has hit something, as a fraction of the weight',
-        minimum=0.0, maximum=10.0)
+    footing_weight: float = _weight(1.0, 'weight of a leg that has lost its footing in stance')
+    footing_load: float = _share(
+        0.02, 'load below which a standing foot has no footing, as a fraction of the weight')
+    footing_share: float = _share(
+        0.5, 'fraction of a stance without footing after which the leg votes')
+    collision_weight: float = _weight(1.0, 'weight of a leg that hits something in its swing')
+    collision_load: float = _weight(
+        0.3, 'load above which a swinging foot has hit something, as a fraction of the weight')
     collision_time: float = parameter(
-        0.03, 'time of such a load after which the leg votes', unit='s',
-        minimum=0.0, maximum=10.0)
-    judged_share: float = parameter(
-        0.7, 'central fraction of stance and swing in which contact is evaluated',
-        minimum=0.0, maximum=1.0)
+        0.03, 'time of such a load after which the leg votes', unit='s', minimum=0.0, maximum=10.0)
+    judged_share: float = _share(
+        0.7, 'central fraction of stance and swing in which contact is evaluated')
     judged_after: float = parameter(
-        1.0, 'time of walking after which contact is evaluated', unit='s',
-        minimum=0.0, maximum=60.0)
-    tilt_weight: float = parameter(
-        1.0, 'weight with which every leg votes when the body tilts', minimum=0.0, maximum=10.0)
+        1.0, 'time of walking after which contact is evaluated', unit='s', minimum=0.0,
+        maximum=60.0)
+    tilt_weight: float = _weight(1.0, 'weight with which every leg votes when the body tilts')
     tilt_limit: float = parameter(
         0.6, "angle between the vertical and the body's z axis beyond which all legs vote",
         unit='rad', minimum=0.01, maximum=3.1)
-    silence_weight: float = parameter(
-        1.0, 'weight of a leg without contact sensor, and of every leg without imu',
-        minimum=0.0, maximum=10.0)
+    silence_weight: float = _weight(
+        1.0, 'weight of a leg without contact sensor, and of every leg without imu')
     silence_time: float = parameter(
         0.5, 'time without a valid value after which a sensor counts as dead', unit='s',
         minimum=0.02, maximum=60.0)
