@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import World
-from dmp_cpg_ros.robot.leg_reader import ModelIds, find_ids, foot_position, place_robot, subtree
 from dmp_cpg_ros.robot.model_loader import load_model
+from dmp_cpg_ros.robot.model_parts import ModelIds, find_ids, foot_position, place_robot, subtree
 from dmp_cpg_ros.robot.model_reader import read_description
 from dmp_cpg_ros.robot.mujoco_import import has_screen, mujoco
 from dmp_cpg_ros.robot.port import RobotError

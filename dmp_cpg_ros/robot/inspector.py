@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.robot import leg_reader
+from dmp_cpg_ros.robot import model_parts
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
@@ -71,7 +70,7 @@ def inspect_model(path: Path | str) -> Inspection:
     data.qpos[model.jnt_qposadr[model.body_jntadr[base]] + 3] = 1.0
     mujoco.mj_kinematics(model, data)
     chains = list(filter(None, (_chain(model, child) for child in _children(model, base))))
-    legs = [chain for chain in chains if _axes(model, data, chain) == leg_reader.LEG_AXES]
+    legs = [chain for chain in chains if _axes(model, data, chain) == model_parts.LEG_AXES]
     places = {('f' if data.xanchor[leg[1], 0] > 0.0 else 'r')
               + ('l' if data.xanchor[leg[1], 1] > 0.0 else 'r'): leg for leg in legs}
     if not len(legs) == len(places) == 4:
@@ -109,7 +108,7 @@ def _children(model: mujoco.MjModel, body: int) -> list[int]:
 def _chain(model: mujoco.MjModel, body: int) -> list[int]:
     """Joints of a body and what hangs on it, in order; cut where they branch."""
     below = list(filter(None, (_chain(model, child) for child in _children(model, body))))
-    return leg_reader.joints_of(model, body) + (below[0] if len(below) == 1 else [])
+    return model_parts.joints_of(model, body) + (below[0] if len(below) == 1 else [])
 
 
 def _axes(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> str:
@@ -124,26 +123,23 @@ def _axes(model: mujoco.MjModel, data: mujoco.MjData, chain: list[int]) -> str:
 
 
 def _foot_name(model: mujoco.MjModel, data: mujoco.MjData, leg: list[int]) -> str:
-    """Name by which :func:`~dmp_cpg_ros.robot.leg_reader.find_foot` finds the foot of a leg."""
+    """Name by which :func:`~dmp_cpg_ros.robot.model_parts.find_foot` finds the foot of a leg."""
     knee = data.xanchor[leg[2]]
-    below = leg_reader.subtree(model, model.jnt_bodyid[leg[2]])
-    touching, spheres = leg_reader.touching_geoms(model, below)
+    below = model_parts.subtree(model, model.jnt_bodyid[leg[2]])
+    touching, spheres = model_parts.touching_geoms(model, below)
 
     def far(place: NDArray[np.float64]) -> float:
         return float(np.linalg.norm(place - knee))
 
-    def farthest(candidates: Iterable[int], places: NDArray[np.float64]) -> list[int]:
-        return sorted(candidates, key=lambda i: -far(places[i]))
-
-    bodies = {int(model.geom_bodyid[g]) for g in spheres or touching}
+    bodies = sorted({int(model.geom_bodyid[g]) for g in spheres or touching})
     sites = [s for s in range(model.nsite) if model.site_bodyid[s] in below]
-    choices = [*(model.geom(g).name for g in farthest(spheres, data.geom_xpos)),
-               *(model.body(b).name for b in farthest(sorted(bodies), data.xpos)),
-               *(model.site(s).name for s in farthest(sites, data.site_xpos))]
+    choices = [named(i).name for ids, places, named in (
+        (spheres, data.geom_xpos, model.geom), (bodies, data.xpos, model.body),
+        (sites, data.site_xpos, model.site)) for i in sorted(ids, key=lambda i: -far(places[i]))]
     best = max((far(data.geom_xpos[g]) for g in spheres), default=0.0)
     for name in filter(None, choices):
-        foot = leg_reader.find_foot(model, name)
-        if foot.body in below and far(leg_reader.foot_position(data, foot)) > 0.5 * best + 0.02:
+        foot = model_parts.find_foot(model, name)
+        if foot.body in below and far(model_parts.foot_position(data, foot)) > 0.5 * best + 0.02:
             return str(name)
     raise ParameterError(
         f"no foot was found on the leg of joint '{model.joint(leg[2]).name}': below the knee "

@@ -15,9 +15,9 @@ from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.robot import leg_reader
-from dmp_cpg_ros.robot.leg_reader import ModelIds, foot_position
+from dmp_cpg_ros.robot import model_parts
 from dmp_cpg_ros.robot.model_loader import load_model
+from dmp_cpg_ros.robot.model_parts import ModelIds, foot_position
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file
 from dmp_cpg_ros.robot.start_pose import home_joint_position
@@ -54,7 +54,7 @@ def load_description(path: Path | str | None = None) -> RobotDescription:
 def pose(model: mujoco.MjModel, ids: ModelIds, joint_position: Vector) -> mujoco.MjData:
     """Return data with the base at the origin, the joints as given, and kinematics computed."""
     data = mujoco.MjData(model)
-    leg_reader.place_robot(model, data, ids, np.zeros(3), (1, 0, 0, 0), joint_position)
+    model_parts.place_robot(model, data, ids, np.zeros(3), (1, 0, 0, 0), joint_position)
     return data
 
 
@@ -73,7 +73,7 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
     ParameterError
         If a name is not in the model, or a leg is not abduction (x), hip (y), knee (y).
     """
-    ids = leg_reader.find_ids(model, file)
+    ids = model_parts.find_ids(model, file)
     at_zero, home = pose(model, ids, np.zeros(12)), None
     if (key := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, 'home')) >= 0:
         home = model.key_qpos[key, model.jnt_qposadr[ids.joints]]
@@ -100,7 +100,7 @@ def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, inde
               file: RobotFile, home: Vector | None) -> LegGeometry:
     name, foot = LEGS[index], ids.feet[index]
     joints = [int(joint) for joint in ids.joints[3 * index:3 * index + 3]]
-    sign = leg_reader.check_leg(model, at_zero, name, joints, foot, ids.base)
+    sign = model_parts.check_leg(model, at_zero, name, joints, foot, ids.base)
     abduction, hip, knee = at_zero.xanchor[joints]
     if tuple(np.sign(hip[:2])) != _PLACE_OF_LEG[name]:
         raise ParameterError(
@@ -115,7 +115,7 @@ def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, inde
         axis_sign=sign, knee_sign=_knee_sign(name, thigh, shank, sign[2] * angle),
         position_lower=lower, position_upper=upper,
         torque_limit=np.array(
-            file.torque_limit or [leg_reader.torque_limit(model, joint) for joint in joints]),
+            file.torque_limit or [model_parts.torque_limit(model, joint) for joint in joints]),
         velocity_limit=np.array(file.velocity_limit or (USUAL_VELOCITY_LIMIT,) * 3),
         rotor_inertia=model.dof_armature[model.jnt_dofadr[joints]].copy(), foot_radius=foot.radius)
 

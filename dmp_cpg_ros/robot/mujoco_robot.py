@@ -18,10 +18,8 @@ from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import World, height_over_ground
 from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue
-from dmp_cpg_ros.robot.contact_reader import ContactReader
-from dmp_cpg_ros.robot.joint_actuators import JointActuators, as_slice, standing_torque
+from dmp_cpg_ros.robot import model_parts
 from dmp_cpg_ros.robot.joint_drive import JointDrive
-from dmp_cpg_ros.robot.leg_reader import find_ids, place_robot
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_reader import read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
@@ -95,15 +93,15 @@ class MujocoRobot:
         self._steps = steps_per_tick(tick_ns, self._step_ns)
         # A silent restart of the simulation on bad numbers would look like a jump of the robot.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-        self._ids = ids = find_ids(model, file)
+        self._ids = ids = model_parts.find_ids(model, file)
         self.base = ids.base
-        self._qpos = as_slice(model.jnt_qposadr[ids.joints])
-        self._dof = as_slice(model.jnt_dofadr[ids.joints])
+        self._qpos = model_parts.as_slice(model.jnt_qposadr[ids.joints])
+        self._dof = model_parts.as_slice(model.jnt_dofadr[ids.joints])
         self._gravity = model.opt.gravity.copy()
-        self._actuators = JointActuators(model, ids.joints)
+        self._actuators = model_parts.JointActuators(model, ids.joints)
         self._drive = JointDrive(
             self.description, self._steps, self._step_s, model.dof_damping[self._dof])
-        self._contacts = ContactReader(model, ids)
+        self._contacts = model_parts.ContactReader(model, ids)
         self._hips_in_base = np.array([leg.hip_in_base for leg in self.description.legs])
         if not (np.isfinite(initial_spread) and initial_spread >= 0.0):
             raise ParameterError(f'initial_spread = {initial_spread!r} must be at least 0 rad')
@@ -135,7 +133,8 @@ class MujocoRobot:
         if self._sensors is not None:
             self._sensors.reset()
         held = start.joint_position
-        place_robot(model, data, self._ids, start.base_position, start.base_quaternion, held)
+        model_parts.place_robot(
+            model, data, self._ids, start.base_position, start.base_quaternion, held)
         mujoco.mj_forward(model, data)
         if start.settling_s:
             for _ in range(round(start.settling_s * 1e9 / self.tick_ns)):
@@ -144,7 +143,7 @@ class MujocoRobot:
             self._drive.reset()
             self._work = np.zeros(12)
         else:
-            holding = standing_torque(model, data, self._ids, self._dof)
+            holding = model_parts.standing_torque(model, data, self._ids, self._dof)
             self._effort = self._drive.limited(holding, np.zeros(12))
             self._peak_effort = np.abs(self._effort)
             self._actuators.apply(data, self._effort)

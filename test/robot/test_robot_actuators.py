@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.robot.joint_actuators import as_slice
+from dmp_cpg_ros.robot.model_parts import as_slice
 
 
 @pytest.mark.parametrize('places', [[6, 7, 8], [5], [6, 8, 7], [3, 5, 7], [8, 7, 6]])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
-from dmp_cpg_ros.robot.leg_reader import find_ids
 from dmp_cpg_ros.robot.model_loader import load_model
+from dmp_cpg_ros.robot.model_parts import find_ids
 from dmp_cpg_ros.robot.model_reader import load_description, pose
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import own_robot_file

@@ -12,7 +12,7 @@ from checkout import ROOT
 
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import JointTargets
-from dmp_cpg_ros.robot.leg_reader import foot_position
+from dmp_cpg_ros.robot.model_parts import foot_position
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.suite import load_suite

@@ -15,8 +15,8 @@ from checkout import ROOT
 from dmp_cpg_ros.core.errors import DataError, MissingFileError, ParameterError
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.robot.leg_reader import find_ids, foot_position
 from dmp_cpg_ros.robot.model_loader import load_model
+from dmp_cpg_ros.robot.model_parts import find_ids, foot_position
 from dmp_cpg_ros.robot.model_reader import load_description, pose, read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file

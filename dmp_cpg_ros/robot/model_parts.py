@@ -1,11 +1,12 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The base, joints, feet and actuators of a robot in its compiled model."""
+"""The base, joints, feet, actuators and contacts of a robot in its compiled model."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +22,13 @@ LEG_AXES = 'xyy'
 """Axes of abduction, hip and knee."""
 
 _AXIS_TOLERANCE = 0.02  # [rad] of an axis from x or y
+
+_FOOT, _SHANK, _BASE, _OUTSIDE, _OTHER = range(5)
+
+NEAR_FOOT = 1.5  # foot radii from the foot's centre within which the lower leg's shell is its foot
+
+Places = slice | NDArray[np.integer[Any]]
+"""Where some values are in an array."""
 
 
 @dataclass(frozen=True)
@@ -237,3 +245,114 @@ def torque_limit(model: mujoco.MjModel, joint: int) -> float:
             f"the model gives no torque limit for joint '{model.joint(joint).name}' (ctrlrange, "
             "forcerange or actuatorfrcrange); add 'torque_limit' to the robot file")
     return min(limits)
+
+
+def as_slice(places: NDArray[np.integer[Any]]) -> Places:
+    """Slice of consecutive places, which reads and writes at a fraction of the price of a list of
+    them; of others the list itself.
+    """
+    first = int(places[0])
+    consecutive = np.array_equal(places, np.arange(first, first + len(places)))
+    return slice(first, first + len(places)) if consecutive else places
+
+
+class JointActuators:
+    """Applies torques to twelve joints.
+
+    When every joint has a plain motor the motors get the torques. Otherwise all torques are
+    applied to the joints themselves, and the model's own actuators of these joints (position
+    servos, say) are switched off in ``model``.
+    """
+
+    def __init__(self, model: mujoco.MjModel, joints: NDArray[np.int64]) -> None:
+        found = (actuator_of(model, int(joint)) for joint in joints)
+        actuators = [actuator for actuator in found if actuator is not None]
+        ratios = np.array([motor_ratio(model, actuator) for actuator in actuators])
+        self._through_motors = len(actuators) == len(joints) and bool(ratios.all())
+        if self._through_motors:
+            self._index, self._per_torque = as_slice(np.array(actuators)), 1.0 / ratios
+            return
+        self._index = as_slice(model.jnt_dofadr[joints])
+        model.actuator_gainprm[actuators] = model.actuator_biasprm[actuators] = 0.0
+
+    def apply(self, data: mujoco.MjData, torque: NDArray[np.float64]) -> None:
+        """Set the torques (12,) [N m] of the coming physics step."""
+        if self._through_motors:
+            data.ctrl[self._index] = torque * self._per_torque
+        else:
+            data.qfrc_applied[self._index] = torque
+
+
+def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,
+                    dof: Places) -> NDArray[np.float64]:
+    """Return the torques of statics, τ = h(q) − Σ J_iᵀ f_i, with vertical foot forces f_i.
+
+    The forces carry the weight and have no moment about the centre of mass; of all such forces
+    those of least norm are taken.
+
+    Parameters
+    ----------
+    model, data
+        MuJoCo's, after mj_forward, at rest.
+    ids : ModelIds
+        Base and feet.
+    dof : ndarray (12,) or slice
+        Degrees of freedom of the joints.
+
+    Returns
+    -------
+    ndarray (12,)
+        [N m].
+    """
+    places = np.array([foot_position(data, foot) for foot in ids.feet])
+    arms = places - data.subtree_com[ids.base]
+    weight = -model.body_subtreemass[ids.base] * model.opt.gravity[2]
+    balance = np.array([np.ones(4), arms[:, 0], arms[:, 1]])
+    force = np.linalg.lstsq(balance, np.array([weight, 0.0, 0.0]), rcond=None)[0]
+    torque: NDArray[np.float64] = data.qfrc_bias.copy()
+    J = np.zeros((3, model.nv))
+    for foot, place, f in zip(ids.feet, places, force, strict=True):
+        mujoco.mj_jac(model, data, J, None, place, foot.body)
+        torque -= J[2] * f
+    return torque[dof]
+
+
+class ContactReader:
+    """Reads contacts between the robot and its surroundings from MuJoCo's data."""
+
+    def __init__(self, model: mujoco.MjModel, ids: ModelIds) -> None:
+        self._model, self._feet, self._wrench = model, ids.feet, np.zeros(6)
+        kind, leg = np.full(model.ngeom, _OTHER), np.zeros(model.ngeom, dtype=int)
+        kind[model.body_rootid[model.geom_bodyid] != model.body_rootid[ids.base]] = _OUTSIDE
+        kind[model.geom_bodyid == ids.base] = _BASE
+        shanks = model.jnt_bodyid[ids.joints[2::3]]
+        for i, (foot, shank) in enumerate(zip(ids.feet, shanks, strict=True)):
+            lower_leg = np.isin(model.geom_bodyid, (shank, foot.body))
+            kind[lower_leg], leg[lower_leg] = _SHANK, i
+            kind[list(foot.geoms)] = _FOOT
+        self._kind, self._leg = kind.tolist(), leg.tolist()
+
+    def foot_force(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Return the normal force of each foot (4,), summed over its contacts [N].
+
+        Some models wrap the lower leg in a mesh that reaches around the foot; what touches so near
+        the foot's centre counts as the foot.
+        """
+        force = [0.0, 0.0, 0.0, 0.0]
+        for i, (geom, other) in enumerate(data.contact.geom.tolist()):
+            if self._kind[geom] == _OUTSIDE:
+                geom, other = other, geom
+            if self._kind[other] != _OUTSIDE or self._kind[geom] not in (_FOOT, _SHANK):
+                continue
+            leg = self._leg[geom]
+            if self._kind[geom] == _FOOT or np.linalg.norm(
+                    data.contact.pos[i] - foot_position(data, self._feet[leg])
+                    ) < NEAR_FOOT * self._feet[leg].radius:
+                mujoco.mj_contactForce(self._model, data, i, self._wrench)
+                force[leg] += float(self._wrench[0])
+        return np.array(force)
+
+    def base_touches(self, data: mujoco.MjData) -> bool:
+        """Return whether the base body touches the surroundings."""
+        return any({self._kind[first], self._kind[second]} == {_BASE, _OUTSIDE}
+                   for first, second in data.contact.geom.tolist())
