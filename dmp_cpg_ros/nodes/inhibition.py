@@ -112,7 +112,7 @@ class InhibitionNode(SuiteNode):
         self._body_mode = values['posture_feedback'] or self._body_mode
         self._votes = self._voting.step(
             self._votes, stamp_ns, network, _vote_sensors(stamp_ns, values), self._x, self._r,
-            before.word in ('walking', 'free'), self._inbox.take())
+            before.state in ('walking', 'free'), self._inbox.take())
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
             self._votes.tally, self._body_mode)
@@ -132,7 +132,7 @@ class InhibitionNode(SuiteNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop."""
-        return {'inhibition': self._state.word, 'requested': self._state.requested,
+        return {'inhibition': self._state.state, 'requested': self._state.requested,
                 'command': self._gate.at(self._state.time_ns)}
 
     # The service -------------------------------------------------------------------------------
@@ -154,7 +154,7 @@ class InhibitionNode(SuiteNode):
         if stop != self._state.requested:
             return False, f'held by votes: {self._state.tally.cause}; ask again without them'
         if already:
-            return True, f'already {self._state.word}'
+            return True, f'already {self._state.state}'
         self._predict()
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
         most = f'at most {self._bound:.3f} s' if isfinite(self._bound) else (
@@ -195,7 +195,7 @@ class InhibitionNode(SuiteNode):
     def _news(self) -> tuple[Any, ...]:
         """What is told when it changes."""
         now = self._state
-        return (now.word, now.requested, now.armed, now.automatic, now.request_ns, now.voted,
+        return (now.state, now.requested, now.armed, now.automatic, now.request_ns, now.voted,
                 now.tally.causes, now.tally.weights.tobytes())
 
     def _publish_gains(self) -> None:
@@ -210,7 +210,7 @@ class InhibitionNode(SuiteNode):
         if self._voting.voting.voting:
             told |= {**_by_leg('vote', state.tally.weights), 'voted': state.voted,
                      'asked': state.asked, 'cause': state.tally.cause}
-        self._publisher.publish(conversions.inhibition_state(state.time_ns, state.word, told))
+        self._publisher.publish(conversions.inhibition_state(state.time_ns, state.state, told))
 
 
 def _by_leg(what: str, numbers: Array) -> dict[str, float]:

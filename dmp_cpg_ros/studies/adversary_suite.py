@@ -98,7 +98,7 @@ class Oscillators(WalkingLoop):
         self.canon = canon = self.canonical.step(self.canon, self.r, inhibition, dt)
         self.votes = self.voting.step(
             self.votes, self.now_ns, self.network, self._sensors, canon.x, self.r,
-            self.stop.word in ('walking', 'free'), self.inbox.take())
+            self.stop.state in ('walking', 'free'), self.inbox.take())
         self.stop = self.supervisor.step(
             self.stop, self.now_ns, self.network, canon.x, canon.x_dot, self.r, command,
             self.votes.tally)
@@ -170,7 +170,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
             loop.advance()
             moved = (phase(loop.x) - before + np.pi) % (2.0 * np.pi) - np.pi
             turned = turned + moved if resting and loop.stop.requested else np.zeros(4)
-            resting = loop.stop.requested and (resting or loop.stop.word == 'at_rest')
+            resting = loop.stop.requested and (resting or loop.stop.state == 'at_rest')
             if not np.all(np.isfinite(loop.x)):
                 return 'the oscillators diverge', closest
             if held and loop.inhibition.requested and not loop.held:
@@ -178,11 +178,11 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
             if np.abs(turned).max() > STRIDE:
                 return 'a leg takes a stride while the stop is in force', closest
             if expected is None:
-                if kind == 'end' and loop.stop.word == 'at_rest':
+                if kind == 'end' and loop.stop.state == 'at_rest':
                     break
                 continue
             since = (loop.now_ns - expected[0]) * 1e-9
-            if loop.stop.word == 'at_rest':
+            if loop.stop.state == 'at_rest':
                 closest = max(closest, since / expected[1])
                 if since > expected[1] + 1e-9:
                     return f'at rest after {since:.3f} s, at most {expected[1]:.3f}', closest
@@ -197,7 +197,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
         counts[kind] += kind != 'end'
         if kind != 'end':
             expected = _do(loop, kind, value, expected, counts)
-    return ('' if loop.stop.word == 'at_rest' else 'the last stop does not end'), closest
+    return ('' if loop.stop.state == 'at_rest' else 'the last stop does not end'), closest
 
 
 def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, float] | None,

@@ -56,7 +56,7 @@ def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> Re
         robot, targets=JointSeries(time, *targets),
         canonical=CanonicalSeries(time, x, x_dot, tuple(shares_of(tick.gait) for tick in ticks)),
         reference=VelocitySeries(time, r),
-        inhibition=_changes(time, [(tick.supervisor.word, {}) for tick in ticks]),
+        inhibition=_changes(time, [(tick.supervisor.state, {}) for tick in ticks]),
         modes=_changes(time, [(tick.mode.mode, {'reason': tick.mode.reason}) for tick in ticks]))
 
 

@@ -149,7 +149,7 @@ class _Trial(LoopRun[FreezingLoop]):
                 held >= max(SHORTEST_HOLD, measured + HOLD_AT_REST)):
             self.walk(self.tick_s)
             held += self.tick_s
-            if self.loop.stop.word == 'at_rest':
+            if self.loop.stop.state == 'at_rest':
                 measured = self.loop.stop.measured_s
         # a robot that fell on the way says nothing of the oscillators' time to rest
         unknown = self.fell() and measured == np.inf

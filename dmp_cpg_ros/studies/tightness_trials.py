@@ -141,7 +141,7 @@ def stop_times(graph: str, phases: int = 12) -> tuple[float, float]:
     supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
     fastest = np.array([p.reference.max_speed, p.reference.max_lateral_speed,
                         p.reference.max_turn_rate])
-    walking = replace(supervisor.initial_state(), word='walking', requested=False, armed=False,
+    walking = replace(supervisor.initial_state(), state='walking', requested=False, armed=False,
                       automatic=False, activity=np.ones(SIZE))
     published = supervisor.inhibition(walking)
     start = canonical.initial_state(gait, replace(p.inhibition, start_inhibited=False))

@@ -82,7 +82,7 @@ def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
             assert re.search(pattern, refusal), refusal
 
     recording, ticks = load_recording(tmp_path / 'run' / 'bag'), plain_ticks(plain)
-    assert ticks[-1].supervisor.word == 'at_rest'
+    assert ticks[-1].supervisor.state == 'at_rest'
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
     np.testing.assert_array_equal(recording.canonical.x_dot, [tick.x_dot for tick in ticks])
     for name in ('position', 'velocity', 'effort'):

@@ -76,7 +76,7 @@ def test_asked_to_lie_down_while_walking_it_stops_first_and_comes_down_gently() 
     life = Life()
     life.loop.command(0.4)
     life.go(2.0)
-    assert life.loop.stop.word == 'walking'
+    assert life.loop.stop.state == 'walking'
     life.loop.request_mode('lie_down')
     life.go(4.5)
     assert life.modes == ['standing', 'stopping', 'lowering', 'lying']
@@ -114,9 +114,9 @@ def test_pushed_over_it_is_damped_until_it_is_told_to_recover() -> None:
     life.loop.command(0.4)
     life.go(25.0, until='standing').go(0.5)
     assert life.modes == ['standing', 'damped', 'recovering', 'rising', 'standing'] and life.stands
-    assert life.loop.stop.word == 'at_rest'  # the command that stood while it fell starts nothing
+    assert life.loop.stop.state == 'at_rest'  # the command that stood while it fell starts nothing
     life.loop.request(False)
-    assert life.go(0.5).loop.stop.word == 'walking'
+    assert life.go(0.5).loop.stop.state == 'walking'
 
 
 @pytest.mark.parametrize('seed', range(4))

@@ -59,7 +59,7 @@ def test_a_learned_motion_walks_at_every_speed_stops_as_predicted_and_walks_on(
     walk = Walk({**values, **motion_overrides(str(motion_file))})
     assert speeds_of(walk) == pytest.approx(speeds_of(Walk(values)), rel=0.05)
     predicted, asked_ns = walk.loop.request(True), walk.loop.stop.time_ns
-    while walk.loop.stop.word != 'at_rest':
+    while walk.loop.stop.state != 'at_rest':
         walk.go(0.004)
         assert walk.loop.stop.time_ns - asked_ns < 5e9
     assert (walk.loop.stop.time_ns - asked_ns) * 1e-9 == pytest.approx(predicted, abs=1e-9)

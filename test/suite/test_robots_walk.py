@@ -59,7 +59,7 @@ def test_it_walks_takes_a_push_stops_and_walks_on(robot):
     walk.go(0.8)
     walk.loop.request(True)
     walk.go(2.4)
-    assert walk.loop.stop.word == 'at_rest'
+    assert walk.loop.stop.state == 'at_rest'
     assert np.abs(walk.state.base_velocity_in_base).max() < 0.01
     assert (walk.state.foot_force > 0.05 * robot.description.mass * 9.81).all()
     walk.loop.request(False)

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Stopping and starting the gait: requests in, the next tick's inhibition and its state word out.
+"""Stopping and starting the gait: requests in, the next tick's inhibition and its state out.
 
 - ``free``, ``walking``: uninhibited, or slowed by votes that do not stop it; walking once the legs
   are in their places and the reference moves.
@@ -35,7 +35,7 @@ from dmp_cpg_ros.core.transformation.foot_path import activities_step
 
 Array = NDArray[np.float64]
 
-STATE_WORDS = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing')
+STATES = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing')
 """What ``inhibition_state`` can say."""
 
 FALLEN_MODES = ('damped', 'recovering')
@@ -96,8 +96,8 @@ class SupervisorState:
     ----------
     time_ns : int
         Stamp of the tick [ns].
-    word : str
-        One of ``STATE_WORDS``.
+    state : str
+        One of ``STATES``.
     requested : bool
         Whether a stop is requested: asked for, or voted.
     automatic : bool
@@ -124,7 +124,7 @@ class SupervisorState:
     """
 
     time_ns: int
-    word: str
+    state: str
     requested: bool
     automatic: bool
     request_ns: int
@@ -170,7 +170,7 @@ class GaitSupervisor:
         each leg of what was asked for and what was voted, once the reference is slow.
         """
         return Inhibition(state.requested, self._gains(state, state.armed),
-                          self.parameters.region_radius, state.word == 'at_rest')
+                          self.parameters.region_radius, state.state == 'at_rest')
 
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
         if not state.requested:
@@ -259,7 +259,7 @@ class GaitSupervisor:
         stop = state.asked or state.voted
         if stop == state.requested:
             return state
-        return updated(state, word='waiting' if stop else 'releasing', requested=stop,
+        return updated(state, state='waiting' if stop else 'releasing', requested=stop,
                        request_ns=state.time_ns, armed=False, measured_s=float('nan'), idle_ns=-1)
 
     def _barred(self, state: SupervisorState, body_mode: str) -> SupervisorState:
@@ -277,25 +277,25 @@ class GaitSupervisor:
         armed = (state.armed and inside) or (
             speed <= self.parameters.capture_speed and self.in_places(network, x))
         if not (armed and inside):
-            return updated(state, armed=armed, word='waiting')
+            return updated(state, armed=armed, state='waiting')
         if (max(map(abs, rates)) > REST_PHASE_RATE or speed > REST_SPEED
                 or max(state.activity.tolist()) > REST_ACTIVITY):
-            return updated(state, armed=armed, word='captured')
-        return updated(state, armed=armed, word='at_rest', measured_s=self._measured(state))
+            return updated(state, armed=armed, state='captured')
+        return updated(state, armed=armed, state='at_rest', measured_s=self._measured(state))
 
     def in_places(self, network: GaitNetwork, x: Array) -> bool:
         """Whether legs and radii are as close to their places as capture takes for granted."""
         return in_places(network, x, self.parameters.region_radius)
 
     def _running(self, state: SupervisorState, errors: Array, speed: float) -> SupervisorState:
-        locked = max(map(abs, errors.tolist())) <= LOCKED_PHASE_ERROR
+        in_step = max(map(abs, errors.tolist())) <= LOCKED_PHASE_ERROR
         swinging = min(state.activity.tolist())
-        if state.word == 'releasing' and not (locked and swinging >= LOCKED_ACTIVITY):
+        if state.state == 'releasing' and not (in_step and swinging >= LOCKED_ACTIVITY):
             return state
-        word, measured_s = 'walking' if locked and speed > REST_SPEED else 'free', state.measured_s
-        if word == state.word and isfinite(measured_s):
+        now, measured_s = 'walking' if in_step and speed > REST_SPEED else 'free', state.measured_s
+        if now == state.state and isfinite(measured_s):
             return state
-        return updated(state, word=word, measured_s=self._measured(state))
+        return updated(state, state=now, measured_s=self._measured(state))
 
     @staticmethod
     def _measured(state: SupervisorState) -> float:
@@ -344,6 +344,6 @@ def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: R
             state, start_ns + k * tick_ns, canonical.network(canon.gait), canon.x, canon.x_dot,
             r, command, body_mode=body_mode)
         inhibition = supervisor.inhibition(state)
-        if state.word in ('at_rest', 'walking', 'free'):
+        if state.state in ('at_rest', 'walking', 'free'):
             return k * dt
     return inf

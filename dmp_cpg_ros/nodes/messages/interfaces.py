@@ -163,7 +163,7 @@ TOPICS: tuple[Interface, ...] = (
               (POSTURE,), (), sometimes=(POSTURE,)),
     Interface('/clock', Clock, 'the clock of the robot', (ROBOT,), ()),
     Interface('inhibition_state', DiagnosticArray,
-              'stop and start for people: state word, gains, times, when they change',
+              'stop and start for people: state, gains, times, when they change',
               (INHIBITION,), ('user',), latched=True),
     Interface('inhibition_gains', JointState,
               'position = gain of each leg [1/s], region_radius, requested, at_rest',

@@ -30,7 +30,7 @@ class Gait:
                  stop: SupervisorState | None = None) -> None:
         self.network, self.reference = gait, ReferenceSystem(reference)
         self.supervisor = GaitSupervisor(inhibition, VotingParameters(), LEG.activity_rate)
-        self.stop = stop or replace(self.supervisor.initial_state(), word='walking',
+        self.stop = stop or replace(self.supervisor.initial_state(), state='walking',
                                     requested=False, armed=False, activity=np.ones(4))
         self.published, self.x, self.r = self.supervisor.inhibition(self.stop), x, r
         self.command = tuple(r.tolist())
@@ -52,7 +52,7 @@ class Gait:
         """Time from a request to a state word [s]."""
         self.stop = self.supervisor.request(self.stop, request)
         begin = self.tick_count
-        while self.stop.word != word and (self.tick_count - begin) * TICK < limit:
+        while self.stop.state != word and (self.tick_count - begin) * TICK < limit:
             self.tick()
         return (self.tick_count - begin) * TICK
 

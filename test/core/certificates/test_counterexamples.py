@@ -61,7 +61,7 @@ class Walk:
         """Stop: bound, prediction and what it took [s]; C is not left once it is entered."""
         bound, predicted = self.loop.time_to_rest(), self.loop.request(True)
         ticks = 0
-        while self.loop.stop.word != 'at_rest':
+        while self.loop.stop.state != 'at_rest':
             self.tick()
             ticks += 1
             assert ticks * TICK < bound + TICK, 'beyond the bound'
@@ -134,7 +134,7 @@ def test_no_leg_takes_a_stride_when_the_inhibited_leg_changes_at_rest(gain: floa
     walk.turned[:] = 0.0
     told = walk.loop.change({'inhibited_legs': (leg,)})
     walk.run(3.0)
-    assert walk.loop.stop.word == 'at_rest'
+    assert walk.loop.stop.state == 'at_rest'
     assert np.abs(walk.turned).max() < np.radians(50.0)      # atan(omega/k), not a turn
     assert not told or f'{leg} rests' in told
     if gain == 100.0:
@@ -151,17 +151,17 @@ def test_no_leg_takes_a_stride_when_the_coupling_changes_at_rest(gain: float) ->
     walk.turned[:] = 0.0
     walk.loop.change({'coupling_gain': gain})
     walk.run(3.0)
-    assert walk.loop.stop.word == 'at_rest' and np.abs(walk.turned).max() < np.radians(50.0)
+    assert walk.loop.stop.state == 'at_rest' and np.abs(walk.turned).max() < np.radians(50.0)
 
 
 def test_what_captures_cannot_change_while_it_captures() -> None:
     walk = Walk()
     walk.walk(0.3, 2.0)
     walk.loop.request(True)
-    while walk.loop.stop.word != 'captured':
+    while walk.loop.stop.state != 'captured':
         walk.tick()
     assert 'being captured' in walk.loop.change({'inhibition_gain': 500.0})
-    while walk.loop.stop.word != 'at_rest':
+    while walk.loop.stop.state != 'at_rest':
         walk.tick()
     assert accepted(walk, inhibition_gain=500.0)
 

@@ -202,7 +202,7 @@ def test_stop_and_start_keep_bound_and_prediction_under_random_contacts(
             state = robot.step(tick.targets)
             speed = np.hypot(*(tick.x_dot.T)) / np.hypot(*(tick.x.T))
             offset = max(offset, float(np.abs(speed - loop.network.omega(tick.r)).max()))
-            if tick.supervisor.word in until:
+            if tick.supervisor.state in until:
                 return
 
     walk(0.1)
@@ -215,11 +215,11 @@ def test_stop_and_start_keep_bound_and_prediction_under_random_contacts(
     assert offset > 0.5                                     # feedback was felt
     predicted = loop.request(True)
     walk(3.0, until=('at_rest',))
-    assert loop.stop.word == 'at_rest'
+    assert loop.stop.state == 'at_rest'
     assert loop.stop.measured_s <= certificate.time_to_rest
     assert loop.stop.measured_s == pytest.approx(predicted, abs=2.5 * TICK)
     walk(0.5)
-    assert loop.stop.word == 'at_rest'
+    assert loop.stop.state == 'at_rest'
 
 
 def test_legs_keep_their_places_while_a_gait_changes_under_random_contacts() -> None:

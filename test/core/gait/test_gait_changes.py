@@ -51,9 +51,9 @@ class Walker:
         """Time until a state of the stop [s]."""
         for k in range(round(most / TICK)):
             self.walk(TICK)
-            if self.loop.stop.word == word:
+            if self.loop.stop.state == word:
                 return (k + 1) * TICK
-        raise AssertionError(f'{self.loop.stop.word} and not {word}')
+        raise AssertionError(f'{self.loop.stop.state} and not {word}')
 
     def gaits(self) -> list[str]:
         names = [tick.gait.name for tick in self.ticks]
@@ -86,7 +86,7 @@ def test_a_stop_within_a_transition_is_predicted_bounded_and_comes_to_rest(
     assert max(feet) - ground < 0.01 * ROBOT.stance_height
     walker.walk(0.5)
     assert walker.ticks[-1].gait.name == after == loop.network.gait.name
-    assert loop.stop.word == 'at_rest'
+    assert loop.stop.state == 'at_rest'
     loop.request(False)
     walker.until('walking')
     assert np.abs(loop.network.phase_errors(loop.x)).max() < 0.05
@@ -99,7 +99,7 @@ def test_at_rest_a_gait_changes_at_once_and_moves_no_foot(after: str) -> None:
     walker.loop.change_gait(after)
     ticks = walker.walk(1.0)
     assert [tick.gait.name for tick in ticks] == [after] * len(ticks)
-    assert {tick.supervisor.word for tick in ticks} == {'at_rest'}
+    assert {tick.supervisor.state for tick in ticks} == {'at_rest'}
     assert np.abs(walker.loop.network.rate(walker.loop.x, walker.loop.r,
                                            walker.loop.inhibition)).max() < 1e-9
     for tick in ticks:

@@ -29,7 +29,7 @@ from dmp_cpg_ros.core.canonical.inhibition import (
 )
 from dmp_cpg_ros.core.canonical.phase import phase, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.inhibition.supervisor import STATE_WORDS
+from dmp_cpg_ros.core.inhibition.supervisor import STATES
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
@@ -72,12 +72,12 @@ class Run:
         """Time until the state is one of the words [s]."""
         for k in range(1, round(longest / TICK) + 1):
             self.go(TICK)
-            if self.loop.stop.word in words:
+            if self.loop.stop.state in words:
                 return k * TICK
-        raise AssertionError(f'{self.loop.stop.word} for {longest} s')
+        raise AssertionError(f'{self.loop.stop.state} for {longest} s')
 
     def words(self) -> list[str]:
-        return [word for word, _ in groupby(tick.supervisor.word for tick in self.ticks)]
+        return [word for word, _ in groupby(tick.supervisor.state for tick in self.ticks)]
 
 
 def walking(gait: str = 'amble', speed: float = 0.5, seconds: float = 3.0,
@@ -98,7 +98,7 @@ def test_a_whole_stop_and_start_says_its_words_in_order() -> None:
     run.ticks.clear()
     run.go(2.0)
     assert run.words() == ['releasing', 'walking']
-    assert set(run.words()) <= set(STATE_WORDS)
+    assert set(run.words()) <= set(STATES)
 
 
 def test_rest_is_rest() -> None:
@@ -110,7 +110,7 @@ def test_rest_is_rest() -> None:
     assert run.loop.network.scale.foot_speed(*tick.r) <= 0.01
     measured = run.loop.stop.measured_s
     run.go(1.0)
-    assert run.loop.stop.word == 'at_rest' and run.loop.stop.measured_s == measured
+    assert run.loop.stop.state == 'at_rest' and run.loop.stop.measured_s == measured
 
 
 def test_while_stopping_the_reference_is_zero_and_after_it_is_the_command() -> None:
@@ -177,7 +177,7 @@ def test_silence_of_the_command_leads_to_the_same_stop() -> None:
 def test_without_auto_inhibit_a_zero_command_trots_on_the_spot() -> None:
     run = Run('trot', inhibition=InhibitionParameters(auto_inhibit=False, start_inhibited=False))
     run.go(4.0)
-    assert not run.loop.stop.requested and run.loop.stop.word == 'free'
+    assert not run.loop.stop.requested and run.loop.stop.state == 'free'
     assert np.abs(run.ticks[-1].x_dot).max() > 1.0
 
 
@@ -187,7 +187,7 @@ def test_a_stop_by_service_is_not_undone_by_commands() -> None:
     run.until('at_rest')
     run.loop.command(0.8)
     run.go(2.0)
-    assert run.loop.stop.word == 'at_rest'
+    assert run.loop.stop.state == 'at_rest'
 
 
 def test_a_service_call_makes_an_automatic_stop_its_own() -> None:
@@ -197,7 +197,7 @@ def test_a_service_call_makes_an_automatic_stop_its_own() -> None:
     run.loop.request(True)
     run.loop.command(0.5)
     run.go(3.0)
-    assert run.loop.stop.word == 'at_rest'
+    assert run.loop.stop.state == 'at_rest'
 
 
 @pytest.mark.parametrize('leg', LEGS)

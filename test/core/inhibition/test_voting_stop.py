@@ -93,16 +93,16 @@ def test_gains_are_held_back_until_the_reference_is_slow() -> None:
 def test_what_holds_the_gait_does_not_fade_and_the_service_releases_it() -> None:
     run = walking(**voters())
     vote(run, LEGS[:3], 2.5)
-    assert run.loop.stop.word == 'at_rest'
+    assert run.loop.stop.state == 'at_rest'
     held = run.loop.inhibition.gains
     run.loop.request(False)
     assert run.loop.stop.requested and run.loop.stop.voted
     run.go(1.5)
     assert not run.loop.stop.tally.alive
-    assert run.loop.stop.word == 'at_rest' and np.array_equal(run.loop.inhibition.gains, held)
+    assert run.loop.stop.state == 'at_rest' and np.array_equal(run.loop.inhibition.gains, held)
     run.loop.command(0.8)
     run.go(1.0)
-    assert run.loop.stop.word == 'at_rest'
+    assert run.loop.stop.state == 'at_rest'
     run.loop.request(False)
     assert not run.loop.stop.requested
     run.until('walking')
@@ -111,7 +111,7 @@ def test_what_holds_the_gait_does_not_fade_and_the_service_releases_it() -> None
 def test_a_stop_by_votes_can_end_by_itself() -> None:
     run = walking(**voters(vote_resume=True))
     vote(run, LEGS, 2.5)
-    assert run.loop.stop.word == 'at_rest'
+    assert run.loop.stop.state == 'at_rest'
     run.until('walking', longest=3.0)
 
 
@@ -120,7 +120,7 @@ def test_a_stop_that_was_also_asked_for_outlasts_the_votes() -> None:
     vote(run, LEGS, 0.3)
     run.loop.request(True)
     run.go(3.0)
-    assert run.loop.stop.word == 'at_rest' and not run.loop.stop.voted
+    assert run.loop.stop.state == 'at_rest' and not run.loop.stop.voted
     assert np.array_equal(run.loop.inhibition.gains, run.loop.parameters.inhibition.armed_gains)
 
 
@@ -153,7 +153,7 @@ def test_where_the_winner_takes_all_the_largest_vote_is_inhibited_alone(leg: str
     run = walking(**voters(vote_rule='winner_take_all'))
     run.loop.vote({**dict.fromkeys(LEGS, 0.05), leg: 1.0})
     run.go(2.5)
-    assert run.loop.stop.word == 'at_rest'
+    assert run.loop.stop.state == 'at_rest'
     assert [gain > 0.0 for gain in run.loop.inhibition.gains] == [name == leg for name in LEGS]
 
 
@@ -169,7 +169,7 @@ def test_legs_that_step_into_the_void_stop_the_gait_and_one_leg_does_not() -> No
     assert not run.loop.stop.requested
     assert 'fr footing' in {tick.supervisor.tally.cause for tick in run.ticks}
     run = after(LEGS, 4.0)
-    assert run.loop.stop.word == 'at_rest' and run.loop.stop.voted
+    assert run.loop.stop.state == 'at_rest' and run.loop.stop.voted
 
 
 def test_without_voting_nobody_is_heard() -> None:
