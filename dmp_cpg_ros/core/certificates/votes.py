@@ -119,10 +119,9 @@ def vote_inequalities(s: Setting) -> list[Inequality]:
     if not voting.voting:
         return []
     clamp, count = vote_clamp(s.network, p, voting, s.span), voting.majority
-    gains = np.zeros((len(sets := different_voters(system, count)), system.graph.size))
-    for row, voters in zip(gains, sets, strict=True):
-        row[list(voters)] = max(clamp.gain, 1e-9)
-    needed, found, bounds = zip(*(_under(s, row) for row in gains), strict=True)
+    legs, acting = np.arange(system.graph.size), max(clamp.gain, 1e-9)
+    needed, found, bounds = zip(*(_under(s, np.where(np.isin(legs, voters), acting, 0.0))
+                                  for voters in different_voters(system, count)), strict=True)
     worst = min(found, key=lambda contraction: contraction.rate)
     who = 'any leg alone' if count == 1 else f'any {count} legs'
     where, left_is = ('from every state', 'rho r^2') if worst.reach == inhibited.GLOBAL else (
