@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``film``: a recorded run as a film, drawn after the run."""
+"""``film``: a recorded run as a GIF (always) or an MP4 (with imageio-ffmpeg), drawn after it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 
 import matplotlib
@@ -19,16 +21,13 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import held, smoothed, velocity_in_heading
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.commands.analyze import read_json
-from dmp_cpg_ros.commands.film_files import Frame, checked_film_path, write_film
-from dmp_cpg_ros.commands.run_knowledge import run_context
-from dmp_cpg_ros.core.errors import DataError, DmpCpgError
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.run_folder import read_json, run_context
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
 
 Array = NDArray[np.float64]
-
-BAD_INPUT = 2
-"""Exit status for a bad recording or file, or where nothing can be drawn."""
+Frame = NDArray[np.uint8]
 
 LOOK_WINDOW, SPEED_WINDOW = 1.2, 0.8
 """The camera follows the path, and the speed is shown, averaged over this [s]."""
@@ -36,8 +35,13 @@ LOOK_WINDOW, SPEED_WINDOW = 1.2, 0.8
 INK, OUTLINE = (255, 255, 255), (30, 40, 55)
 """Colours of the words."""
 
-PALETTE_FRAMES = 6
-"""Frames from which a GIF takes its colours."""
+PALETTE_FRAMES, COLOURS = 6, 128
+"""Frames from which a GIF takes its colours, and their number; one palette for all frames keeps
+what stands still from flickering.
+"""
+
+ENCODER, MP4_QUALITY = 'imageio_ffmpeg', 7
+"""The module that encodes MP4, and the quality, from 0 to 10."""
 
 
 @dataclass(frozen=True)
@@ -101,13 +105,8 @@ def film(recording: Recording, context: RunContext, robot_file: Path | None, pat
     with Camera(robot_file, shot.width, shot.height, context.world, plain=True) as camera:
         draw = _Painter(recording, camera, shot)
         sample = [draw(t) for t in np.linspace(first, last, min(PALETTE_FRAMES, len(times)))]
-        write_film(path, _painted(draw, times), sample, shot.fps)
+        write_film(path, map(draw, times), sample, shot.fps)
     return len(times)
-
-
-def _painted(draw: _Painter, times: Array) -> Iterator[Frame]:
-    for time in times:
-        yield draw(float(time))
 
 
 class _Painter:
@@ -158,19 +157,91 @@ def film_run(run: Path, path: Path, shot: Shot | None = None) -> int:
     return film(load_recording(run), context, robot_file, path, shot)
 
 
+def has_encoder() -> bool:
+    """Whether MP4 can be written."""
+    return find_spec(ENCODER) is not None
+
+
+def checked_film_path(path: Path) -> Path:
+    """Return a film's path, or say why it cannot be written.
+
+    Raises
+    ------
+    ParameterError
+        If its ending is neither ``.gif`` nor ``.mp4``, or nothing here encodes MP4.
+    """
+    if path.suffix.lower() not in ('.gif', '.mp4'):
+        raise ParameterError(f"a film must end in .gif or .mp4, not '{path.name}'")
+    if path.suffix.lower() == '.mp4' and not has_encoder():
+        raise ParameterError(
+            f"'{path.name}' needs an encoder: pip install imageio-ffmpeg; a .gif needs none")
+    return path
+
+
+def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame],
+               fps: float) -> None:
+    """Write frames as they come.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.gif`` or ``.mp4``.
+    frames : iterator of ndarray (height, width, 3) of uint8
+        At least one, all of one size.
+    palette_from : list of ndarray
+        Frames that have the colours of the film, for a GIF.
+    fps : float
+        Frames per second.
+
+    Raises
+    ------
+    ParameterError
+        See :func:`checked_film_path`.
+    """
+    checked_film_path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix.lower() == '.gif':
+        _write_gif(path, frames, palette_from, fps)
+    else:
+        _write_mp4(path, frames, fps)
+
+
+def _write_gif(path: Path, frames: Iterator[Frame], palette_from: list[Frame],
+               fps: float) -> None:
+    sample = Image.fromarray(np.concatenate(palette_from))
+    palette = sample.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
+
+    def reduced(frame: Frame) -> Image.Image:
+        return Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+
+    first = reduced(next(frames))
+    first.save(path, save_all=True, append_images=map(reduced, frames), loop=0,
+               duration=max(round(1000.0 / fps), 20), optimize=False)
+
+
+def _write_mp4(path: Path, frames: Iterator[Frame], fps: float) -> None:
+    import imageio_ffmpeg
+
+    first = next(frames)
+    height, width = first.shape[:2]
+    writer = imageio_ffmpeg.write_frames(
+        str(path), (width, height), fps=fps, quality=MP4_QUALITY, macro_block_size=2,
+        ffmpeg_log_level='error')
+    writer.send(None)
+    for frame in chain([first], frames):
+        writer.send(np.ascontiguousarray(frame))
+    writer.close()
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    options = _parser().parse_args(arguments)
+    return run_command(_parser(), arguments, _film)
+
+
+def _film(options: argparse.Namespace, _: RosArguments) -> int:
     height = 2 * round(options.width * 9 / 32)
     shot = Shot(options.start, options.end, options.fps, options.width, height)
-    try:
-        frames = film_run(options.run, options.film, shot)
-    except DmpCpgError as error:
-        print(f'film: {error}', file=sys.stderr)
-        return BAD_INPUT
-    except OSError as error:
-        print(f"film: cannot write '{error.filename}': {error.strerror}", file=sys.stderr)
-        return BAD_INPUT
+    frames = film_run(options.run, options.film, shot)
     print(f'{options.film}: {frames} frames, {options.film.stat().st_size / 1e6:.2f} MB')
     return 0
 

@@ -10,13 +10,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from dmp_cpg_ros.commands.ros_arguments import parse_arguments
-from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.inspector import Inspection, inspect_model
-
-BAD_INPUT = 2
-"""Exit status for a missing file, a model that is no quadruped, or a picture that cannot be."""
 
 KNEES = {-1: 'backwards', 1: 'forwards'}
 """Sign of the knees' rotation to the way in which they bend."""
@@ -24,22 +20,21 @@ KNEES = {-1: 'backwards', 1: 'forwards'}
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    options, _ = parse_arguments(_parser(), arguments)
-    try:
-        found = inspect_model(options.model)
-        text = robot_yaml(found, None if options.output is None else options.output.parent)
-        if options.output is None:
-            print(text, end='')
-        else:
-            options.output.write_text(text, encoding='utf-8')
-        if options.picture is not None:
-            _draw(found, options.picture)
-    except DmpCpgError as error:
-        print(f'inspect_robot: {error}', file=sys.stderr)
-        return BAD_INPUT
-    except OSError as error:
-        print(f"inspect_robot: cannot write '{error.filename}': {error.strerror}", file=sys.stderr)
-        return BAD_INPUT
+    return run_command(_parser(), arguments, _inspect)
+
+
+def _inspect(options: argparse.Namespace, _: RosArguments) -> int:
+    found = inspect_model(options.model)
+    if options.output is None:
+        print(robot_yaml(found), end='')
+    else:
+        options.output.write_text(robot_yaml(found, options.output.parent), encoding='utf-8')
+    if options.picture is not None:
+        from matplotlib import image
+
+        from dmp_cpg_ros.robot.leg_picture import leg_picture
+
+        image.imsave(options.picture, leg_picture(found.file))
     print(summary(found), file=sys.stderr if options.output is None else sys.stdout)
     return 0
 
@@ -55,17 +50,13 @@ def robot_yaml(found: Inspection, folder: Path | None = None) -> str:
         Where the file will be; the model is then named relative to it when it lies below it.
     """
     file = found.file
-    joints = (f'  {leg}: [{", ".join(names)}]'
+    joints = (f'  {leg}: [{", ".join(names)}]\n'
               for leg, names in zip(LEGS, file.joints, strict=True))
     feet = ', '.join(f'{leg}: {foot}' for leg, foot in zip(LEGS, file.feet, strict=True))
-    return '\n'.join((
-        f'# Found by inspect_robot in {file.model.name}; everything else is read from the model.',
-        f'model: {model_name(file.model, folder)}',
-        f'base: {file.base}',
-        'joints:',
-        *joints,
-        f'feet: {{{feet}}}',
-        ''))
+    return (
+        f'# Found by inspect_robot in {file.model.name}; everything else is read from the model.\n'
+        f'model: {model_name(file.model, folder)}\nbase: {file.base}\njoints:\n'
+        f'{"".join(joints)}feet: {{{feet}}}\n')
 
 
 def model_name(model: Path, folder: Path | None) -> str:
@@ -96,14 +87,6 @@ def summary(found: Inspection) -> str:
     if found.others:
         lines.append(f'joints of no leg, left alone: {", ".join(found.others)}')
     return '\n'.join(lines)
-
-
-def _draw(found: Inspection, path: Path) -> None:
-    from matplotlib import image
-
-    from dmp_cpg_ros.robot.leg_picture import leg_picture
-
-    image.imsave(path, leg_picture(found.file))
 
 
 def _parser() -> argparse.ArgumentParser:

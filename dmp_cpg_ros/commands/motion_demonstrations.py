@@ -17,8 +17,7 @@ from dmp_cpg_ros.analysis.episodes import GaitRow, gait_rows
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import common_rows, feet_in_base, held, rotations, stretches
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.commands.analyze import read_json
-from dmp_cpg_ros.commands.run_knowledge import run_context
+from dmp_cpg_ros.commands.run_folder import read_json, run_context
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
