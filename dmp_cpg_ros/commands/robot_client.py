@@ -17,19 +17,13 @@ import rclpy
 import yaml
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
-from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.commands.suite_client import (
-    ClientError,
-    SuiteClient,
-    VelocityCommand,
-    deliver,
-)
+from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, VelocityCommand, deliver
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
@@ -57,29 +51,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rclpy.init(args=['robot_client', *arguments],
                    signal_handler_options=SignalHandlerOptions.NO)
         node = Node('robot_client', enable_rosout=False, start_parameter_services=False)
-        status: int = options.run(SuiteClient(node, options.wait), options)
-        return status
-    except ParameterError as error:
-        return _said(error, BAD_INPUT)
+        options.run(SuiteClient(node, options.wait), options)
     except (DmpCpgError, RuntimeError) as error:
-        return _said(error, FAILED)
+        print(f'robot_client: {error}', file=sys.stderr)
+        return BAD_INPUT if isinstance(error, ParameterError) else FAILED
     except KeyboardInterrupt:
         return OK if options.command in ENDLESS else INTERRUPTED
     finally:
         rclpy.try_shutdown()
+    return OK
 
 
-def request_stop(client: SuiteClient, options: argparse.Namespace) -> int:
-    """Inhibit or resume the gait."""
-    return _told(client.call('inhibit', SetBool.Request(data=options.command == 'inhibit')))
+def request(client: SuiteClient, options: argparse.Namespace) -> None:
+    """Inhibit or resume the gait, stand up, lie down or recover; a refusal is an error."""
+    stop = {'inhibit': True, 'resume': False}.get(options.command)
+    answer = (client.call(options.command, Trigger.Request()) if stop is None else
+              client.call('inhibit', SetBool.Request(data=stop)))
+    if not answer.success:
+        raise ClientError(answer.message)
+    print(answer.message)
 
 
-def request_mode(client: SuiteClient, options: argparse.Namespace) -> int:
-    """Stand up, lie down or recover."""
-    return _told(client.call(options.command, Trigger.Request()))
-
-
-def publish_command(client: SuiteClient, options: argparse.Namespace) -> int:
+def publish_command(client: SuiteClient, options: argparse.Namespace) -> None:
     """Command a velocity for some time or until Ctrl-C; the last command is zero."""
     command = VelocityCommand(client, stamped=options.stamped)
     begin, sent = time.monotonic(), 0
@@ -91,10 +84,9 @@ def publish_command(client: SuiteClient, options: argparse.Namespace) -> int:
                 0.0, begin + min(sent / options.rate, options.seconds) - time.monotonic()))
     finally:
         command.end()
-    return OK
 
 
-def push(client: SuiteClient, options: argparse.Namespace) -> int:
+def push(client: SuiteClient, options: argparse.Namespace) -> None:
     """Push the simulated robot."""
     message = WrenchStamped()
     vector = message.wrench.force
@@ -102,48 +94,44 @@ def push(client: SuiteClient, options: argparse.Namespace) -> int:
     publisher = client.publisher(interface('push'))
     publisher.publish(message)
     deliver(publisher)
-    return OK
 
 
-def parameter(client: SuiteClient, options: argparse.Namespace) -> int:
+def parameter(client: SuiteClient, options: argparse.Namespace) -> None:
     """Get, set or list the parameters of a node."""
-    node, name, value = options.node, options.name, options.value
-    if (options.action == 'list') != (name is None) or (options.action == 'set') != (
-            value is not None):
+    action, node, name, value = options.action, options.node, options.name, options.value
+    if (action == 'list') != (name is None) or (action == 'set') != (value is not None):
         raise ParameterError('param takes: list NODE, get NODE NAME, or set NODE NAME VALUE')
     client.meet(['inhibition'])
-
-    def service(kind: Any, end: str) -> Client:
-        return client.node.create_client(kind, f'{node}/{end}')
-
-    if options.action == 'list':
-        answer = client.ask(service(ListParameters, 'list_parameters'), ListParameters.Request())
-        print('\n'.join(sorted(answer.result.names)))
-        return OK
-    setter = service(SetParameters, 'set_parameters')
-    known = client.ask(service(GetParameters, 'get_parameters'),
-                       GetParameters.Request(names=[name])).values
+    # The one that must not be repeated first: see SuiteClient.
+    setting, getting, listing = (
+        client.node.create_client(kind, f'{node}/{end}_parameters') for kind, end in (
+            (SetParameters, 'set'), (GetParameters, 'get'), (ListParameters, 'list')))
+    if action == 'list':
+        names = client.ask(listing, ListParameters.Request()).result.names
+        print('\n'.join(sorted(names)))
+        return
+    known = client.ask(getting, GetParameters.Request(names=[name])).values
     if not known or known[0].type == Parameter.Type.NOT_SET.value:
         raise ClientError(f"{node} has no parameter '{name}'; see: robot_client param list {node}")
-    if options.action == 'get':
+    if action == 'get':
         print(plain(parameter_value_to_python(known[0])))
-        return OK
+        return
     given = parameter_value_to_python(get_parameter_value(value))
     if known[0].type == Parameter.Type.DOUBLE.value and type(given) is int:
         given = float(given)
-    client.meet([], setter)
-    request = SetParameters.Request(parameters=[Parameter(name, value=given).to_parameter_msg()])
-    result = client.answer([setter.call_async(request)], setter.service_name).results[0]
+    client.meet([], setting)
+    change = SetParameters.Request(parameters=[Parameter(name, value=given).to_parameter_msg()])
+    result = client.answer([setting.call_async(change)], setting.service_name).results[0]
     if not result.successful:
         raise ClientError(f'Setting parameter failed: {result.reason}')
     print('Set parameter successful')
-    return OK
 
 
-def show_nodes(client: SuiteClient, options: argparse.Namespace) -> int:
+def show_nodes(client: SuiteClient, options: argparse.Namespace) -> None:
     """List the nodes of the suite with what they wait for, and the others."""
     client.meet(['inhibition'])
-    clients = {name: client.node.create_client(Trigger, f'{name}/ready')
+    node = client.node
+    clients = {name: node.create_client(Trigger, f'{name}/ready')
                for name in (*WALKING_NODES, RECORDER)}
     client.spin_until(lambda: all(each.service_is_ready() for each in clients.values()),
                       options.wait)
@@ -151,72 +139,47 @@ def show_nodes(client: SuiteClient, options: argparse.Namespace) -> int:
         state = (client.ask(each, Trigger.Request()).message if each.service_is_ready()
                  else 'does not run')
         print(f'{name:24}{state}')
-    here = {name for name, space in client.node.get_node_names_and_namespaces()
-            if space == client.node.get_namespace()}
-    for name in sorted(here - set(clients) - {client.node.get_name()}):
+    here = {name for name, space in node.get_node_names_and_namespaces()
+            if space == node.get_namespace()}
+    for name in sorted(here - set(clients) - {node.get_name()}):
         print(f'{name:24}not of the suite')
-    return OK
 
 
-def echo(client: SuiteClient, options: argparse.Namespace) -> int:
+def echo(client: SuiteClient, options: argparse.Namespace) -> None:
     """Print the messages of a topic as YAML."""
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # echo TOPIC | head ends quietly
     client.meet(['inhibition'])
-    known = INTERFACES.get(options.topic)
     name = client.node.resolve_topic_name(options.topic)
-    ends: list[Any] = []
 
-    def found() -> list[Any]:
-        ends[:] = client.node.get_publishers_info_by_topic(name)
-        return ends
+    def ends() -> list[Any]:
+        found: list[Any] = client.node.get_publishers_info_by_topic(name)
+        return found
 
-    if not client.spin_until(found, options.wait):
-        raise ClientError(f"nobody publishes {name}; the suite's topics are {_topics()}")
-    profile = known.reader_qos if known else ends[0].qos_profile
+    if not client.spin_until(ends, options.wait):
+        raise ClientError(f"nobody publishes {name}; the suite's topics are "
+                          f'{", ".join(topic.name for topic in TOPICS)}')
+    known, end = INTERFACES.get(options.topic), ends()[0]
+    package, _, kind = end.topic_type.split('/')
+    try:
+        message_type = getattr(importlib.import_module(f'{package}.msg'), kind)
+    except ImportError as error:
+        raise ClientError(f'messages of {package} are not installed: {error}') from None
     messages: list[Any] = []
-    client.node.create_subscription(
-        _message_type(ends[0].topic_type), name, messages.append, profile)
+    client.node.create_subscription(message_type, name, messages.append,
+                                    known.reader_qos if known else end.qos_profile)
     while client.spin_until(lambda: messages):
         for message in messages:
             print(yaml.safe_dump(_as_mapping(message), sort_keys=False), end='---\n', flush=True)
             if options.once:
-                return OK
+                return
         messages.clear()
-    return OK
 
 
-def drive(client: SuiteClient, options: argparse.Namespace) -> int:
+def drive(client: SuiteClient, options: argparse.Namespace) -> None:
     """Drive by keyboard."""
     from dmp_cpg_ros.commands.teleop import drive_by_keyboard
 
-    command = VelocityCommand(client, stamped=options.stamped)
-    return drive_by_keyboard(client, command, options.rate)
-
-
-def _told(answer: Any) -> int:
-    """Print the answer of a service; a refusal is an error."""
-    if not answer.success:
-        raise ClientError(answer.message)
-    print(answer.message)
-    return OK
-
-
-def _said(error: Exception, status: int) -> int:
-    print(f'robot_client: {error}', file=sys.stderr)
-    return status
-
-
-def _topics() -> str:
-    return ', '.join(topic.name for topic in TOPICS)
-
-
-def _message_type(name: str) -> Any:
-    """Class of a type such as ``std_msgs/msg/String``."""
-    package, _, message = name.split('/')
-    try:
-        return getattr(importlib.import_module(f'{package}.msg'), message)
-    except ImportError as error:
-        raise ClientError(f'messages of {package} are not installed: {error}') from None
+    drive_by_keyboard(client, VelocityCommand(client, stamped=options.stamped), options.rate)
 
 
 def _as_mapping(value: Any) -> Any:
@@ -272,25 +235,25 @@ def _parser() -> argparse.ArgumentParser:
                            help='send TwistStamped, for a suite with stamped_cmd_vel:=true')
 
     velocity = command('cmd_vel', publish_command, 'command a velocity until Ctrl-C')
-    for name, text, default in (('v_x', 'forward [m/s]', None), ('v_y', 'to the left [m/s]', 0.0),
-                                ('yaw_rate', 'to the left [rad/s]', 0.0)):
-        velocity.add_argument(name, type=_number, help=text, default=default,
-                              nargs=None if default is None else '?')
+    velocity.add_argument('v_x', type=_number, help='forward [m/s]')
+    for name, unit in (('v_y', 'm/s'), ('yaw_rate', 'rad/s')):
+        velocity.add_argument(name, type=_number, help=f'to the left [{unit}]', default=0.0,
+                              nargs='?')
     velocity.add_argument('--for', metavar='SECONDS', dest='seconds', type=_positive,
                           default=math.inf, help='end after so long')
     sending(velocity)
-    command('inhibit', request_stop, 'stop the gait')
-    command('resume', request_stop, 'start the gait')
+    command('inhibit', request, 'stop the gait')
+    command('resume', request, 'start the gait')
     for name in REQUESTS:
-        command(name, request_mode, interface(name).meaning)
+        command(name, request, interface(name).meaning)
     pushing = command('push', push, 'push the simulated robot for 0.1 s')
     pushing.add_argument('force', metavar='F', type=_number, nargs=3,
                          help='forward, to the left, up [N]')
     parameters = command('param', parameter, 'get, set or list parameters of a node')
     parameters.add_argument('action', choices=('get', 'set', 'list'))
     parameters.add_argument('node', metavar='NODE')
-    parameters.add_argument('name', metavar='NAME', nargs='?')
-    parameters.add_argument('value', metavar='VALUE', nargs='?')
+    for name in ('name', 'value'):
+        parameters.add_argument(name, metavar=name.upper(), nargs='?')
     command('nodes', show_nodes, 'list the nodes and what they wait for')
     printing = command('echo', echo, 'print what is published on a topic')
     printing.add_argument('topic', metavar='TOPIC')

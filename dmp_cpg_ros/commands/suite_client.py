@@ -63,8 +63,8 @@ class SuiteClient:
         """Run callbacks until a condition holds; returns whether it does."""
         deadline = time.monotonic() + within_s
         while not condition() and time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=max(0.0, min(
-                STEP_S, deadline - time.monotonic())))
+            left_s = max(0.0, deadline - time.monotonic())
+            self._executor.spin_once(timeout_sec=min(STEP_S, left_s))
         return bool(condition())
 
     def meet(self, kinds: Sequence[str], *clients: Client) -> None:
@@ -104,10 +104,9 @@ class SuiteClient:
         """Publisher whose readers all know it; raises ClientError when they want another type."""
         publisher = self.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self.meet(topic.subscribers)
-        expected = len(topic.subscribers)
 
         def matched() -> bool:
-            return bool(publisher.get_subscription_count() >= expected)
+            return bool(publisher.get_subscription_count() >= len(topic.subscribers))
 
         def others() -> list[str]:
             ends = self.node.get_subscriptions_info_by_topic(publisher.topic_name)
@@ -121,21 +120,20 @@ class SuiteClient:
         return publisher
 
     def _find(self, client: Client) -> None:
-        if not self.spin_until(client.service_is_ready, self._wait_s):
-            raise ClientError(self._nobody(client.service_name))
-
-    def _nobody(self, service: str) -> str:
-        """Say that nobody offers a service, and what is there."""
-        node = self.node
+        """Wait for a server; raises ClientError with what is there instead."""
+        if self.spin_until(client.service_is_ready, self._wait_s):
+            return
+        node, service = self.node, client.service_name
         nodes = node.get_node_names_and_namespaces()
         suites = {space for name, space in nodes if name == 'inhibition'}
         if node.get_namespace() in suites:
             names = {name for name, space in nodes if space == node.get_namespace()}
-            return (f'nobody offers {service}; nodes are '
-                    f'{", ".join(sorted(names - {node.get_name()}))}')
+            raise ClientError(f'nobody offers {service}; nodes are '
+                              f'{", ".join(sorted(names - {node.get_name()}))}')
         hint = f' (there is one with --namespace {", ".join(sorted(suites))})' if suites else ''
-        return (f'no suite answers in ROS domain {node.context.get_domain_id()}{hint}: nobody '
-                f'offers {service}; start one with walk, such as: walk stand_by.yaml')
+        raise ClientError(
+            f'no suite answers in ROS domain {node.context.get_domain_id()}{hint}: nobody offers '
+            f'{service}; start one with walk, such as: walk stand_by.yaml')
 
 
 class VelocityCommand:

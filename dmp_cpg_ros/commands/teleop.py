@@ -10,8 +10,6 @@ import select
 import sys
 import termios
 import tty
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 from rclpy.task import Future
@@ -21,6 +19,8 @@ from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, Velocity
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader
 from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface
+
+STILL = (0.0, 0.0, 0.0)
 
 STEPS = {'w': (0.1, 0.0), 's': (-0.1, 0.0), 'a': (0.0, 0.2), 'd': (0.0, -0.2)}
 """Change of v_x [m/s] and of the yaw rate [rad/s] by one press of a key."""
@@ -54,14 +54,18 @@ class Teleop:
     def __init__(self, client: SuiteClient) -> None:
         """Create clients, and listen to the state of the stop."""
         node, inhibit, gains = client.node, interface('inhibit'), InhibitionGainsReader()
-        self.velocity = (0.0, 0.0, 0.0)
+
+        def on_state(message: Any) -> None:
+            self._word = read_state_word(message)
+
+        def on_gains(message: Any) -> None:
+            self._requested = gains.read(message).requested
+
+        self.velocity = STILL
         self._word, self._requested, self._shown = '', False, ''
         self._inhibit = node.create_client(inhibit.type, inhibit.name)
         self._modes = {key: node.create_client(Trigger, name) for key, name in MODES.items()}
-        for name, callback in (
-            ('inhibition_state', self._on_state),
-            ('inhibition_gains', lambda message: self._on_gains(gains.read(message).requested)),
-        ):
+        for name, callback in (('inhibition_state', on_state), ('inhibition_gains', on_gains)):
             topic = interface(name)
             node.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
         client.meet((*inhibit.publishers, *interface('stand_up').publishers),
@@ -74,7 +78,7 @@ class Teleop:
             faster, further = STEPS[key]
             self.velocity = (round(v_x + faster, 3), 0.0, round(yaw_rate + further, 3))
         elif key == 'x':
-            self.velocity = (0.0, 0.0, 0.0)
+            self.velocity = STILL
         elif key == ' ':
             request = SetBool.Request(data=not self._requested)
             self._inhibit.call_async(request).add_done_callback(self._answered)
@@ -89,19 +93,13 @@ class Teleop:
             self._shown = line
             print(f'\r\x1b[K{line}', end='', flush=True)
 
-    def _on_state(self, message: Any) -> None:
-        self._word = read_state_word(message)
-
-    def _on_gains(self, requested: bool) -> None:
-        self._requested = requested
-
     def _answered(self, future: Future) -> None:
         answer = future.result()
         print(f'\r\x1b[K{"" if answer.success else "refused: "}{answer.message}')
         self._shown = ''
 
 
-def drive_by_keyboard(client: SuiteClient, command: VelocityCommand, rate: float) -> int:
+def drive_by_keyboard(client: SuiteClient, command: VelocityCommand, rate: float) -> None:
     """Drive until q, Ctrl-C or the end of the input; the last command is zero.
 
     Raises
@@ -113,30 +111,22 @@ def drive_by_keyboard(client: SuiteClient, command: VelocityCommand, rate: float
         raise ClientError('teleop reads keys from a terminal, and this input is none')
     teleop = Teleop(client)
     print(HELP, end='')
-    try:
-        with _key_by_key(sys.stdin.fileno()):
-            while True:
-                command.send(teleop.velocity)
-                teleop.show()
-                client.spin_until(lambda: _waiting(sys.stdin.fileno()), 1.0 / rate)
-                for key in _keys(sys.stdin.fileno()):
-                    if key == 'q':
-                        return 0
-                    teleop.press(key)
-    finally:
-        print()
-        command.end()
-
-
-@contextmanager
-def _key_by_key(terminal: int) -> Iterator[None]:
-    """Let a terminal give every key at once and show none."""
+    terminal = sys.stdin.fileno()
     former = termios.tcgetattr(terminal)
     try:
-        tty.setcbreak(terminal)
-        yield
+        tty.setcbreak(terminal)  # gives every key at once and shows none
+        while True:
+            command.send(teleop.velocity)
+            teleop.show()
+            client.spin_until(lambda: _waiting(terminal), 1.0 / rate)
+            for key in _keys(terminal):
+                if key == 'q':
+                    return
+                teleop.press(key)
     finally:
         termios.tcsetattr(terminal, termios.TCSADRAIN, former)
+        print()
+        command.end()
 
 
 def _waiting(terminal: int) -> bool:
