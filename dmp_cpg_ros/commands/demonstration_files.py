@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import csv
-import io
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -21,18 +22,13 @@ from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 Array = NDArray[np.float64]
 
 _TIME_NAMES = ('t', 'time', 'time_s', 'timestamp', 'stamp')
-_ORDERS = {'': 0, '_velocity': 1, '_acceleration': 2}
-_ARRAYS = ('times', 'positions', 'velocities', 'accelerations')
+_ENDINGS = ('', '_velocity', '_acceleration')
+_ARRAYS = ('positions', 'velocities', 'accelerations')
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
 
 
-def read_demonstration(
-    path: Path,
-    joints: Sequence[str] = (),
-    topic: str = 'joint_states',
-    start: float | None = None,
-    end: float | None = None,
-) -> Demonstration:
+def read_demonstration(path: Path, joints: Sequence[str] = (), topic: str = 'joint_states',
+                       start: float | None = None, end: float | None = None) -> Demonstration:
     """Read a demonstration of any kind.
 
     Parameters
@@ -68,7 +64,17 @@ def read_demonstration(
         whole = _from_bag(path, topic, joints)
     else:
         raise DataError(f"'{path}' is of no known kind; valid are .csv, .npy, .npz and bags")
-    return _part(_chosen(whole, joints, path), start, end)
+    unknown = [name for name in joints if name not in whole.names]
+    if unknown:
+        valid = ', '.join(whole.names) or 'none, for the file names no joints'
+        raise DataError(f"'{path}' has no joint '{unknown[0]}'; valid are {valid}")
+    names = tuple(joints) or whole.names
+    columns = [whole.names.index(name) for name in names] if names else slice(None)
+    since = whole.times - whole.times[0]
+    rows = (since >= (start or 0.0)) & (since <= (np.inf if end is None else end))
+    parts: dict[str, Any] = {field: values[rows][:, columns] for field in _ARRAYS
+                             if (values := getattr(whole, field)) is not None}
+    return replace(whole, times=whole.times[rows], names=names, **parts)
 
 
 def _from_csv(path: Path) -> Demonstration:
@@ -77,19 +83,18 @@ def _from_csv(path: Path) -> Demonstration:
         text = path.read_text(encoding='utf-8-sig')
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"'{path}' cannot be read as text: {error}") from error
-    rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
+    rows = [row for row in csv.reader(text.splitlines()) if ''.join(row).strip()]
     if not rows:
         raise DataError(f"'{path}' is empty; its first column must be time [s]")
-    header = [cell.strip() for cell in rows[0]]
-    if all(_is_number(cell) for cell in header):
-        header = ['time', *(f'joint_{i + 1}' for i in range(len(header) - 1))]
-    else:
-        rows = rows[1:]
+    try:
+        np.array(rows[0], dtype=float)
+        header = ['time', *(f'joint_{i}' for i in range(1, len(rows[0])))]
+    except ValueError:
+        header, rows = [cell.strip() for cell in rows[0]], rows[1:]
     if len(header) < 2 or header[0].lower() not in _TIME_NAMES:
         raise DataError(
             f"'{path}' must have the time in its first column, named {', '.join(_TIME_NAMES)}, "
-            f'and positions in the others; its columns are {", ".join(header)}'
-        )
+            f'and positions in the others; its columns are {", ".join(header)}')
     try:
         data = np.array([[float(cell) for cell in row] for row in rows], dtype=float)
     except ValueError as error:
@@ -97,25 +102,13 @@ def _from_csv(path: Path) -> Demonstration:
     if data.ndim != 2 or data.shape[1] != len(header):
         raise DataError(f"'{path}' must have {len(header)} numbers in every row")
     columns = dict(zip(header[1:], data.T[1:], strict=True))
-    return _of_columns(data[:, 0], columns)
-
-
-def _of_columns(times: Array, columns: dict[str, Array]) -> Demonstration:
-    derived = {
-        base + ending
-        for base in columns
-        for ending in _ORDERS
-        if ending and base + ending in columns
-    }
+    derived = {base + ending for base in columns for ending in _ENDINGS[1:]}
     names = tuple(name for name in columns if name not in derived)
-    parts: list[Array | None] = []
-    for ending in _ORDERS:
-        there = all(name + ending in columns for name in names)
-        parts.append(np.stack([columns[n + ending] for n in names], axis=1) if there else None)
-    positions, velocities, accelerations = parts
-    if positions is None:
-        raise DataError('a demonstration needs positions')
-    return Demonstration(times, positions, velocities, accelerations, names)
+    parts: dict[str, Any] = {
+        field: np.stack([columns[name + ending] for name in names], axis=1)
+        for field, ending in zip(_ARRAYS, _ENDINGS, strict=True)
+        if all(name + ending in columns for name in names)}
+    return Demonstration(data[:, 0], **parts, names=names)
 
 
 def _from_numpy(path: Path) -> Demonstration:
@@ -127,25 +120,21 @@ def _from_numpy(path: Path) -> Demonstration:
         if content.ndim != 2 or content.shape[1] < 2 or not np.isrealobj(content):
             raise DataError(
                 f"'{path}' must hold an array (m, 1 + n) with the time [s] in its first column, "
-                f'not one of shape {content.shape}'
-            )
+                f'not one of shape {content.shape}')
         return Demonstration(content[:, 0], content[:, 1:])
     with content:
-        for needed in _ARRAYS[:2]:
+        for needed in ('times', 'positions'):
             if needed not in content.files:
-                raise DataError(
-                    f"'{path}' has no array '{needed}'; needed are {', '.join(_ARRAYS[:2])}, "
-                    f'possible {", ".join(_ARRAYS[2:])}, names'
-                )
+                raise DataError(f"'{path}' has no array '{needed}'; needed are times, positions, "
+                                'possible velocities, accelerations, names')
         try:
-            arrays: list[Any] = [
-                np.asarray(content[a]) if a in content.files else None for a in _ARRAYS
-            ]
-            names = tuple(map(str, content['names'])) if 'names' in content.files else ()
+            arrays: dict[str, Any] = {
+                name: content[name] for name in ('times', *_ARRAYS, 'names')
+                if name in content.files}
         except ValueError as error:
             raise DataError(f"'{path}' holds more than plain arrays: {error}") from error
-    times, positions, velocities, accelerations = arrays
-    return Demonstration(times, positions, velocities, accelerations, names)
+    names = tuple(map(str, arrays.pop('names', ())))
+    return Demonstration(**arrays, names=names)
 
 
 def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:
@@ -155,71 +144,26 @@ def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         full = next((t for t in kinds if t == topic or t.endswith('/' + topic.lstrip('/'))), None)
         usable = sorted(t for t, kind in kinds.items() if kind == _JOINT_STATE)
-        if full is None or full not in usable:
-            raise DataError(
-                f"'{path}' has no topic '{topic}' of joint states; valid are "
-                f'{", ".join(usable) or "none in this bag"}'
-            )
+        if full not in usable:
+            raise DataError(f"'{path}' has no topic '{topic}' of joint states; valid are "
+                            f'{", ".join(usable) or "none in this bag"}')
         chosen = [c for c in reader.connections if c.topic == full]
         for _, bag_ns, message in decoded(reader, chosen, Counter()):
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-            row = samples.setdefault(stamp or bag_ns, {})
-            for i, name in enumerate(message.name):
-                if i < len(message.position):
-                    speed = float(message.velocity[i]) if i < len(message.velocity) else None
-                    row[name] = (float(message.position[i]), speed)
-    names = tuple(joints) or tuple(dict.fromkeys(n for row in samples.values() for n in row))
-    unknown = [n for n in names if not any(n in row for row in samples.values())]
+            samples.setdefault(stamp or bag_ns, {}).update(
+                (name, (position, speed)) for name, position, speed
+                in zip_longest(message.name, message.position, message.velocity)
+                if name is not None and position is not None)
+    known = dict.fromkeys(name for row in samples.values() for name in row)
+    names = tuple(joints or known)
+    unknown = [name for name in names if name not in known]
     if unknown:
-        known = dict.fromkeys(n for row in samples.values() for n in row)
         raise DataError(f"'{path}' has no joint '{unknown[0]}'; valid are {', '.join(known)}")
-    stamps = sorted(stamp for stamp, row in samples.items() if all(n in row for n in names))
+    stamps = sorted(stamp for stamp, row in samples.items() if row.keys() >= set(names))
     if not stamps:
         raise DataError(f"'{path}': no message on '{full}' holds all of {', '.join(names)}")
     rows = [[samples[stamp][name] for name in names] for stamp in stamps]
+    complete = all(speed is not None for row in rows for _, speed in row)
+    values = np.array(rows, dtype=float)  # (m, n, 2)
     times = np.array([stamp - stamps[0] for stamp in stamps]) * 1e-9
-    speeds = [[speed for _, speed in row] for row in rows]
-    complete = all(speed is not None for row in speeds for speed in row)
-    velocities = np.array(speeds, dtype=float) if complete else None
-    return Demonstration(
-        times, np.array([[p for p, _ in r] for r in rows]), velocities, None, names
-    )
-
-
-def _chosen(demonstration: Demonstration, joints: Sequence[str], path: Path) -> Demonstration:
-    if not joints or tuple(joints) == demonstration.names:
-        return demonstration
-    for name in joints:
-        if name not in demonstration.names:
-            valid = ', '.join(demonstration.names) or 'none, for the file names no joints'
-            raise DataError(f"'{path}' has no joint '{name}'; valid are {valid}")
-    index = [demonstration.names.index(name) for name in joints]
-    v, a = demonstration.velocities, demonstration.accelerations
-    return Demonstration(
-        demonstration.times,
-        demonstration.positions[:, index],
-        None if v is None else v[:, index],
-        None if a is None else a[:, index],
-        tuple(joints),
-    )
-
-
-def _part(demonstration: Demonstration, start: float | None, end: float | None) -> Demonstration:
-    since = demonstration.times - demonstration.times[0]
-    keep = (since >= (start or 0.0)) & (since <= (np.inf if end is None else end))
-    v, a = demonstration.velocities, demonstration.accelerations
-    return Demonstration(
-        demonstration.times[keep],
-        demonstration.positions[keep],
-        None if v is None else v[keep],
-        None if a is None else a[keep],
-        demonstration.names,
-    )
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return Demonstration(times, values[..., 0], values[..., 1] if complete else None, None, names)

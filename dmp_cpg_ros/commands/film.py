@@ -50,16 +50,16 @@ class Shot:
 
     Attributes
     ----------
-    start, end : float or None
-        On the robot's clock [s]; None: from the beginning, to the end.
+    start, end : float
+        On the robot's clock [s].
     fps : float
         Frames per second, at the robot's own pace.
     width, height : int
         [pixels]
     """
 
-    start: float | None = None
-    end: float | None = None
+    start: float = -np.inf
+    end: float = np.inf
     fps: float = 20.0
     width: int = 640
     height: int = 360
@@ -96,8 +96,8 @@ def film(recording: Recording, context: RunContext, robot_file: Path | None, pat
     odometry, joints = recording.odometry, recording.joints
     if not (odometry.time.size and joints.time.size):
         raise DataError('a film needs recorded joint_states and odom')
-    first = max(odometry.time[0], joints.time[0], -np.inf if shot.start is None else shot.start)
-    last = min(odometry.time[-1], joints.time[-1], np.inf if shot.end is None else shot.end)
+    first = max(odometry.time[0], joints.time[0], shot.start)
+    last = min(odometry.time[-1], joints.time[-1], shot.end)
     times = np.arange(first, last + 1e-9, 1.0 / shot.fps)
     if not times.size:
         raise DataError(f'nothing was recorded between {shot.start} s and {shot.end} s; the '
@@ -129,19 +129,16 @@ class _Painter:
             for values in (odometry.position_in_world, odometry.quaternion, self._look,
                            self._speed))
         joints = held(self._recording.joints.time, self._recording.joints.position, at)[0]
-        picture = Image.fromarray(
-            self._camera.drawn(place, quaternion, joints, look_at=look))
+        picture = Image.fromarray(self._camera.drawn(place, quaternion, joints, look_at=look))
         words = [event.message for event in self._recording.inhibition if event.time <= time]
-        self._write(picture, (words[-1] if words else '').replace('_', ' '),
-                    f'{round(float(speed[0]), 2) + 0.0:.2f} m/s   {time:.1f} s')
-        return np.asarray(picture, dtype=np.uint8)
-
-    def _write(self, picture: Image.Image, left: str, right: str) -> None:
+        left = (words[-1] if words else '').replace('_', ' ')
+        right = f'{round(float(speed[0]), 2) + 0.0:.2f} m/s   {time:.1f} s'
         pen, margin = ImageDraw.Draw(picture), self._margin
         width = pen.textlength(right, font=self._font)
         for x, text in ((margin, left), (picture.width - margin - width, right)):
             pen.text((x, margin), text, font=self._font, fill=INK, stroke_width=2,
                      stroke_fill=OUTLINE)
+        return np.asarray(picture, dtype=np.uint8)
 
 
 def film_run(run: Path, path: Path, shot: Shot | None = None) -> int:
@@ -200,35 +197,23 @@ def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame],
     """
     checked_film_path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
+    first = next(frames)
+    frames = chain([first], frames)
     if path.suffix.lower() == '.gif':
-        _write_gif(path, frames, palette_from, fps)
-    else:
-        _write_mp4(path, frames, fps)
-
-
-def _write_gif(path: Path, frames: Iterator[Frame], palette_from: list[Frame],
-               fps: float) -> None:
-    sample = Image.fromarray(np.concatenate(palette_from))
-    palette = sample.quantize(COLOURS, Image.Quantize.MAXCOVERAGE)
-
-    def reduced(frame: Frame) -> Image.Image:
-        return Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-
-    first = reduced(next(frames))
-    first.save(path, save_all=True, append_images=map(reduced, frames), loop=0,
-               duration=max(round(1000.0 / fps), 20), optimize=False)
-
-
-def _write_mp4(path: Path, frames: Iterator[Frame], fps: float) -> None:
+        palette = Image.fromarray(np.concatenate(palette_from)).quantize(
+            COLOURS, Image.Quantize.MAXCOVERAGE)
+        pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+                    for frame in frames)
+        next(pictures).save(path, save_all=True, append_images=pictures, loop=0,
+                            duration=max(round(1000.0 / fps), 20), optimize=False)
+        return
     import imageio_ffmpeg
 
-    first = next(frames)
-    height, width = first.shape[:2]
     writer = imageio_ffmpeg.write_frames(
-        str(path), (width, height), fps=fps, quality=MP4_QUALITY, macro_block_size=2,
+        str(path), first.shape[1::-1], fps=fps, quality=MP4_QUALITY, macro_block_size=2,
         ffmpeg_log_level='error')
     writer.send(None)
-    for frame in chain([first], frames):
+    for frame in frames:
         writer.send(np.ascontiguousarray(frame))
     writer.close()
 
@@ -249,15 +234,16 @@ def _film(options: argparse.Namespace, _: RosArguments) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='film', description="Draw a recorded run as a film, from the run's folder.")
-    parser.add_argument('run', metavar='RUN', type=Path, help="a run's folder, with bag/ inside")
-    parser.add_argument('film', metavar='FILE', type=Path,
-                        help='FILE.gif, or FILE.mp4 when imageio-ffmpeg is installed')
-    parser.add_argument('--start', metavar='S', type=float, help="begin, on the robot's clock")
-    parser.add_argument('--end', metavar='S', type=float, help='end')
-    parser.add_argument('--fps', metavar='HZ', type=float, default=Shot.fps,
-                        help=f'frames per second (default: {Shot.fps:g})')
-    parser.add_argument('--width', metavar='PIXELS', type=int, default=Shot.width,
-                        help=f'width, of 16:9 (default: {Shot.width})')
+    add = parser.add_argument
+    add('run', metavar='RUN', type=Path, help="a run's folder, with bag/ inside")
+    add('film', metavar='FILE', type=Path,
+        help='FILE.gif, or FILE.mp4 when imageio-ffmpeg is installed')
+    add('--start', metavar='S', type=float, default=Shot.start, help="begin, on the robot's clock")
+    add('--end', metavar='S', type=float, default=Shot.end, help='end')
+    add('--fps', metavar='HZ', type=float, default=Shot.fps,
+        help='frames per second (default: %(default)g)')
+    add('--width', metavar='PIXELS', type=int, default=Shot.width,
+        help='width, of 16:9 (default: %(default)s)')
     return parser
 
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,22 +90,21 @@ def read_motion(
     if gaits is None or not recording.reference.time.size:
         raise DataError(f"'{path}': the reference or the gait in force was not recorded")
     times, scale = canonical.time[at], body_scale(context.robot)
-    planned = _planned(recording, gaits, at, scale)
+    position, duty, cycle, bounce, steady = _planned(recording, gaits, at, scale)
     angles = joints.position[rows]
     if topic == 'joint_targets':
         angles = _goals(times, angles, joints.velocity[rows], parameters)
     up = rotations(recording.odometry.quaternion[attitude])[:, 2]
     feet: list[list[FootSamples]] = [[] for _ in context.robot.legs]
-    for first, past in stretches(planned.steady):
+    for first, past in stretches(steady):
         part = slice(int(np.searchsorted(times, times[first] + SETTLING)), past)
         if times[past - 1] - times[first] < SETTLING + SHORTEST:
             continue
         for i, leg in enumerate(context.robot.legs):
             foot = feet_in_base(leg, angles[part, 3 * i : 3 * i + 3])
             away = foot - nominal_foothold(context.robot, leg.name)
-            away[:, 2] = np.sum(up[part] * foot, axis=1) + planned.bounce[part, i]
-            feet[i].append(FootSamples(
-                planned.cycle_position[part, i], planned.duty[part], planned.cycle[part], away))
+            away[:, 2] = np.sum(up[part] * foot, axis=1) + bounce[part, i]
+            feet[i].append(FootSamples(position[part, i], duty[part], cycle[part], away))
     if not feet[0]:
         raise DataError(
             f"'{path}': the robot nowhere walks straight on for {SETTLING + SHORTEST:g} s at one "
@@ -113,20 +112,11 @@ def read_motion(
     return feet, context.robot
 
 
-class _Planned(NamedTuple):
-    """What the gaits plan at every stamp (m,), and whether the robot does so steadily."""
-
-    cycle_position: Array  # (m, 4)
-    duty: Array
-    cycle: Array
-    bounce: Array  # (m, 4)
-    steady: NDArray[np.bool_]
-
-
-def _planned(
-    recording: Recording, gaits: list[GaitRow], at: NDArray[np.int64], scale: BodyScale
-) -> _Planned:
-    """Plans at rows of the canonical states; NaN within changes of gait, which are not steady."""
+def _planned(recording: Recording, gaits: list[GaitRow], at: NDArray[np.int64], scale: BodyScale
+             ) -> tuple[Array, Array, Array, Array, NDArray[np.bool_]]:
+    """Cycle positions (m, 4), duty, cycle, bounce (m, 4) that the gaits plan at rows of the
+    canonical states, and whether the robot does so steadily; NaN within changes of gait.
+    """
     canonical, reference = recording.canonical, recording.reference
     in_force: list[GaitInForce | None] = [None] * len(canonical.time)
     for entry in gaits:
@@ -149,7 +139,7 @@ def _planned(
         & (np.abs(r - before).max(axis=1) < STEADY * speed)
         & (np.abs(rate - omega[:, None]).max(axis=1) < STEADY * omega)
     )
-    return _Planned(c, duty, 2.0 * np.pi / omega, bounce, steady)
+    return c, duty, 2.0 * np.pi / omega, bounce, steady
 
 
 def _goals(times: Array, angles: Array, rates: Array, parameters: Mapping[str, Any]) -> Array:

@@ -214,7 +214,7 @@ class _Watch:
                 raise InterruptedRunError(self._interrupted[0])
             ended = self._group.ended()
             if ended:
-                raise SuiteError('; '.join(map(str, ended)))
+                raise SuiteError('; '.join(ended))
         return bool(future.done())
 
     def until_ready(self) -> None:
