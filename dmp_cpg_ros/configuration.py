@@ -111,13 +111,8 @@ def load_yaml(path: str | Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise MissingFileError(f"cannot read '{path}': {reason}") from error
-    try:
-        text = data.decode('utf-8')
-    except UnicodeDecodeError as error:
-        line = data.count(b'\n', 0, error.start) + 1
-        raise DataError(f"'{path}', line {line}: not a text file in UTF-8: {error.reason}"
-                        ) from error
-    content = parse_yaml(text, f"'{path}'")
+    # Bytes that are no UTF-8 become characters that are no YAML.
+    content = parse_yaml(data.decode(errors='surrogateescape'), f"'{path}'")
     if content is None:
         return {}
     if not isinstance(content, dict):
@@ -160,7 +155,7 @@ def parse_yaml(text: str, where: str) -> Any:
         raise DataError(f'{where}{place}: {error.problem or error.context}') from error
     except yaml.reader.ReaderError as error:
         line = text.count('\n', 0, error.position) + 1
-        raise DataError(f'{where}, line {line}: not YAML: {error.reason}') from error
+        raise DataError(f'{where}, line {line}: not YAML in UTF-8: {error.reason}') from error
 
 
 def node_parameters(
@@ -320,11 +315,11 @@ def _sections(content: Mapping[str, Any], path: str | Path, prefix: str = ''
             raise DataError(f"'{path}': '{name}' must be a mapping with '{_PARAMETERS_KEY}:' in "
                             f'it, not {shown(value)}')
         below = dict(value)
-        parameters = below.pop(_PARAMETERS_KEY, {})
-        if not isinstance(parameters, Mapping):
-            raise DataError(f"'{path}': '{_PARAMETERS_KEY}' of '{name}' must be a mapping, "
-                            f'not {shown(parameters)}')
-        if _PARAMETERS_KEY in value:
+        if _PARAMETERS_KEY in below:
+            parameters = below.pop(_PARAMETERS_KEY)
+            if not isinstance(parameters, Mapping):
+                raise DataError(f"'{path}': '{_PARAMETERS_KEY}' of '{name}' must be a mapping, "
+                                f'not {shown(parameters)}')
             sections.setdefault(name, {}).update(_flat(parameters))
         sections.update(_sections(below, path, name))
     return sections

@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from dmp_cpg_ros.analysis.strict_json import to_json, write_json
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
@@ -64,15 +64,13 @@ def _certify(options: argparse.Namespace, ros: RosArguments) -> int:
         if p.voting.voting or p.canonical.contact_feedback:
             raise ParameterError('voting and contact_feedback have no exact proof; --proof needs '
                                  'both to be off')
-        options.proof.write_text(json.dumps(proof_of(**running), indent=1) + '\n',
-                                 encoding='utf-8')
+        write_json(options.proof, proof_of(**running))
     if options.json:
         content = _as_mapping(suite, certificate, votes)
         if options.suggest:
-            content['suggestion'] = None if suggestion is None else {
-                'coupling_gain': suggestion.coupling_gain,
-                'inhibition_gain': suggestion.inhibition_gain}
-        print(json.dumps(content, indent=2, allow_nan=False))
+            content['suggestion'] = suggestion and {
+                name: getattr(suggestion, name) for name in ('coupling_gain', 'inhibition_gain')}
+        print(to_json(content), end='')
     else:
         lines = _report(suite, certificate, votes)
         print('\n'.join([*lines, '', *_suggested(suggestion)] if options.suggest else lines))
@@ -152,13 +150,11 @@ def _suggested(suggestion: Suggestion | None) -> list[str]:
 
 
 def _as_mapping(suite: Suite, certificate: Certificate, votes: VotesNeeded) -> dict[str, Any]:
-    enough, too_weak = ([gain if math.isfinite(gain) else None for gain in gains]
-                        for gains in (votes.enough, votes.too_weak))
     return {'file': str(suite.file), 'gait': suite.gait.name, 'tick_s': suite.tick_ns * 1e-9,
             **certificate.as_mapping(),
             'votes': {'limit': votes.clamp.limit, 'gain': votes.clamp.gain,
-                      'needed': votes.certain, 'powerless': votes.powerless, 'enough': enough,
-                      'too_weak': too_weak}}
+                      'needed': votes.certain, 'powerless': votes.powerless,
+                      'enough': votes.enough, 'too_weak': votes.too_weak}}
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from itertools import chain
@@ -103,42 +103,36 @@ def film(recording: Recording, context: RunContext, robot_file: Path | None, pat
         raise DataError(f'nothing was recorded between {shot.start} s and {shot.end} s; the '
                         f'recording is from {odometry.time[0]:g} s to {odometry.time[-1]:g} s')
     with Camera(robot_file, shot.width, shot.height, context.world, plain=True) as camera:
-        draw = _Painter(recording, camera, shot)
+        draw = _painter(recording, camera, shot.height)
         sample = [draw(t) for t in np.linspace(first, last, min(PALETTE_FRAMES, len(times)))]
         write_film(path, map(draw, times), sample, shot.fps)
     return len(times)
 
 
-class _Painter:
-    """Draws the recording at a time, with its state and speed written on it."""
+def _painter(recording: Recording, camera: Camera, height: int) -> Callable[[float], Frame]:
+    """Return what draws the recording at a time [s], with its state and speed written on it."""
+    odometry, joints = recording.odometry, recording.joints
+    moving = (odometry.position_in_world, odometry.quaternion,
+              smoothed(odometry.time, odometry.position_in_world, LOOK_WINDOW),
+              smoothed(odometry.time, velocity_in_heading(odometry)[:, :1], SPEED_WINDOW))
+    file = Path(matplotlib.get_data_path()) / 'fonts' / 'ttf' / 'DejaVuSans-Bold.ttf'
+    font, margin = ImageFont.truetype(str(file), max(height // 18, 11)), height // 24
 
-    def __init__(self, recording: Recording, camera: Camera, shot: Shot) -> None:
-        self._recording, self._camera = recording, camera
-        odometry = recording.odometry
-        self._look = smoothed(odometry.time, odometry.position_in_world, LOOK_WINDOW)
-        self._speed = smoothed(odometry.time, velocity_in_heading(odometry)[:, :1], SPEED_WINDOW)
-        font = Path(matplotlib.get_data_path()) / 'fonts' / 'ttf' / 'DejaVuSans-Bold.ttf'
-        self._font = ImageFont.truetype(str(font), max(shot.height // 18, 11))
-        self._margin = shot.height // 24
-
-    def __call__(self, time: float) -> Frame:
-        """Frame at a time [s]."""
-        odometry, at = self._recording.odometry, np.array([time])
-        place, quaternion, look, speed = (
-            held(odometry.time, values, at)[0]
-            for values in (odometry.position_in_world, odometry.quaternion, self._look,
-                           self._speed))
-        joints = held(self._recording.joints.time, self._recording.joints.position, at)[0]
-        picture = Image.fromarray(self._camera.drawn(place, quaternion, joints, look_at=look))
-        words = [event.message for event in self._recording.inhibition if event.time <= time]
+    def draw(time: float) -> Frame:
+        at = np.array([time])
+        place, quaternion, look, speed = (held(odometry.time, values, at)[0] for values in moving)
+        angles = held(joints.time, joints.position, at)[0]
+        picture = Image.fromarray(camera.drawn(place, quaternion, angles, look_at=look))
+        words = [event.message for event in recording.inhibition if event.time <= time]
         left = (words[-1] if words else '').replace('_', ' ')
         right = f'{round(float(speed[0]), 2) + 0.0:.2f} m/s   {time:.1f} s'
-        pen, margin = ImageDraw.Draw(picture), self._margin
-        width = pen.textlength(right, font=self._font)
-        for x, text in ((margin, left), (picture.width - margin - width, right)):
-            pen.text((x, margin), text, font=self._font, fill=INK, stroke_width=2,
-                     stroke_fill=OUTLINE)
+        pen = ImageDraw.Draw(picture)
+        end = picture.width - margin - pen.textlength(right, font=font)
+        for x, text in ((margin, left), (end, right)):
+            pen.text((x, margin), text, font=font, fill=INK, stroke_width=2, stroke_fill=OUTLINE)
         return np.asarray(picture, dtype=np.uint8)
+
+    return draw
 
 
 def film_run(run: Path, path: Path, shot: Shot | None = None) -> int:

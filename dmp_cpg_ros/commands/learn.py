@@ -12,8 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from dmp_cpg_ros.commands.demonstration_files import read_demonstration
-from dmp_cpg_ros.commands.motion_demonstrations import read_motion
+from dmp_cpg_ros.commands.demonstration_files import read_demonstration, read_motion
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning import discrete, rhythmic
@@ -81,9 +80,9 @@ def _motion(options: argparse.Namespace) -> int:
     if len(heights) > 1:
         raise DataError('a motion is learned from walks of one robot')
     bases = 25 if options.bases == 'auto' else options.bases
-    gains = {'stiffness': options.stiffness, 'damping': options.damping}
-    primitive, errors = learn_motion(
-        feet, heights.pop(), bases, **{k: v for k, v in gains.items() if v is not None})
+    gains = {name: value for name in ('stiffness', 'damping')
+             if (value := getattr(options, name)) is not None}
+    primitive, errors = learn_motion(feet, heights.pop(), bases, **gains)
     motion = LearnedMotion(primitive)
     save_primitive(primitive, options.motion)
     stride, side, lift = errors.reshape(-1, 3).max(axis=0)

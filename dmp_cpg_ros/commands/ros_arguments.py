@@ -17,9 +17,8 @@ from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 BAD_INPUT = 2
 """Exit status of a command whose arguments or files cannot be used."""
 
-LEVELS = {'debug': logging.DEBUG, 'info': logging.INFO, 'warn': logging.WARNING,
-          'error': logging.ERROR, 'fatal': logging.CRITICAL}
-"""Log levels of ROS as those of Python."""
+LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
+"""Log levels of ROS; Python's have the same names."""
 
 VALUED = {'-p': '--param', '-r': '--remap', '-e': '--enclave', '--param': '--param',
           '--remap': '--remap', '--params-file': '--params-file', '--log-level': '--log-level',
@@ -150,10 +149,8 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
     ros: list[str] = []
     into = own
     for argument in arguments:
-        if argument == '--ros-args':
-            into = ros
-        elif argument == '--' and into is ros:
-            into = own
+        if argument == '--ros-args' or (argument == '--' and into is ros):
+            into = own if argument == '--' else ros
         else:
             into.append(argument)
     return own, ros
@@ -189,5 +186,5 @@ def _read(arguments: list[str]) -> RosArguments:
             level = value.rpartition(':=')[2].lower()
             if level not in LEVELS:
                 raise ParameterError(f"'{value}' is no log level; valid are {', '.join(LEVELS)}")
-            logging.getLogger().setLevel(LEVELS[level])
+            logging.getLogger().setLevel(level.upper())
     return read

@@ -13,29 +13,20 @@ import json
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext, find_parameter
 from dmp_cpg_ros.analysis.pictures import Draw
 from dmp_cpg_ros.configuration import find_config, first_free
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
-from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
 from dmp_cpg_ros.suite import load_gait, load_gaits, node_sets
 from dmp_cpg_ros.suite_table import RECORDER, instances
-
-Array = NDArray[np.float64]
-
-T = TypeVar('T')
-P = TypeVar('P', bound=Parameters)
 
 _log = logging.getLogger(__name__)
 
@@ -145,12 +136,12 @@ def run_context(
     MissingFileError, ParameterError
         If ``robot_file`` cannot be used.
     """
-    robot, path = _robot(robot_file, find_parameter(parameters, 'robot'))
-    name = find_parameter(parameters, 'gait')
+    named, name = find_parameter(parameters, 'robot'), find_parameter(parameters, 'gait')
     file = find_parameter(parameters, 'gaits_file', 'gaits.yaml')
-    unknown: tuple[Gait | None, dict[str, Gait]] = (None, {})
-    gait, gaits = unknown if name is None else _or(
-        unknown, 'phase offsets are taken from the recording',
+    robot, path = _robot(robot_file) if robot_file is not None else _or(
+        (None, None), "what needs the robot's geometry is left out", lambda: _robot(named))
+    gait, gaits = (None, {}) if name is None else _or(
+        (None, {}), 'phase offsets are taken from the recording',
         lambda: (load_gait(name, file), load_gaits(file)))
     inhibition = _or(InhibitionParameters(), 'the region C is drawn with default parameters',
                      lambda: _parameter_set(InhibitionParameters, parameters))
@@ -163,7 +154,7 @@ def run_context(
 def picture_taker(robot_path: Path | None, world: World | None = None) -> Draw:
     """Return a function that draws poses of a robot, or says why it cannot and draws nothing."""
 
-    def draw(positions: Array, quaternions: Array, joints: Array) -> Sequence[Any]:
+    def draw(positions: Any, quaternions: Any, joints: Any) -> Sequence[Any]:
         try:
             from dmp_cpg_ros.robot.camera import pose_pictures
 
@@ -175,33 +166,23 @@ def picture_taker(robot_path: Path | None, world: World | None = None) -> Draw:
     return draw
 
 
-def _robot(
-    robot_file: Path | str | None, named: str | None
-) -> tuple[RobotDescription | None, Path | None]:
-    """Read the robot that walked; one that only a parameter names may be missing here."""
-    try:
-        from dmp_cpg_ros.robot.model_reader import load_description
+def _robot(name: Path | str | None) -> tuple[RobotDescription, Path | None]:
+    from dmp_cpg_ros.robot.model_reader import load_description
 
-        name = robot_file or named
-        path = None if name is None else find_config(name)
-        return load_description(path), path
-    except (DmpCpgError, ImportError) as error:
-        if robot_file is not None:
-            raise
-        _log.warning("what needs the robot's geometry is left out: %s", error)
-        return None, None
+    path = None if name is None else find_config(name)
+    return load_description(path), path
 
 
-def _or(usual: T, without: str, read: Callable[[], T]) -> T:
+def _or(usual: Any, without: str, read: Callable[[], Any]) -> Any:
     """Return what is read, or what is usual after a warning that says what is done without."""
     try:
         return read()
-    except DmpCpgError as error:
+    except (DmpCpgError, ImportError) as error:
         _log.warning('%s: %s', without, error)
         return usual
 
 
-def _parameter_set(kind: type[P], parameters: Mapping[str, Any] | None) -> P:
+def _parameter_set(kind: type[Any], parameters: Mapping[str, Any] | None) -> Any:
     """Collect the parameters of a set from wherever they stand; defaults for those that do not."""
     values = {field.name: find_parameter(parameters, field.name)
               for field in dataclasses.fields(kind)}
