@@ -158,9 +158,8 @@ def parse_yaml(text: str, where: str) -> Any:
         raise DataError(f'{where}, line {line}: not YAML in UTF-8: {error.reason}') from error
 
 
-def node_parameters(
-    content: Mapping[str, Any], node_name: str, path: str | Path
-) -> dict[str, Any]:
+def node_parameters(content: Mapping[str, Any], node_name: str, path: str | Path
+                    ) -> dict[str, Any]:
     """Pick the parameters of one node from a ROS 2 parameter file, as the node itself would.
 
     Of the sections that mean the node (its own, ``/**``, ``/**/name`` ...) the later one in the
@@ -248,7 +247,7 @@ def _value(node: yaml.Node) -> Any:
                            f"{', '.join(_SCALARS)}")
     try:
         return _SCALARS[kind][1](node.value)
-    except ValueError as error:
+    except (KeyError, ValueError) as error:
         raise _error(node, f'no value of type {kind}: {error}') from error
 
 
@@ -266,19 +265,11 @@ def _whole(text: str) -> int:
     return int(value)
 
 
-def _truth(text: str) -> bool:
-    """``true``, ``yes``, ``on`` or their opposites."""
-    if not _BOOL.fullmatch(text):
-        raise ValueError('valid are true and false')
-    return text.lower() in ('true', 'yes', 'on')
-
-
 _TAG = 'tag:yaml.org,2002:'
-_BOOL = re.compile('(?i:true|false|yes|no|on|off)')
 _SCALARS: dict[str, tuple[str | None, Callable[[str], Any]]] = {
     'str': (None, str),
     'null': ('~|null|Null|NULL|', lambda _: None),
-    'bool': (_BOOL.pattern, _truth),
+    'bool': ('(?i:true|false|yes|no|on|off)', lambda text: _Composer.bool_values[text.lower()]),
     'int': ('[-+]?(0[0-7]*|[1-9][0-9]*|0x[0-9a-fA-F]+)', _whole),
     'float': (r'[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?\.(?i:inf)|\.(?i:nan)',
               lambda text: float(re.sub(r'\.(?=[iInN])', '', text)))}

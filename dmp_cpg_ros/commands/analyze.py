@@ -24,18 +24,11 @@ BAG_ALONE = {'note': 'made from a bag alone: versions, commit and host are those
 
 
 def analyze_run(
-    run_dir: Path | str,
-    *,
-    out: Path | str | None = None,
-    robot_file: Path | str | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    certificate: Sequence[Any] | None = None,
-    seeds: Mapping[str, int] | None = None,
-    lock_step: bool | None = None,
-    pictures: bool = True,
-    report: bool = True,
-    **manifest_facts: Any,
-) -> RunResults:
+        run_dir: Path | str, *, out: Path | str | None = None,
+        robot_file: Path | str | None = None, parameters: Mapping[str, Any] | None = None,
+        certificate: Sequence[Any] | None = None, seeds: Mapping[str, int] | None = None,
+        lock_step: bool | None = None, pictures: bool = True, report: bool = True,
+        **manifest_facts: Any) -> RunResults:
     """Analyze a run and write its folder.
 
     Parameters
@@ -83,9 +76,8 @@ def analyze_run(
         parameters, seeds, payload_digests(bag) if lock_step else None, lock_step=lock_step,
         robot=find_parameter(parameters, 'robot') if context.robot is None else context.robot.name,
         **(BAG_ALONE if parameters is None else {}), **manifest_facts)
-    draw = None
-    if pictures and report and context.robot is not None:
-        draw = picture_taker(robot_path, context.world)
+    drawn = pictures and report and context.robot is not None
+    draw = picture_taker(robot_path, context.world) if drawn else None
     folder = Path(out) if out is not None else run or _beside(bag)
     return write_results(folder, recording, context, manifest, certificate, draw, report)
 

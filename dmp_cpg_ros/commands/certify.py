@@ -14,11 +14,8 @@ from typing import Any
 from dmp_cpg_ros.analysis.strict_json import to_json, write_json
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.certificates import inequality, proof, suggest, votes
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
-from dmp_cpg_ros.core.certificates.inequality import Inequality
-from dmp_cpg_ros.core.certificates.proof import proof_of
-from dmp_cpg_ros.core.certificates.suggest import Suggestion, suggest_gains
-from dmp_cpg_ros.core.certificates.votes import VotesNeeded, votes_needed
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.reference.operating_range import operating_range
@@ -56,23 +53,23 @@ def _certify(options: argparse.Namespace, ros: RosArguments) -> int:
     suite = load_suite(options.file or ros.parameters_file, overrides, ros.namespace)
     p, running = suite.parameters, running_parameters(suite)
     network = running['network']
-    votes = votes_needed(network, p.inhibition, p.voting,
-                         operating_range(network, p.inhibition, p.reference))
+    span = operating_range(network, p.inhibition, p.reference)
+    needed = votes.votes_needed(network, p.inhibition, p.voting, span)
     certificate = certify(**running, voting=p.voting)
-    suggestion = suggest_gains(**running, voting=p.voting) if options.suggest else None
+    suggestion = suggest.suggest_gains(**running, voting=p.voting) if options.suggest else None
     if options.proof is not None and certificate.holds:
         if p.voting.voting or p.canonical.contact_feedback:
             raise ParameterError('voting and contact_feedback have no exact proof; --proof needs '
                                  'both to be off')
-        write_json(options.proof, proof_of(**running))
+        write_json(options.proof, proof.proof_of(**running))
     if options.json:
-        content = _as_mapping(suite, certificate, votes)
+        content = _mapping(suite, certificate, needed)
         if options.suggest:
             content['suggestion'] = suggestion and {
                 name: getattr(suggestion, name) for name in ('coupling_gain', 'inhibition_gain')}
         print(to_json(content), end='')
     else:
-        lines = _report(suite, certificate, votes)
+        lines = _report(suite, certificate, needed)
         print('\n'.join([*lines, '', *_suggested(suggestion)] if options.suggest else lines))
     for entry in certificate.failing:
         print(f'certify: fails: {entry.explained()}', file=sys.stderr)
@@ -91,7 +88,7 @@ def running_parameters(suite: Suite) -> dict[str, Any]:
             'leg': p.leg, 'posture': p.posture, 'tick_s': suite.tick_ns * 1e-9}
 
 
-def _report(suite: Suite, certificate: Certificate, votes: VotesNeeded) -> list[str]:
+def _report(suite: Suite, certificate: Certificate, needed: votes.VotesNeeded) -> list[str]:
     lines = [f'{suite.file}: {suite.gait.name} at up to {certificate.omega_max:.4g} rad/s, '
              f'{1e9 / suite.tick_ns:g} Hz', '', *_table(certificate.inequalities)]
     if certificate.rest_phase:
@@ -104,11 +101,11 @@ def _report(suite: Suite, certificate: Certificate, votes: VotesNeeded) -> list[
                f'holds; contraction under inhibition is of {certificate.contraction_grade} grade; '
                f"sampled, not proved: {', '.join(certificate.sampled) or 'nothing'}")
     voting = 'on' if suite.parameters.voting.voting else 'off'
-    return [*lines, '', f'voting is {voting}; {_votes(votes)}', _vote_gains(votes), '',
+    return [*lines, '', f'voting is {voting}; {_votes(needed)}', _vote_gains(needed), '',
             f'certificate: {verdict}']
 
 
-def _table(inequalities: Sequence[Inequality]) -> list[str]:
+def _table(inequalities: Sequence[inequality.Inequality]) -> list[str]:
     """Two lines for each inequality: both sides with the margin, and what it means."""
     rows = [('inequality', '', 'left side', 'right side', 'margin', 'unit', 'grade')]
     rows += [(entry.name,
@@ -121,25 +118,25 @@ def _table(inequalities: Sequence[Inequality]) -> list[str]:
     return [head, *(line for pair in zip(lines, told, strict=True) for line in pair)]
 
 
-def _votes(votes: VotesNeeded) -> str:
+def _votes(needed: votes.VotesNeeded) -> str:
     """How many legs can stop the gait by their votes."""
-    alone = ('certainly stops' if votes.certain == 1 else
-             'may stop' if votes.powerless == 0 else 'cannot stop')
-    needed = 'no number of legs is certain to be enough' if votes.certain is None else (
-        f'votes needed: {votes.certain} of {len(LEGS)}')
-    return (f'a full vote has the weight {votes.clamp.limit:.4g}, a gain of '
-            f'{votes.clamp.gain:.4g} 1/s: {needed}; {votes.powerless} or fewer cannot stop the '
+    alone = ('certainly stops' if needed.certain == 1 else
+             'may stop' if needed.powerless == 0 else 'cannot stop')
+    number = ('no number of legs is certain to be enough' if needed.certain is None else
+              f'votes needed: {needed.certain} of {len(LEGS)}')
+    return (f'a full vote has the weight {needed.clamp.limit:.4g}, a gain of '
+            f'{needed.clamp.gain:.4g} 1/s: {number}; {needed.powerless} or fewer cannot stop the '
             f'gait, one leg alone {alone} it')
 
 
-def _vote_gains(votes: VotesNeeded) -> str:
+def _vote_gains(needed: votes.VotesNeeded) -> str:
     enough, too_weak = (', '.join(f'{gain:.4g}' for gain in gains)
-                        for gains in (votes.enough, votes.too_weak))
+                        for gains in (needed.enough, needed.too_weak))
     return (f'gains of each from which 1, 2, ... votes certainly stop it: {enough} 1/s; below '
             f'which they cannot: {too_weak} 1/s')
 
 
-def _suggested(suggestion: Suggestion | None) -> list[str]:
+def _suggested(suggestion: suggest.Suggestion | None) -> list[str]:
     if suggestion is None:
         return ['no coupling and inhibition gains within their ranges make it hold: change what '
                 'the failing inequality names']
@@ -149,12 +146,12 @@ def _suggested(suggestion: Suggestion | None) -> list[str]:
             f'    inhibition_gain: {suggestion.inhibition_gain:g}    # [1/s]']
 
 
-def _as_mapping(suite: Suite, certificate: Certificate, votes: VotesNeeded) -> dict[str, Any]:
+def _mapping(suite: Suite, certificate: Certificate, needed: votes.VotesNeeded) -> dict[str, Any]:
     return {'file': str(suite.file), 'gait': suite.gait.name, 'tick_s': suite.tick_ns * 1e-9,
             **certificate.as_mapping(),
-            'votes': {'limit': votes.clamp.limit, 'gain': votes.clamp.gain,
-                      'needed': votes.certain, 'powerless': votes.powerless,
-                      'enough': votes.enough, 'too_weak': votes.too_weak}}
+            'votes': {'limit': needed.clamp.limit, 'gain': needed.clamp.gain,
+                      'needed': needed.certain, 'powerless': needed.powerless,
+                      'enough': needed.enough, 'too_weak': needed.too_weak}}
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -18,11 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis.bag import decoded, find_bag, opened
+from dmp_cpg_ros.analysis import bag, episodes, motion
 from dmp_cpg_ros.analysis.context import find_parameter
-from dmp_cpg_ros.analysis.episodes import GaitRow, gait_rows
 from dmp_cpg_ros.analysis.loading import load_recording
-from dmp_cpg_ros.analysis.motion import common_rows, feet_in_base, held, rotations, stretches
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.commands.run_folder import read_json, run_context
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
@@ -38,8 +36,7 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale, nomin
 Array = NDArray[np.float64]
 
 _TIME_NAMES = ('t', 'time', 'time_s', 'timestamp', 'stamp')
-_ENDINGS = ('', '_velocity', '_acceleration')
-_ARRAYS = ('positions', 'velocities', 'accelerations')
+_ARRAYS = {'positions': '', 'velocities': '_velocity', 'accelerations': '_acceleration'}
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
 
 SLOWEST = 0.1
@@ -130,12 +127,11 @@ def _from_csv(path: Path) -> Demonstration:
     if data.ndim != 2 or data.shape[1] != len(header):
         raise DataError(f"'{path}' must have {len(header)} numbers in every row")
     columns = dict(zip(header[1:], data.T[1:], strict=True))
-    derived = {base + ending for base in columns for ending in _ENDINGS[1:]}
+    derived = {base + ending for base in columns for ending in _ARRAYS.values() if ending}
     names = tuple(name for name in columns if name not in derived)
     parts: dict[str, Any] = {
         field: np.stack([columns[name + ending] for name in names], axis=1)
-        for field, ending in zip(_ARRAYS, _ENDINGS, strict=True)
-        if all(name + ending in columns for name in names)}
+        for field, ending in _ARRAYS.items() if all(name + ending in columns for name in names)}
     return Demonstration(data[:, 0], **parts, names=names)
 
 
@@ -156,9 +152,8 @@ def _from_numpy(path: Path) -> Demonstration:
                 raise DataError(f"'{path}' has no array '{needed}'; needed are times, positions, "
                                 'possible velocities, accelerations, names')
         try:
-            arrays: dict[str, Any] = {
-                name: content[name] for name in ('times', *_ARRAYS, 'names')
-                if name in content.files}
+            arrays: dict[str, Any] = {name: content[name] for name in ('times', *_ARRAYS, 'names')
+                                      if name in content.files}
         except ValueError as error:
             raise DataError(f"'{path}' holds more than plain arrays: {error}") from error
     names = tuple(map(str, arrays.pop('names', ())))
@@ -168,7 +163,7 @@ def _from_numpy(path: Path) -> Demonstration:
 def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:
     """Positions by joint name at every stamp at which all wanted joints are known."""
     samples: dict[int, dict[str, tuple[float, float | None]]] = {}
-    with opened(find_bag(path)) as reader:
+    with bag.opened(bag.find_bag(path)) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         full = next((t for t in kinds if t == topic or t.endswith('/' + topic.lstrip('/'))), None)
         usable = sorted(t for t, kind in kinds.items() if kind == _JOINT_STATE)
@@ -176,7 +171,7 @@ def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:
             raise DataError(f"'{path}' has no topic '{topic}' of joint states; valid are "
                             f'{", ".join(usable) or "none in this bag"}')
         chosen = [c for c in reader.connections if c.topic == full]
-        for _, bag_ns, message in decoded(reader, chosen, Counter()):
+        for _, bag_ns, message in bag.decoded(reader, chosen, Counter()):
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             samples.setdefault(stamp or bag_ns, {}).update(
                 (name, (position, speed)) for name, position, speed
@@ -224,14 +219,14 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
     """
     if topic not in ('joint_targets', 'joint_states'):
         raise DataError(f"a motion is learned from joint_targets or joint_states, not '{topic}'")
-    recording, bag = load_recording(path), find_bag(path)
-    run = (bag if bag.is_dir() else bag.parent).parent
+    recording, file = load_recording(path), bag.find_bag(path)
+    run = (file if file.is_dir() else file.parent).parent
     joints = recording.targets if topic == 'joint_targets' else recording.joints
     canonical = recording.canonical
     walked = next((gait.before for gait in canonical.gaits if not gait.after), 'amble')
     parameters = read_json(run / 'manifest.json').get('parameters') or {'gait': walked}
     context, _ = run_context(parameters, robot_file)
-    rows, at, attitude = common_rows(joints.time, canonical.time, recording.odometry.time)
+    rows, at, attitude = motion.common_rows(joints.time, canonical.time, recording.odometry.time)
     if not len(rows):
         raise DataError(f"'{path}': no stamp has all of {topic}, canonical_state and odom")
     missing = [JOINT_NAMES[j] for j in np.flatnonzero(np.isnan(joints.position[rows]).any(axis=0))]
@@ -239,7 +234,7 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
         raise DataError(f"'{path}': {topic} lacks the joints {', '.join(missing)}")
     if context.robot is None or context.gait is None:
         raise DataError(f"'{path}': the robot or the gait that walked is not known here")
-    gaits = gait_rows(recording, context)
+    gaits = episodes.gait_rows(recording, context)
     if gaits is None or not recording.reference.time.size:
         raise DataError(f"'{path}': the reference or the gait in force was not recorded")
     times, scale = canonical.time[at], body_scale(context.robot)
@@ -247,14 +242,14 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
     angles = joints.position[rows]
     if topic == 'joint_targets':
         angles = _goals(times, angles, joints.velocity[rows], parameters)
-    up = rotations(recording.odometry.quaternion[attitude])[:, 2]
+    up = motion.rotations(recording.odometry.quaternion[attitude])[:, 2]
     feet: list[list[FootSamples]] = [[] for _ in context.robot.legs]
-    for first, past in stretches(steady):
+    for first, past in motion.stretches(steady):
         part = slice(int(np.searchsorted(times, times[first] + SETTLING)), past)
         if times[past - 1] - times[first] < SETTLING + SHORTEST:
             continue
         for i, leg in enumerate(context.robot.legs):
-            foot = feet_in_base(leg, angles[part, 3 * i : 3 * i + 3])
+            foot = motion.feet_in_base(leg, angles[part, 3 * i : 3 * i + 3])
             away = foot - nominal_foothold(context.robot, leg.name)
             away[:, 2] = np.sum(up[part] * foot, axis=1) + bounce[part, i]
             feet[i].append(FootSamples(position[part, i], duty[part], cycle[part], away))
@@ -265,15 +260,15 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
     return feet, context.robot
 
 
-def _planned(recording: Recording, gaits: list[GaitRow], at: NDArray[np.int64], scale: BodyScale
-             ) -> tuple[Array, Array, Array, Array, NDArray[np.bool_]]:
+def _planned(recording: Recording, gaits: list[episodes.GaitRow], at: NDArray[np.int64],
+             scale: BodyScale) -> tuple[Array, Array, Array, Array, NDArray[np.bool_]]:
     """Cycle positions (m, 4), duty, cycle, bounce (m, 4) that the gaits plan at rows of the
     canonical states, and whether the robot does so steadily; NaN within changes of gait.
     """
     canonical, reference = recording.canonical, recording.reference
     in_force = [entry.gait for entry in gaits for _ in range(entry.rows.start, entry.rows.stop)]
     times = canonical.time[at]
-    r, before = (held(reference.time, reference.value, times - ago) for ago in (0.0, 0.1))
+    r, before = (motion.held(reference.time, reference.value, times - ago) for ago in (0.0, 0.1))
     speed = np.array([scale.foot_speed(*row) for row in r])
     phi, rate = phase(canonical.x[at]), phase_rate(canonical.x[at], canonical.x_dot[at])
     omega, duty = np.full((2, len(at)), np.nan)

@@ -169,8 +169,7 @@ def checked_film_path(path: Path) -> Path:
     return path
 
 
-def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame],
-               fps: float) -> None:
+def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame], fps: float) -> None:
     """Write frames as they come.
 
     Parameters

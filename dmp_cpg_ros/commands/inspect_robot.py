@@ -76,29 +76,25 @@ def summary(found: Inspection) -> str:
     d, legs = found.description, found.description.legs
     knees = {KNEES[leg.knee_sign] for leg in legs}
     lengths = [sum((part @ part) ** 0.5 for part in (leg.thigh, leg.shank)) for leg in legs]
-    lines = [
+    limits, kp, kd = (', '.join(f'{value:.{digits}f}' for value in values) for values, digits in (
+        (legs[0].torque_limit, 1), (d.kp, 0), (d.kd, 1)))
+    others = f'\njoints of no leg, left alone: {", ".join(found.others)}' if found.others else ''
+    return (
         f'{d.name}: four legs, {d.mass:.1f} kg, base {d.stance_height:.3f} m over the ground when '
-        'it stands',
-        f'legs of {sum(lengths) / 4:.3f} m, knees bend {" and ".join(sorted(knees))}, feet of '
-        f'{1e3 * legs[0].foot_radius:.0f} mm radius',
-        'torque limits ' + ', '.join(f'{t:.1f}' for t in legs[0].torque_limit)
-        + ' N m; drive gains ' + ', '.join(f'{k:.0f}' for k in d.kp) + ' N m/rad, '
-        + ', '.join(f'{k:.1f}' for k in d.kd) + ' N m s/rad']
-    if found.others:
-        lines.append(f'joints of no leg, left alone: {", ".join(found.others)}')
-    return '\n'.join(lines)
+        f'it stands\nlegs of {sum(lengths) / 4:.3f} m, knees bend {" and ".join(sorted(knees))}, '
+        f'feet of {1e3 * legs[0].foot_radius:.0f} mm radius\ntorque limits {limits} N m; drive '
+        f'gains {kp} N m/rad, {kd} N m s/rad{others}')
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog='inspect_robot',
-        description='Find the legs of a quadruped in an MJCF and write its robot file, which '
-        'walk --robot takes.')
-    parser.add_argument('model', metavar='FILE.xml', type=Path, help='MJCF file')
-    parser.add_argument('--output', metavar='FILE.yaml', type=Path,
-                        help='where to write the robot file (default: print it)')
-    parser.add_argument('--picture', metavar='FILE.png', type=Path,
-                        help='draw the robot with its legs in colours')
+    parser = argparse.ArgumentParser(prog='inspect_robot', description=(
+        'Find the legs of a quadruped in an MJCF and write its robot file, which walk --robot '
+        'takes.'))
+    add = parser.add_argument
+    add('model', metavar='FILE.xml', type=Path, help='MJCF file')
+    add('--output', metavar='FILE.yaml', type=Path,
+        help='where to write the robot file (default: print it)')
+    add('--picture', metavar='FILE.png', type=Path, help='draw the robot with its legs in colours')
     return parser
 
 

@@ -15,9 +15,8 @@ import numpy as np
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration, read_motion
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.learning import discrete, rhythmic
+from dmp_cpg_ros.core.learning import discrete, period, rhythmic
 from dmp_cpg_ros.core.learning.learning import METHODS, FitOptions, ranges
-from dmp_cpg_ros.core.learning.period import spread_between_cycles
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
@@ -52,7 +51,12 @@ def _main(options: argparse.Namespace, _: RosArguments) -> int:
         return _motion(options)
     if options.out is None:
         raise ParameterError('name the file to write, with --out FILE or --motion FILE')
-    demonstrations = [_read(path, options) for path in options.demonstrations]
+    demonstrations = [
+        read_demonstration(path, options.joints, options.topic or 'joint_states', options.start,
+                           options.end) for path in options.demonstrations]
+    if options.positions_only:
+        demonstrations = [Demonstration(read.times, read.positions, names=read.names)
+                          for read in demonstrations]
     began = perf_counter()
     primitive, errors = _learn(demonstrations, options)
     seconds = perf_counter() - began
@@ -94,14 +98,6 @@ def _motion(options: argparse.Namespace) -> int:
     return 0
 
 
-def _read(path: Path, options: argparse.Namespace) -> Demonstration:
-    topic = options.topic or 'joint_states'
-    read = read_demonstration(path, options.joints, topic, options.start, options.end)
-    if options.positions_only:
-        return Demonstration(read.times, read.positions, names=read.names)
-    return read
-
-
 def _learn(demonstrations: list[Demonstration], options: argparse.Namespace
            ) -> tuple[Primitive, np.ndarray]:
     fit = FitOptions(options.method, options.ridge, options.overlap)
@@ -121,7 +117,7 @@ def _irregularity(demonstrations: list[Demonstration], primitive: Primitive) -> 
     if (isinstance(primitive, DiscretePrimitive) or len(demonstrations) > 1
             or first.duration < 2.0 * primitive.period):
         return None
-    return spread_between_cycles(first, primitive.period) / ranges([first])
+    return period.spread_between_cycles(first, primitive.period) / ranges([first])
 
 
 def _listed(primitive: Primitive, shares: np.ndarray) -> str:
@@ -144,7 +140,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--bases', type=_bases, default=25,
         help="number of bases, or 'auto' to choose it by the held-out error (default: 25)")
     add('--period', metavar='S', type=float, help='period of a rhythm (default: found from data)')
-    add('--joints', metavar='A,B', type=_names, default=(), help='joints to take (default: all)')
+    add('--joints', metavar='A,B', type=_words, default=(), help='joints to take (default: all)')
     add('--topic', help='topic of a bag (default: joint_states; joint_targets for --motion)')
     add('--start', metavar='S', type=float, help='take samples from here on, after the first [s]')
     add('--end', metavar='S', type=float, help='take samples up to here, after the first [s]')
@@ -165,7 +161,7 @@ def _bases(text: str) -> int | str:
     return text if text == 'auto' else int(text)
 
 
-def _names(text: str) -> tuple[str, ...]:
+def _words(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(',') if name.strip())
 
 

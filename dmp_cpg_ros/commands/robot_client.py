@@ -216,8 +216,7 @@ def _parser() -> argparse.ArgumentParser:
         description='Command a running suite (start one with walk). It is looked for in the '
         'domain of ROS_DOMAIN_ID; --ros-args are taken as by every node.',
         epilog='Exit status: 0 when it was done, 1 when no suite is found or it refuses, 2 '
-        'for bad input, 130 for Ctrl-C before it was done.',
-    )
+        'for bad input, 130 for Ctrl-C before it was done.')
     parser.add_argument('--namespace', metavar='NAME', help="the suite's namespace")
     parser.add_argument('--wait', metavar='SECONDS', type=_positive, default=10.0,
                         help='how long to look for the suite (default: 10)')

@@ -82,9 +82,8 @@ def run_command(parser: argparse.ArgumentParser, arguments: Sequence[str] | None
     return BAD_INPUT
 
 
-def parse_arguments(
-    parser: argparse.ArgumentParser, arguments: Sequence[str] | None, *, parameters: bool = False
-) -> tuple[argparse.Namespace, RosArguments]:
+def parse_arguments(parser: argparse.ArgumentParser, arguments: Sequence[str] | None, *,
+                    parameters: bool = False) -> tuple[argparse.Namespace, RosArguments]:
     """Parse a command line with ``--ros-args``; exits with status 2 where it is wrong.
 
     Parameters

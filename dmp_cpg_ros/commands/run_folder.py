@@ -65,9 +65,8 @@ def make_run_folder(out: Path | None) -> Path:
         raise DataError(f'cannot make the folder of the run: {error}') from error
 
 
-def resolved_parameters(
-    file: Path, overrides: Mapping[str, Any], namespace: str = ''
-) -> dict[str, dict[str, Any]]:
+def resolved_parameters(file: Path, overrides: Mapping[str, Any], namespace: str = ''
+                        ) -> dict[str, dict[str, Any]]:
     """Every parameter of every node that walks by node name, as it will run.
 
     Parameters
@@ -112,9 +111,8 @@ def read_json(path: Path) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def run_context(
-    parameters: Mapping[str, Any] | None, robot_file: Path | str | None = None
-) -> tuple[RunContext, Path | None]:
+def run_context(parameters: Mapping[str, Any] | None, robot_file: Path | str | None = None
+                ) -> tuple[RunContext, Path | None]:
     """Find out what walked.
 
     Parameters

@@ -28,9 +28,7 @@ from std_srvs.srv import Trigger
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, already_running, claim, claimed
-from dmp_cpg_ros.nodes.framework.execution import make_executor, prepare_middleware
-from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers
+from dmp_cpg_ros.nodes.framework import claims, execution, health
 from dmp_cpg_ros.nodes.scenario.lying_down import LyingDown
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES, instances
@@ -92,22 +90,23 @@ def alone_in_domain(namespace: str) -> Iterator[None]:
         If another has it, or nodes of one are in the graph, left over perhaps.
     """
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    prepare_middleware()
+    execution.prepare_middleware()
     context = Context()
     rclpy.init(context=context, args=[])
     try:
         domain = context.get_domain_id()
-        held = claim(f'{namespace}/suite', domain)
+        held = claims.claim(f'{namespace}/suite', domain)
         names = [f'{namespace}/{name}' for name in (*WALKING_NODES, RECORDER)]
         lookout = Node('lookout', context=context, namespace=namespace)
         # Claims tell at once of nodes on this machine; the graph, after a while, of all others.
-        others = claimed(names, domain) or _in_graph(lookout, names)
+        others = claims.claimed(names, domain) or _in_graph(lookout, names)
         lookout.destroy_node()
     finally:
         context.try_shutdown()
     with held:
         if others:
-            raise AlreadyRunningError(already_running(domain, f'nodes {", ".join(others)}'))
+            raise claims.AlreadyRunningError(
+                claims.already_running(domain, f'nodes {", ".join(others)}'))
         yield
 
 
@@ -161,7 +160,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
                 if kind.name == RECORDER or not composed:
                     group.start(name, kind.module, [*arguments, '-r', f'__node:={name}'])
             player = ScenarioPlayer(scenario, tick_ns, lock_step, say)
-            executor = make_executor('events')
+            executor = execution.make_executor('events')
             executor.add_node(player)
             # In lock-step no time passes that nobody asks for: nothing can fall.
             lying_down = None if lock_step else LyingDown(player, say)
@@ -219,8 +218,8 @@ class _Watch:
 
     def until_ready(self) -> None:
         """Ask every node whether it is active and connected until all say yes."""
-        deadline, tell = time.monotonic() + READY_WITHIN_S, Intervals(FIRST_WORD_S)
-        others = ReadinessOfOthers(self._player, list(self._transitions))
+        deadline, tell = time.monotonic() + READY_WITHIN_S, health.Intervals(FIRST_WORD_S)
+        others = health.ReadinessOfOthers(self._player, list(self._transitions))
         while (missing := others.missing()) or not self._player.connected():
             waiting = '; '.join(missing) or 'topics and services of the player'
             if time.monotonic() > deadline:

@@ -13,7 +13,6 @@ import tty
 from typing import Any
 
 from rclpy.task import Future
-from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, VelocityCommand
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader
@@ -28,8 +27,8 @@ STEPS = {'w': (0.1, 0.0), 's': (-0.1, 0.0), 'a': (0.0, 0.2), 'd': (0.0, -0.2)}
 ARROWS = {'A': 'w', 'B': 's', 'D': 'a', 'C': 'd'}
 """Last letter of what an arrow key sends, and the key that does the same."""
 
-MODES = {'u': 'stand_up', 'l': 'lie_down', 'r': 'recover'}
-"""Keys that call a service."""
+SERVICES = {' ': 'inhibit', 'u': 'stand_up', 'l': 'lie_down', 'r': 'recover'}
+"""Keys that call a service; the first stops the gait or starts it again."""
 
 HELP = """\
 w/s or up/down: faster, slower; a/d or left/right: turn; x: no velocity
@@ -53,7 +52,7 @@ class Teleop:
 
     def __init__(self, client: SuiteClient) -> None:
         """Create clients, and listen to the state of the stop."""
-        node, inhibit, gains = client.node, interface('inhibit'), InhibitionGainsReader()
+        node, gains = client.node, InhibitionGainsReader()
 
         def on_state(message: Any) -> None:
             self._word = read_state_word(message)
@@ -63,13 +62,14 @@ class Teleop:
 
         self.velocity = STILL
         self._word, self._requested, self._shown = '', False, ''
-        self._inhibit = node.create_client(inhibit.type, inhibit.name)
-        self._modes = {key: node.create_client(Trigger, name) for key, name in MODES.items()}
+        services = {key: interface(name) for key, name in SERVICES.items()}
+        self._clients = {key: node.create_client(service.type, service.name)
+                         for key, service in services.items()}
         for name, callback in (('inhibition_state', on_state), ('inhibition_gains', on_gains)):
             topic = interface(name)
             node.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
-        client.meet((*inhibit.publishers, *interface('stand_up').publishers),
-                    self._inhibit, *self._modes.values())
+        kinds = {kind for service in services.values() for kind in service.publishers}
+        client.meet(sorted(kinds), *self._clients.values())
 
     def press(self, key: str) -> None:
         """Take a key; unknown ones do nothing."""
@@ -79,11 +79,12 @@ class Teleop:
             self.velocity = (round(v_x + faster, 3), 0.0, round(yaw_rate + further, 3))
         elif key == 'x':
             self.velocity = STILL
-        elif key == ' ':
-            request = SetBool.Request(data=not self._requested)
-            self._inhibit.call_async(request).add_done_callback(self._answered)
-        elif key in self._modes:
-            self._modes[key].call_async(Trigger.Request()).add_done_callback(self._answered)
+        elif key in self._clients:
+            client = self._clients[key]
+            request = client.srv_type.Request()
+            if key == ' ':
+                request.data = not self._requested
+            client.call_async(request).add_done_callback(self._answered)
 
     def show(self) -> None:
         """Rewrite the last line of the terminal where it has changed."""

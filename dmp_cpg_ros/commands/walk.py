@@ -15,15 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dmp_cpg_ros.commands import film, ros_arguments, run_folder
 from dmp_cpg_ros.commands.analyze import analyze_run, print_facts
 from dmp_cpg_ros.commands.certify import running_parameters
-from dmp_cpg_ros.commands.ros_arguments import (
-    RosArguments,
-    checked_namespace,
-    read_parameter,
-    run_command,
-)
-from dmp_cpg_ros.commands.run_folder import make_run_folder, resolved_parameters, write_parameters
 from dmp_cpg_ros.configuration import config_folders, find_config, load_yaml, unused_sections
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
@@ -49,20 +43,20 @@ class _Plan:
     certificate: Certificate
     overrides: dict[str, Any]
     options: argparse.Namespace
-    ros: RosArguments
+    ros: ros_arguments.RosArguments
 
     def resolved(self, **more: Any) -> dict[str, dict[str, Any]]:
         """Every parameter of every node that walks, by the node's name."""
-        return resolved_parameters(
-            self.suite.file, {**self.overrides, **more}, self.ros.namespace)
+        overrides = {**self.overrides, **more}
+        return run_folder.resolved_parameters(self.suite.file, overrides, self.ros.namespace)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    return run_command(_parser(), arguments, _main, parameters=True)
+    return ros_arguments.run_command(_parser(), arguments, _main, parameters=True)
 
 
-def _main(options: argparse.Namespace, ros: RosArguments) -> int:
+def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
     plan = _planned(options, ros)
     for section in unused_sections(plan.suite.file, ros.namespace, KINDS):
         print(f"walk: '{plan.suite.file}': section '{section}' means no node in namespace "
@@ -74,13 +68,12 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
         return _walk(plan)
 
 
-def _planned(options: argparse.Namespace, ros: RosArguments) -> _Plan:
+def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _Plan:
     """Read everything; raises DmpCpgError for what cannot be run."""
     scenario = load_scenario(options.scenario)
-    overrides = {
-        **scenario.parameters, **motion_overrides(options.motion or ''), **ros.parameters,
-        **dict(map(read_parameter, options.set))}
-    ros.namespace = checked_namespace(options.namespace or ros.namespace)
+    overrides = {**scenario.parameters, **motion_overrides(options.motion or ''),
+                 **ros.parameters, **dict(map(ros_arguments.read_parameter, options.set))}
+    ros.namespace = ros_arguments.checked_namespace(options.namespace or ros.namespace)
     if options.parameters and ros.parameters_file:
         raise ParameterError('give --parameters or --params-file, not both')
     if options.robot is not None:
@@ -99,14 +92,14 @@ def _planned(options: argparse.Namespace, ros: RosArguments) -> _Plan:
             f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
             'proposes gains that hold; --set allow_uncertified:=true walks all the same)')
     if options.video:
-        _film_path(options.video, Path())
+        film.checked_film_path(Path(options.video))
     return _Plan(scenario, suite, certificate, overrides, options, ros)
 
 
 def _walk(plan: _Plan) -> int:
     """Run, record and report; returns the exit status."""
     begin, options = time.monotonic(), plan.options
-    folder = make_run_folder(options.out)
+    folder = run_folder.make_run_folder(options.out)
     print(f'{plan.scenario.name}: {plan.scenario.duration_s:g} s, {plan.suite.gait.name}, '
           f'{"lock-step" if options.lock_step else "real time"}, '
           f'{"one process" if options.composed else "a process per node"}, '
@@ -160,8 +153,9 @@ def _run(plan: _Plan, folder: Path) -> int:
     resolved[RECORDER] = {'output': str(folder / 'bag'),
                           'expected_nodes': [kind.name for kind in WALKING]}
     rules = [*ros.remappings, *namespace_rules(ros.namespace)]
-    arguments = ['--ros-args', '--params-file', str(write_parameters(folder, resolved)),
-                 *ros.others, *(word for name, to in rules for word in ('-r', f'{name}:={to}'))]
+    file = run_folder.write_parameters(folder, resolved)
+    arguments = ['--ros-args', '--params-file', str(file), *ros.others,
+                 *(word for name, to in rules for word in ('-r', f'{name}:={to}'))]
     try:
         run_suite(plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say,
                   lock_step=options.lock_step, composed=options.composed)
@@ -193,23 +187,11 @@ def _analyze(plan: _Plan, folder: Path) -> int:
     return FAILED if results.metrics['robot']['fell'] else OK
 
 
-def _film_path(given: str, folder: Path) -> Path:
-    """Return the film's file, by default in the run's folder; raises ParameterError before the
-    run when it could not be written after it.
-    """
-    from dmp_cpg_ros.commands.film import checked_film_path, has_encoder
-
-    return checked_film_path(
-        Path(given) if given else folder / f'walk.{"mp4" if has_encoder() else "gif"}')
-
-
 def _film(folder: Path, given: str) -> None:
     """Film the run; one that cannot be drawn here is no failure of the run."""
-    from dmp_cpg_ros.commands.film import film_run
-
+    path = Path(given) if given else folder / f'walk.{"mp4" if film.has_encoder() else "gif"}'
     try:
-        path = _film_path(given, folder)
-        print(f'video: {os.path.relpath(path)}, {film_run(folder, path)} frames')
+        print(f'video: {os.path.relpath(path)}, {film.film_run(folder, path)} frames')
     except (DmpCpgError, OSError) as error:
         print(f'walk: no video: {error}', file=sys.stderr)
 
