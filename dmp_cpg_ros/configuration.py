@@ -113,12 +113,10 @@ def load_yaml(path: str | Path) -> dict[str, Any]:
         raise MissingFileError(f"cannot read '{path}': {reason}") from error
     # Bytes that are no UTF-8 become characters that are no YAML.
     content = parse_yaml(data.decode(errors='surrogateescape'), f"'{path}'")
-    if content is None:
-        return {}
-    if not isinstance(content, dict):
+    if not isinstance(content, (dict, type(None))):
         raise DataError(f"'{path}', line 1: must be a mapping (name: value), "
                         f'not {type(content).__name__}')
-    return content
+    return content or {}
 
 
 def parse_yaml(text: str, where: str) -> Any:
@@ -216,11 +214,11 @@ class _Composer(yaml.SafeLoader):
     _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            raise _error(self.peek_event(),
-                         'an alias (*name) is not valid; write out what it stands for')
+        event = self.peek_event()
+        if isinstance(event, yaml.AliasEvent):
+            raise _error(event, 'an alias (*name) is not valid; write out what it stands for')
         if self._depth >= DEEPEST:
-            raise _error(self.peek_event(), f'nested deeper than {DEEPEST}')
+            raise _error(event, f'nested deeper than {DEEPEST}')
         self._depth += 1
         node = super().compose_node(parent, index)
         self._depth -= 1
@@ -319,10 +317,8 @@ def _sections(content: Mapping[str, Any], path: str | Path, prefix: str = ''
 def _flat(parameters: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for key, value in parameters.items():
-        if isinstance(value, Mapping):
-            flat.update(_flat(value, f'{prefix}{key}.'))
-        else:
-            flat[f'{prefix}{key}'] = value
+        name = f'{prefix}{key}'
+        flat.update(_flat(value, f'{name}.') if isinstance(value, Mapping) else {name: value})
     return flat
 
 

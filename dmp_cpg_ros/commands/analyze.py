@@ -78,7 +78,9 @@ def analyze_run(
         **(BAG_ALONE if parameters is None else {}), **manifest_facts)
     drawn = pictures and report and context.robot is not None
     draw = picture_taker(robot_path, context.world) if drawn else None
-    folder = Path(out) if out is not None else run or _beside(bag)
+    bag = bag.resolve()
+    beside = bag.with_name(f'{bag.name if bag.is_dir() else bag.stem}_analysis')
+    folder = Path(out) if out is not None else run or beside
     return write_results(folder, recording, context, manifest, certificate, draw, report)
 
 
@@ -110,12 +112,6 @@ def _run_of(bag: Path, given: Path) -> Path | None:
     folder = bag.resolve() if bag.is_dir() else bag.resolve().parent
     is_run = folder.name == 'bag' and (folder.parent / 'manifest.json').is_file()
     return folder.parent if is_run else None
-
-
-def _beside(bag: Path) -> Path:
-    """Folder for the results of a bare bag."""
-    bag = bag.resolve()
-    return bag.with_name(f'{bag.name if bag.is_dir() else bag.stem}_analysis')
 
 
 def _parser() -> argparse.ArgumentParser:

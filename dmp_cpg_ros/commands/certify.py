@@ -101,8 +101,11 @@ def _report(suite: Suite, certificate: Certificate, needed: votes.VotesNeeded) -
                f'holds; contraction under inhibition is of {certificate.contraction_grade} grade; '
                f"sampled, not proved: {', '.join(certificate.sampled) or 'nothing'}")
     voting = 'on' if suite.parameters.voting.voting else 'off'
-    return [*lines, '', f'voting is {voting}; {_votes(needed)}', _vote_gains(needed), '',
-            f'certificate: {verdict}']
+    enough, too_weak = (', '.join(f'{gain:.4g}' for gain in gains)
+                        for gains in (needed.enough, needed.too_weak))
+    return [*lines, '', f'voting is {voting}; {_votes(needed)}',
+            f'gains of each from which 1, 2, ... votes certainly stop it: {enough} 1/s; below '
+            f'which they cannot: {too_weak} 1/s', '', f'certificate: {verdict}']
 
 
 def _table(inequalities: Sequence[inequality.Inequality]) -> list[str]:
@@ -127,13 +130,6 @@ def _votes(needed: votes.VotesNeeded) -> str:
     return (f'a full vote has the weight {needed.clamp.limit:.4g}, a gain of '
             f'{needed.clamp.gain:.4g} 1/s: {number}; {needed.powerless} or fewer cannot stop the '
             f'gait, one leg alone {alone} it')
-
-
-def _vote_gains(needed: votes.VotesNeeded) -> str:
-    enough, too_weak = (', '.join(f'{gain:.4g}' for gain in gains)
-                        for gains in (needed.enough, needed.too_weak))
-    return (f'gains of each from which 1, 2, ... votes certainly stop it: {enough} 1/s; below '
-            f'which they cannot: {too_weak} 1/s')
 
 
 def _suggested(suggestion: suggest.Suggestion | None) -> list[str]:

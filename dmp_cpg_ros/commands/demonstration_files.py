@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 from pathlib import Path
@@ -89,10 +89,7 @@ def read_demonstration(path: Path, joints: Sequence[str] = (), topic: str = 'joi
         whole = _from_bag(path, topic, joints)
     else:
         raise DataError(f"'{path}' is of no known kind; valid are .csv, .npy, .npz and bags")
-    unknown = [name for name in joints if name not in whole.names]
-    if unknown:
-        valid = ', '.join(whole.names) or 'none, for the file names no joints'
-        raise DataError(f"'{path}' has no joint '{unknown[0]}'; valid are {valid}")
+    _check_joints(path, joints, whole.names)
     names = tuple(joints) or whole.names
     columns = [whole.names.index(name) for name in names] if names else slice(None)
     since = whole.times - whole.times[0]
@@ -100,6 +97,13 @@ def read_demonstration(path: Path, joints: Sequence[str] = (), topic: str = 'joi
     parts: dict[str, Any] = {field: values[rows][:, columns] for field in _ARRAYS
                              if (values := getattr(whole, field)) is not None}
     return replace(whole, times=whole.times[rows], names=names, **parts)
+
+
+def _check_joints(path: Path, joints: Iterable[str], known: Collection[str]) -> None:
+    for name in joints:
+        if name not in known:
+            valid = ', '.join(known) or 'none, for the file names no joints'
+            raise DataError(f"'{path}' has no joint '{name}'; valid are {valid}")
 
 
 def _from_csv(path: Path) -> Demonstration:
@@ -179,9 +183,7 @@ def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:
                 if name is not None and position is not None)
     known = dict.fromkeys(name for row in samples.values() for name in row)
     names = tuple(joints or known)
-    unknown = [name for name in names if name not in known]
-    if unknown:
-        raise DataError(f"'{path}' has no joint '{unknown[0]}'; valid are {', '.join(known)}")
+    _check_joints(path, names, known)
     stamps = sorted(stamp for stamp, row in samples.items() if row.keys() >= set(names))
     if not stamps:
         raise DataError(f"'{path}': no message on '{full}' holds all of {', '.join(names)}")

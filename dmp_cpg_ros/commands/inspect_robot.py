@@ -14,9 +14,6 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.inspector import Inspection, inspect_model
 
-KNEES = {-1: 'backwards', 1: 'forwards'}
-"""Sign of the knees' rotation to the way in which they bend."""
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
@@ -61,11 +58,9 @@ def robot_yaml(found: Inspection, folder: Path | None = None) -> str:
 
 def model_name(model: Path, folder: Path | None) -> str:
     """Name of a model in a robot file: inside a Python package, relative, or its full path."""
-    for entry in sys.path:
-        root = Path(entry).resolve() if entry else None
-        if root is not None and root.name in ('site-packages', 'dist-packages'):
-            if model.is_relative_to(root):
-                return f'package://{model.relative_to(root).as_posix()}'
+    for root in (Path(entry).resolve() for entry in sys.path if entry):
+        if root.name in ('site-packages', 'dist-packages') and model.is_relative_to(root):
+            return f'package://{model.relative_to(root).as_posix()}'
     if folder is not None and model.is_relative_to(folder.resolve()):
         return os.path.relpath(model, folder.resolve())
     return str(model)
@@ -74,7 +69,7 @@ def model_name(model: Path, folder: Path | None) -> str:
 def summary(found: Inspection) -> str:
     """What was found, in a few lines for people."""
     d, legs = found.description, found.description.legs
-    knees = {KNEES[leg.knee_sign] for leg in legs}
+    knees = {'forwards' if leg.knee_sign > 0 else 'backwards' for leg in legs}
     lengths = [sum((part @ part) ** 0.5 for part in (leg.thigh, leg.shank)) for leg in legs]
     limits, kp, kd = (', '.join(f'{value:.{digits}f}' for value in values) for values, digits in (
         (legs[0].torque_limit, 1), (d.kp, 0), (d.kd, 1)))

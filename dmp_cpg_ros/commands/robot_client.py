@@ -7,9 +7,14 @@ from __future__ import annotations
 import argparse
 import importlib
 import math
+import os
+import re
+import select
 import signal
 import sys
+import termios
 import time
+import tty
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,14 +25,17 @@ from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, VelocityCommand, deliver
+from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, deliver, velocity_command
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.framework.parameters import plain
+from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader
+from dmp_cpg_ros.nodes.messages.inhibition_state import read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
@@ -36,6 +44,22 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 ENDLESS = ('cmd_vel', 'teleop', 'echo')
 """Commands that Ctrl-C ends as it should."""
+
+STILL = (0.0, 0.0, 0.0)
+
+STEPS = {'w': (0.1, 0.0), 's': (-0.1, 0.0), 'a': (0.0, 0.2), 'd': (0.0, -0.2)}
+"""Change of v_x [m/s] and of the yaw rate [rad/s] by one press of a key."""
+
+ARROWS = {'A': 'w', 'B': 's', 'D': 'a', 'C': 'd'}
+"""Last letter of what an arrow key sends, and the key that does the same."""
+
+SERVICES = {' ': 'inhibit', 'u': 'stand_up', 'l': 'lie_down', 'r': 'recover'}
+"""Keys that call a service; the first stops the gait or starts it again."""
+
+HELP = """\
+w/s or up/down: faster, slower; a/d or left/right: turn; x: no velocity
+space: inhibit or resume; u: stand up, l: lie down, r: recover; q: quit
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -74,16 +98,13 @@ def request(client: SuiteClient, options: argparse.Namespace) -> None:
 
 def publish_command(client: SuiteClient, options: argparse.Namespace) -> None:
     """Command a velocity for some time or until Ctrl-C; the last command is zero."""
-    command = VelocityCommand(client, stamped=options.stamped)
-    begin, sent = time.monotonic(), 0
-    try:
+    with velocity_command(client, stamped=options.stamped) as send:
+        begin, sent = time.monotonic(), 0
         while time.monotonic() - begin < options.seconds:
-            command.send((options.v_x, options.v_y, options.yaw_rate))
+            send((options.v_x, options.v_y, options.yaw_rate))
             sent += 1
             client.spin_until(lambda: False, max(
                 0.0, begin + min(sent / options.rate, options.seconds) - time.monotonic()))
-    finally:
-        command.end()
 
 
 def push(client: SuiteClient, options: argparse.Namespace) -> None:
@@ -107,8 +128,7 @@ def parameter(client: SuiteClient, options: argparse.Namespace) -> None:
         client.node.create_client(kind, f'{node}/{end}_parameters') for kind, end in (
             (SetParameters, 'set'), (GetParameters, 'get'), (ListParameters, 'list')))
     if action == 'list':
-        names = client.ask(listing, ListParameters.Request()).result.names
-        print('\n'.join(sorted(names)))
+        print('\n'.join(sorted(client.ask(listing, ListParameters.Request()).result.names)))
         return
     known = client.ask(getting, GetParameters.Request(names=[name])).values
     if not known or known[0].type == Parameter.Type.NOT_SET.value:
@@ -150,15 +170,11 @@ def echo(client: SuiteClient, options: argparse.Namespace) -> None:
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # echo TOPIC | head ends quietly
     client.meet(['inhibition'])
     name = client.node.resolve_topic_name(options.topic)
-
-    def ends() -> list[Any]:
-        found: list[Any] = client.node.get_publishers_info_by_topic(name)
-        return found
-
-    if not client.spin_until(ends, options.wait):
+    ends = client.node.get_publishers_info_by_topic
+    if not client.spin_until(lambda: ends(name), options.wait):
         raise ClientError(f"nobody publishes {name}; the suite's topics are "
                           f'{", ".join(topic.name for topic in TOPICS)}')
-    known, end = INTERFACES.get(options.topic), ends()[0]
+    known, end = INTERFACES.get(options.topic), ends(name)[0]
     package, _, kind = end.topic_type.split('/')
     try:
         message_type = getattr(importlib.import_module(f'{package}.msg'), kind)
@@ -175,11 +191,105 @@ def echo(client: SuiteClient, options: argparse.Namespace) -> None:
         messages.clear()
 
 
-def drive(client: SuiteClient, options: argparse.Namespace) -> None:
-    """Drive by keyboard."""
-    from dmp_cpg_ros.commands.teleop import drive_by_keyboard
+class Teleop:
+    """What the keys do.
 
-    drive_by_keyboard(client, VelocityCommand(client, stamped=options.stamped), options.rate)
+    Parameters
+    ----------
+    client : SuiteClient
+        The suite.
+
+    Attributes
+    ----------
+    velocity : tuple of 3 floats
+        Commanded v_x, v_y [m/s] and yaw rate [rad/s].
+    """
+
+    def __init__(self, client: SuiteClient) -> None:
+        """Create clients, and listen to the state of the stop."""
+        node, gains = client.node, InhibitionGainsReader()
+
+        def on_state(message: Any) -> None:
+            self._word = read_state_word(message)
+
+        def on_gains(message: Any) -> None:
+            self._requested = gains.read(message).requested
+
+        self.velocity = STILL
+        self._word, self._requested, self._shown = '', False, ''
+        services = {key: interface(name) for key, name in SERVICES.items()}
+        self._clients = {key: node.create_client(service.type, service.name)
+                         for key, service in services.items()}
+        for name, callback in (('inhibition_state', on_state), ('inhibition_gains', on_gains)):
+            topic = interface(name)
+            node.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
+        kinds = {kind for service in services.values() for kind in service.publishers}
+        client.meet(sorted(kinds), *self._clients.values())
+
+    def press(self, key: str) -> None:
+        """Take a key; unknown ones do nothing."""
+        v_x, _, yaw_rate = self.velocity
+        if key in STEPS:
+            faster, further = STEPS[key]
+            self.velocity = (round(v_x + faster, 3), 0.0, round(yaw_rate + further, 3))
+        elif key == 'x':
+            self.velocity = STILL
+        elif key in self._clients:
+            client = self._clients[key]
+            request = client.srv_type.Request()
+            if key == ' ':
+                request.data = not self._requested
+            client.call_async(request).add_done_callback(self._answered)
+
+    def show(self) -> None:
+        """Rewrite the last line of the terminal where it has changed."""
+        v_x, _, yaw_rate = self.velocity
+        line = f'{v_x:+.1f} m/s, {yaw_rate:+.1f} rad/s, {self._word.replace("_", " ")}'
+        if line != self._shown:
+            self._shown = line
+            print(f'\r\x1b[K{line}', end='', flush=True)
+
+    def _answered(self, future: Future) -> None:
+        answer = future.result()
+        print(f'\r\x1b[K{"" if answer.success else "refused: "}{answer.message}')
+        self._shown = ''
+
+
+def drive(client: SuiteClient, options: argparse.Namespace) -> None:
+    """Drive by keyboard until q, Ctrl-C or the end of the input; the last command is zero."""
+    terminal = sys.stdin.fileno()
+    if not os.isatty(terminal):
+        raise ClientError('teleop reads keys from a terminal, and this input is none')
+    with velocity_command(client, stamped=options.stamped) as send:
+        teleop = Teleop(client)
+        print(HELP, end='')
+        former = termios.tcgetattr(terminal)
+        try:
+            tty.setcbreak(terminal)  # gives every key at once and shows none
+            while True:
+                send(teleop.velocity)
+                teleop.show()
+                client.spin_until(lambda: _waiting(terminal), 1.0 / options.rate)
+                for key in _keys(terminal):
+                    if key == 'q':
+                        return
+                    teleop.press(key)
+        finally:
+            termios.tcsetattr(terminal, termios.TCSADRAIN, former)
+            print()
+
+
+def _waiting(terminal: int) -> bool:
+    return bool(select.select([terminal], [], [], 0.0)[0])
+
+
+def _keys(terminal: int) -> list[str]:
+    """Keys that were pressed, arrows by the letter that does the same; q at the end of input."""
+    if not _waiting(terminal):
+        return []
+    text = os.read(terminal, 1024).decode(errors='replace')
+    pressed = re.findall(r'\x1b[\[O](.)|(.)', text, re.DOTALL)
+    return [ARROWS.get(arrow, '') or key for arrow, key in pressed] or ['q']
 
 
 def _as_mapping(value: Any) -> Any:

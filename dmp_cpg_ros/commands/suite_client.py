@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from rclpy.client import Client
@@ -136,38 +137,47 @@ class SuiteClient:
             f'{service}; start one with walk, such as: walk stand_by.yaml')
 
 
-class VelocityCommand:
-    """Sends velocity commands, as ``Twist`` or ``TwistStamped``.
+@contextmanager
+def velocity_command(client: SuiteClient, *, stamped: bool
+                     ) -> Iterator[Callable[[Sequence[float]], None]]:
+    """Find the readers of velocity commands, and command zero at the end.
 
     Parameters
     ----------
     client : SuiteClient
         Who sends.
     stamped : bool
-        Whether the suite runs with ``stamped_cmd_vel:=true``.
+        Whether the suite runs with ``stamped_cmd_vel:=true``: ``TwistStamped``, not ``Twist``.
+
+    Yields
+    ------
+    callable ((v_x, v_y, γ) [m/s, m/s, rad/s])
+        Sends a command; raises ClientError when nobody reads it.
+
+    Raises
+    ------
+    ClientError
+        If there are no readers of this type.
     """
+    topic = STAMPED_CMD_VEL if stamped else interface('cmd_vel')
+    publisher = client.publisher(topic)
 
-    def __init__(self, client: SuiteClient, *, stamped: bool) -> None:
-        """Find the readers; raises ClientError when there are none of this type."""
-        self._topic = STAMPED_CMD_VEL if stamped else interface('cmd_vel')
-        self._publisher = client.publisher(self._topic)
-
-    def send(self, velocity: Sequence[float]) -> None:
-        """Send (v_x, v_y, γ) [m/s, m/s, rad/s]; raises ClientError when nobody reads it."""
-        if not self._publisher.get_subscription_count():
-            raise ClientError('the suite has ended')
-        self._publish(velocity)
-
-    def end(self) -> None:
-        """Command zero."""
-        self._publish((0.0, 0.0, 0.0))
-        deliver(self._publisher)
-
-    def _publish(self, velocity: Sequence[float]) -> None:
-        message = self._topic.type()
+    def publish(velocity: Sequence[float]) -> None:
+        message = topic.type()
         twist = getattr(message, 'twist', message)
         twist.linear.x, twist.linear.y, twist.angular.z = velocity
-        self._publisher.publish(message)
+        publisher.publish(message)
+
+    def send(velocity: Sequence[float]) -> None:
+        if not publisher.get_subscription_count():
+            raise ClientError('the suite has ended')
+        publish(velocity)
+
+    try:
+        yield send
+    finally:
+        publish((0.0, 0.0, 0.0))
+        deliver(publisher)
 
 
 def deliver(publisher: Publisher) -> None:

@@ -31,8 +31,6 @@ OK, FAILED, INTERRUPTED = 0, 1, 128
 ended it.
 """
 
-DEFAULT_SCENARIO = 'scenarios/start_stop.yaml'
-
 
 @dataclass(frozen=True)
 class _Plan:
@@ -211,7 +209,7 @@ def _parser() -> argparse.ArgumentParser:
         'bad input or where a suite is running already, 130 for Ctrl-C. '
         f'Scenarios: {", ".join(sorted(scenarios))}.')
     add = parser.add_argument
-    add('scenario', nargs='?', default=DEFAULT_SCENARIO,
+    add('scenario', nargs='?', default='scenarios/start_stop.yaml',
         help='scenario file, by its path or in config/scenarios (default: %(default)s)')
     add('--lock-step', action='store_true',
         help='wait for every target, so that the run does not depend on the speed of the machine')
