@@ -136,15 +136,16 @@ def run_context(parameters: Mapping[str, Any] | None, robot_file: Path | str | N
     """
     named, name = find_parameter(parameters, 'robot'), find_parameter(parameters, 'gait')
     file = find_parameter(parameters, 'gaits_file', 'gaits.yaml')
-    robot, path = _robot(robot_file) if robot_file is not None else _or(
+    robot, path = _robot(robot_file) if robot_file is not None else _read_or(
         (None, None), "what needs the robot's geometry is left out", lambda: _robot(named))
-    gait, gaits = (None, {}) if name is None else _or(
+    gait, gaits = (None, {}) if name is None else _read_or(
         (None, {}), 'phase offsets are taken from the recording',
         lambda: (load_gait(name, file), load_gaits(file)))
-    inhibition = _or(InhibitionParameters(), 'the region C is drawn with default parameters',
-                     lambda: _parameter_set(InhibitionParameters, parameters))
-    world = _or(World(), 'the world is taken to be flat',
-                lambda: _parameter_set(WorldParameters, parameters).build())
+    inhibition = _read_or(
+        InhibitionParameters(), 'the region C is drawn with default parameters',
+        lambda: _parameter_set(InhibitionParameters, parameters))
+    world = _read_or(World(), 'the world is taken to be flat',
+                     lambda: _parameter_set(WorldParameters, parameters).build())
     radius = float(find_parameter(parameters, 'radius', 1.0))
     return RunContext(robot, gait, inhibition, radius, world, gaits), path
 
@@ -171,7 +172,7 @@ def _robot(name: Path | str | None) -> tuple[RobotDescription, Path | None]:
     return load_description(path), path
 
 
-def _or(usual: Any, without: str, read: Callable[[], Any]) -> Any:
+def _read_or(usual: Any, without: str, read: Callable[[], Any]) -> Any:
     """Return what is read, or what is usual after a warning that says what is done without."""
     try:
         return read()
