@@ -60,10 +60,9 @@ def find_config(name: str | Path) -> Path:
     if os.path.isfile(given):
         return given.absolute()
     folders = [] if given.is_absolute() else config_folders()
-    for folder in folders:
-        for candidate in (folder / given, folder / f'{given}.yaml'):
-            if os.path.isfile(candidate):
-                return candidate
+    for candidate in (folder / name for folder in folders for name in (given, f'{given}.yaml')):
+        if os.path.isfile(candidate):
+            return candidate
     raise MissingFileError(_not_found(name, folders))
 
 
@@ -112,19 +111,12 @@ def load_yaml(path: str | Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise MissingFileError(f"cannot read '{path}': {reason}") from error
-    try:
-        text = data.decode('utf-8')
-    except UnicodeDecodeError as error:
-        line = data.count(b'\n', 0, error.start) + 1
-        raise DataError(
-            f"'{path}', line {line}: not a text file in UTF-8: {error.reason}") from error
-    content = parse_yaml(text, f"'{path}'")
-    if content is None:
-        return {}
-    if not isinstance(content, dict):
+    # Bytes that are no UTF-8 become characters that are no YAML.
+    content = parse_yaml(data.decode(errors='surrogateescape'), f"'{path}'")
+    if not isinstance(content, (dict, type(None))):
         raise DataError(f"'{path}', line 1: must be a mapping (name: value), "
                         f'not {type(content).__name__}')
-    return content
+    return content or {}
 
 
 def parse_yaml(text: str, where: str) -> Any:
@@ -161,12 +153,11 @@ def parse_yaml(text: str, where: str) -> Any:
         raise DataError(f'{where}{place}: {error.problem or error.context}') from error
     except yaml.reader.ReaderError as error:
         line = text.count('\n', 0, error.position) + 1
-        raise DataError(f'{where}, line {line}: not YAML: {error.reason}') from error
+        raise DataError(f'{where}, line {line}: not YAML in UTF-8: {error.reason}') from error
 
 
-def node_parameters(
-    content: Mapping[str, Any], node_name: str, path: str | Path
-) -> dict[str, Any]:
+def node_parameters(content: Mapping[str, Any], node_name: str, path: str | Path
+                    ) -> dict[str, Any]:
     """Pick the parameters of one node from a ROS 2 parameter file, as the node itself would.
 
     Of the sections that mean the node (its own, ``/**``, ``/**/name`` ...) the later one in the
@@ -191,15 +182,12 @@ def node_parameters(
     DataError
         If it is no parameter file, or has neither a section ``/**`` nor one for this node.
     """
-    sections = _sections(content, '', path)
-    matching = [name for name in sections if _applies(name, node_name)]
+    sections = _sections(content, path)
+    matching = [values for name, values in sections.items() if _applies(name, node_name)]
     if not matching:
         raise DataError(f"'{path}' has no parameters for node '{node_name}'; it has sections for "
                         f"{', '.join(sections) or 'no node'}")
-    merged: dict[str, Any] = {}
-    for name in matching:
-        merged.update(sections[name])
-    return merged
+    return {name: value for values in matching for name, value in values.items()}
 
 
 def unused_sections(path: str | Path, namespace: str, kinds: Collection[str]) -> list[str]:
@@ -214,13 +202,10 @@ def unused_sections(path: str | Path, namespace: str, kinds: Collection[str]) ->
     kinds : collection of str
         Names that nodes have or begin with.
     """
-    found = []
-    for section in _sections(load_yaml(path), '', path):
-        name = section.rpartition('/')[2]
-        if (any(name == kind or name.startswith(f'{kind}_') for kind in kinds)
-                and not _applies(section, f'{namespace}/{name}')):
-            found.append(section)
-    return found
+    named = {section: section.rpartition('/')[2] for section in _sections(load_yaml(path), path)}
+    return [section for section, name in named.items()
+            if any(f'{name}_'.startswith(f'{kind}_') for kind in kinds)
+            and not _applies(section, f'{namespace}/{name}')]
 
 
 class _Composer(yaml.SafeLoader):
@@ -229,13 +214,11 @@ class _Composer(yaml.SafeLoader):
     _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        problem = ''
-        if self.check_event(yaml.AliasEvent):
-            problem = 'an alias (*name) is not valid; write out what it stands for'
-        elif self._depth >= DEEPEST:
-            problem = f'nested deeper than {DEEPEST}'
-        if problem:
-            raise yaml.MarkedYAMLError(problem=problem, problem_mark=self.peek_event().start_mark)
+        event = self.peek_event()
+        if isinstance(event, yaml.AliasEvent):
+            raise _error(event, 'an alias (*name) is not valid; write out what it stands for')
+        if self._depth >= DEEPEST:
+            raise _error(event, f'nested deeper than {DEEPEST}')
         self._depth += 1
         node = super().compose_node(parent, index)
         self._depth -= 1
@@ -244,7 +227,8 @@ class _Composer(yaml.SafeLoader):
 
 def _value(node: yaml.Node) -> Any:
     """Content of a node as plain Python values."""
-    if node.tag == f'{_TAG}map' and isinstance(node, yaml.MappingNode):
+    kind = node.tag.removeprefix(_TAG)
+    if kind == 'map' and isinstance(node, yaml.MappingNode):
         content: dict[str, Any] = {}
         for key, value in node.value:
             if not isinstance(key, yaml.ScalarNode) or not key.value.isprintable():
@@ -254,21 +238,19 @@ def _value(node: yaml.Node) -> Any:
             content[key.value] = _value(value)
         return content
     # launch writes the lists that it hands to a node as tuples.
-    if (node.tag in (f'{_TAG}seq', f'{_TAG}python/tuple')
-            and isinstance(node, yaml.SequenceNode)):
+    if kind in ('seq', 'python/tuple') and isinstance(node, yaml.SequenceNode):
         return [_value(entry) for entry in node.value]
-    kind = node.tag.removeprefix(_TAG)
     if kind not in _SCALARS or not isinstance(node, yaml.ScalarNode):
         raise _error(node, f'the tag {node.tag!r} is not valid here; valid are '
                            f"{', '.join(_SCALARS)}")
     try:
-        return _SCALARS[kind](node.value)
-    except ValueError as error:
+        return _SCALARS[kind][1](node.value)
+    except (KeyError, ValueError) as error:
         raise _error(node, f'no value of type {kind}: {error}') from error
 
 
-def _error(node: yaml.Node, problem: str) -> yaml.MarkedYAMLError:
-    return yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)
+def _error(place: Any, problem: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=place.start_mark)
 
 
 def _whole(text: str) -> int:
@@ -281,28 +263,20 @@ def _whole(text: str) -> int:
     return int(value)
 
 
-def _truth(text: str) -> bool:
-    """``true``, ``yes``, ``on`` or their opposites."""
-    if not _BOOL.fullmatch(text):
-        raise ValueError('valid are true and false')
-    return text.lower() in ('true', 'yes', 'on')
-
-
 _TAG = 'tag:yaml.org,2002:'
-_BOOL = re.compile('(?i:true|false|yes|no|on|off)')
-_SCALARS: dict[str, Callable[[str], Any]] = {
-    'str': str, 'null': lambda _: None, 'bool': _truth, 'int': _whole,
-    'float': lambda text: float(re.sub(r'\.(?=[iInN])', '', text))}
+_SCALARS: dict[str, tuple[str | None, Callable[[str], Any]]] = {
+    'str': (None, str),
+    'null': ('~|null|Null|NULL|', lambda _: None),
+    'bool': ('(?i:true|false|yes|no|on|off)', lambda text: _Composer.bool_values[text.lower()]),
+    'int': ('[-+]?(0[0-7]*|[1-9][0-9]*|0x[0-9a-fA-F]+)', _whole),
+    'float': (r'[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?\.(?i:inf)|\.(?i:nan)',
+              lambda text: float(re.sub(r'\.(?=[iInN])', '', text)))}
+"""Kinds of scalars: what is one without a tag, first match first, and how it is read."""
+
 _Composer.yaml_implicit_resolvers = {}
-for _kind, _pattern, _first in (
-    ('null', r'~|null|Null|NULL|', '~nN'),
-    ('bool', _BOOL.pattern, 'tTfFyYnNoO'),
-    ('int', r'[-+]?(0[0-7]*|[1-9][0-9]*|0x[0-9a-fA-F]+)', '-+0123456789'),
-    ('float', r'[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?\.(?i:inf)|\.(?i:nan)',
-     '-+.0123456789'),
-):
-    _Composer.add_implicit_resolver(
-        f'{_TAG}{_kind}', re.compile(f'(?:{_pattern})$'), [*_first, *([''] * (_kind == 'null'))])
+for _kind, (_pattern, _) in _SCALARS.items():
+    if _pattern is not None:
+        _Composer.add_implicit_resolver(_TAG + _kind, re.compile(f'(?:{_pattern})$'), None)
 
 
 def _not_found(name: str | Path, folders: list[Path]) -> str:
@@ -320,8 +294,8 @@ def _not_found(name: str | Path, folders: list[Path]) -> str:
             f"{', '.join(map(str, folders))}; {guess}there are {', '.join(beside) or 'no files'}")
 
 
-def _sections(content: Mapping[str, Any], prefix: str,
-              path: str | Path) -> dict[str, dict[str, Any]]:
+def _sections(content: Mapping[str, Any], path: str | Path, prefix: str = ''
+              ) -> dict[str, dict[str, Any]]:
     """Collect the flat parameters of every node, keyed by the node's full name or pattern."""
     sections: dict[str, dict[str, Any]] = {}
     for key, value in content.items():
@@ -330,23 +304,21 @@ def _sections(content: Mapping[str, Any], prefix: str,
             raise DataError(f"'{path}': '{name}' must be a mapping with '{_PARAMETERS_KEY}:' in "
                             f'it, not {shown(value)}')
         below = dict(value)
-        parameters = below.pop(_PARAMETERS_KEY, {})
-        if not isinstance(parameters, Mapping):
-            raise DataError(f"'{path}': '{_PARAMETERS_KEY}' of '{name}' must be a mapping, "
-                            f'not {shown(parameters)}')
-        if _PARAMETERS_KEY in value:
+        if _PARAMETERS_KEY in below:
+            parameters = below.pop(_PARAMETERS_KEY)
+            if not isinstance(parameters, Mapping):
+                raise DataError(f"'{path}': '{_PARAMETERS_KEY}' of '{name}' must be a mapping, "
+                                f'not {shown(parameters)}')
             sections.setdefault(name, {}).update(_flat(parameters))
-        sections.update(_sections(below, name, path))
+        sections.update(_sections(below, path, name))
     return sections
 
 
 def _flat(parameters: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for key, value in parameters.items():
-        if isinstance(value, Mapping):
-            flat.update(_flat(value, f'{prefix}{key}.'))
-        else:
-            flat[f'{prefix}{key}'] = value
+        name = f'{prefix}{key}'
+        flat.update(_flat(value, f'{name}.') if isinstance(value, Mapping) else {name: value})
     return flat
 
 

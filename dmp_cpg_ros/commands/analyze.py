@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import logging
 import sys
 from collections.abc import Mapping, Sequence
@@ -18,31 +17,18 @@ from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.manifest import build_manifest
 from dmp_cpg_ros.analysis.run import RunResults, write_results
-from dmp_cpg_ros.commands.ros_arguments import parse_arguments
-from dmp_cpg_ros.commands.run_knowledge import picture_taker, run_context
-from dmp_cpg_ros.core.errors import DmpCpgError
-
-BAD_INPUT = 2
-"""Exit status for a missing folder, one without a bag, a bad robot file or bad arguments."""
-
-MARKS = {True: '[ok]', False: '[NO]', None: '[--]'}
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.run_folder import picture_taker, read_json, run_context
 
 BAG_ALONE = {'note': 'made from a bag alone: versions, commit and host are those of the analysis'}
 
 
 def analyze_run(
-    run_dir: Path | str,
-    *,
-    out: Path | str | None = None,
-    robot_file: Path | str | None = None,
-    parameters: Mapping[str, Any] | None = None,
-    certificate: Sequence[Any] | None = None,
-    seeds: Mapping[str, int] | None = None,
-    lock_step: bool | None = None,
-    pictures: bool = True,
-    report: bool = True,
-    **manifest_facts: Any,
-) -> RunResults:
+        run_dir: Path | str, *, out: Path | str | None = None,
+        robot_file: Path | str | None = None, parameters: Mapping[str, Any] | None = None,
+        certificate: Sequence[Any] | None = None, seeds: Mapping[str, int] | None = None,
+        lock_step: bool | None = None, pictures: bool = True, report: bool = True,
+        **manifest_facts: Any) -> RunResults:
     """Analyze a run and write its folder.
 
     Parameters
@@ -87,42 +73,36 @@ def analyze_run(
         parameters = earlier.get('parameters')
     context, robot_path = run_context(parameters, robot_file)
     manifest = earlier or build_manifest(
-        parameters,
-        seeds,
-        payload_digests(bag) if lock_step else None,
-        lock_step=lock_step,
+        parameters, seeds, payload_digests(bag) if lock_step else None, lock_step=lock_step,
         robot=find_parameter(parameters, 'robot') if context.robot is None else context.robot.name,
-        **(BAG_ALONE if parameters is None else {}),
-        **manifest_facts,
-    )
-    draw = None
-    if pictures and report and context.robot is not None:
-        draw = picture_taker(robot_path, context.world)
-    folder = Path(out) if out is not None else run or _beside(bag)
+        **(BAG_ALONE if parameters is None else {}), **manifest_facts)
+    drawn = pictures and report and context.robot is not None
+    draw = picture_taker(robot_path, context.world) if drawn else None
+    bag = bag.resolve()
+    beside = bag.with_name(f'{bag.name if bag.is_dir() else bag.stem}_analysis')
+    folder = Path(out) if out is not None else run or beside
     return write_results(folder, recording, context, manifest, certificate, draw, report)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     logging.basicConfig(format='%(levelname)s: %(message)s', level=logging.WARNING)
-    options, _ = parse_arguments(_parser(), arguments)
-    try:
-        results = analyze_run(
-            options.bag,
-            out=options.out,
-            robot_file=options.robot,
-            pictures=not options.no_pictures,
-        )
-    except DmpCpgError as error:
-        print(f'analyze: {error}', file=sys.stderr)
-        return BAD_INPUT
-    except OSError as error:
-        print(f"analyze: cannot write '{error.filename}': {error.strerror}", file=sys.stderr)
-        return BAD_INPUT
-    for fact in facts(results.metrics, results.manifest.get('lock_step')):
-        print(f'{MARKS[fact.holds]} {fact.statement}: {fact.finding}')
+    return run_command(_parser(), arguments, _analyze)
+
+
+def _analyze(options: argparse.Namespace, _: RosArguments) -> int:
+    results = analyze_run(options.bag, out=options.out, robot_file=options.robot,
+                          pictures=not options.no_pictures)
+    print_facts(results, results.manifest.get('lock_step'))
     print(f'report: {results.report}')
     return 0
+
+
+def print_facts(results: RunResults, lock_step: bool | None) -> None:
+    """Print what a run's metrics say, marked where it holds or does not."""
+    marks = {True: '[ok]', False: '[NO]', None: '[--]'}
+    for fact in facts(results.metrics, lock_step):
+        print(f'{marks[fact.holds]} {fact.statement}: {fact.finding}')
 
 
 def _run_of(bag: Path, given: Path) -> Path | None:
@@ -134,47 +114,20 @@ def _run_of(bag: Path, given: Path) -> Path | None:
     return folder.parent if is_run else None
 
 
-def _beside(bag: Path) -> Path:
-    """Folder for the results of a bare bag."""
-    bag = bag.resolve()
-    return bag.with_name(f'{bag.name if bag.is_dir() else bag.stem}_analysis')
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='analyze',
-        description='Make figures, metrics.json, manifest.json and report.html of a recorded run.',
-    )
-    parser.add_argument(
-        'bag',
-        metavar='BAG_OR_RUN',
-        type=Path,
-        help="rosbag2 folder or file (MCAP or SQLite), or a run's folder with bag/ inside",
-    )
-    parser.add_argument(
-        '--out',
-        metavar='DIR',
-        type=Path,
-        help="where to write (default: the run's folder; for a bare bag NAME_analysis beside it)",
-    )
-    parser.add_argument(
-        '--robot',
-        metavar='FILE',
-        type=Path,
+        description='Make figures, metrics.json, manifest.json and report.html of a recorded run.')
+    add = parser.add_argument
+    add('bag', metavar='BAG_OR_RUN', type=Path,
+        help="rosbag2 folder or file (MCAP or SQLite), or a run's folder with bag/ inside")
+    add('--out', metavar='DIR', type=Path,
+        help="where to write (default: the run's folder; for a bare bag NAME_analysis beside it)")
+    add('--robot', metavar='FILE', type=Path,
         help="the robot's YAML file (default: the one that the run's manifest names, else the "
-        "package's own)",
-    )
-    parser.add_argument('--no-pictures', action='store_true', help='take no pictures of the robot')
+        "package's own)")
+    add('--no-pictures', action='store_true', help='take no pictures of the robot')
     return parser
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Read an earlier result; empty where there is none that can be read."""
-    try:
-        content = json.loads(path.read_text(encoding='utf-8'))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
 
 
 if __name__ == '__main__':

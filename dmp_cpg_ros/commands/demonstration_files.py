@@ -1,38 +1,59 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Demonstrations from files: CSV, NumPy and rosbag2 recordings."""
+"""Demonstrations from files: CSV, NumPy and rosbag2 recordings.
+
+One is of joints, or of how the feet of a robot walked in a run.
+"""
 
 from __future__ import annotations
 
 import csv
-import io
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis.bag import decoded, find_bag, opened
+from dmp_cpg_ros.analysis import bag, episodes, motion
+from dmp_cpg_ros.analysis.context import find_parameter
+from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.commands.run_folder import read_json, run_context
+from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
+from dmp_cpg_ros.core.transformation.learned_motion import FootSamples
+from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale, nominal_foothold
 
 Array = NDArray[np.float64]
 
 _TIME_NAMES = ('t', 'time', 'time_s', 'timestamp', 'stamp')
-_ORDERS = {'': 0, '_velocity': 1, '_acceleration': 2}
-_ARRAYS = ('times', 'positions', 'velocities', 'accelerations')
+_ARRAYS = {'positions': '', 'velocities': '_velocity', 'accelerations': '_acceleration'}
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
 
+SLOWEST = 0.1
+"""Speed of the reference from which the robot walks [m/s]."""
 
-def read_demonstration(
-    path: Path,
-    joints: Sequence[str] = (),
-    topic: str = 'joint_states',
-    start: float | None = None,
-    end: float | None = None,
-) -> Demonstration:
+STRAIGHT = 0.05
+"""Turn rate of the reference below which it walks straight on [rad/s]."""
+
+STEADY = 0.03
+"""Largest change of the reference in 0.1 s, and of the phase rate from the cadence, as shares."""
+
+SETTLING, SHORTEST = 1.0, 2.0
+"""Time after which a steady walk is taken as a demonstration, and its least duration [s]."""
+
+
+def read_demonstration(path: Path, joints: Sequence[str] = (), topic: str = 'joint_states',
+                       start: float | None = None, end: float | None = None) -> Demonstration:
     """Read a demonstration of any kind.
 
     Parameters
@@ -68,7 +89,21 @@ def read_demonstration(
         whole = _from_bag(path, topic, joints)
     else:
         raise DataError(f"'{path}' is of no known kind; valid are .csv, .npy, .npz and bags")
-    return _part(_chosen(whole, joints, path), start, end)
+    _check_joints(path, joints, whole.names)
+    names = tuple(joints) or whole.names
+    columns = [whole.names.index(name) for name in names] if names else slice(None)
+    since = whole.times - whole.times[0]
+    rows = (since >= (start or 0.0)) & (since <= (np.inf if end is None else end))
+    parts: dict[str, Any] = {field: values[rows][:, columns] for field in _ARRAYS
+                             if (values := getattr(whole, field)) is not None}
+    return replace(whole, times=whole.times[rows], names=names, **parts)
+
+
+def _check_joints(path: Path, joints: Iterable[str], known: Collection[str]) -> None:
+    for name in joints:
+        if name not in known:
+            valid = ', '.join(known) or 'none, for the file names no joints'
+            raise DataError(f"'{path}' has no joint '{name}'; valid are {valid}")
 
 
 def _from_csv(path: Path) -> Demonstration:
@@ -77,19 +112,18 @@ def _from_csv(path: Path) -> Demonstration:
         text = path.read_text(encoding='utf-8-sig')
     except (OSError, UnicodeDecodeError) as error:
         raise DataError(f"'{path}' cannot be read as text: {error}") from error
-    rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
+    rows = [row for row in csv.reader(text.splitlines()) if ''.join(row).strip()]
     if not rows:
         raise DataError(f"'{path}' is empty; its first column must be time [s]")
-    header = [cell.strip() for cell in rows[0]]
-    if all(_is_number(cell) for cell in header):
-        header = ['time', *(f'joint_{i + 1}' for i in range(len(header) - 1))]
-    else:
-        rows = rows[1:]
+    try:
+        np.array(rows[0], dtype=float)
+        header = ['time', *(f'joint_{i}' for i in range(1, len(rows[0])))]
+    except ValueError:
+        header, rows = [cell.strip() for cell in rows[0]], rows[1:]
     if len(header) < 2 or header[0].lower() not in _TIME_NAMES:
         raise DataError(
             f"'{path}' must have the time in its first column, named {', '.join(_TIME_NAMES)}, "
-            f'and positions in the others; its columns are {", ".join(header)}'
-        )
+            f'and positions in the others; its columns are {", ".join(header)}')
     try:
         data = np.array([[float(cell) for cell in row] for row in rows], dtype=float)
     except ValueError as error:
@@ -97,25 +131,12 @@ def _from_csv(path: Path) -> Demonstration:
     if data.ndim != 2 or data.shape[1] != len(header):
         raise DataError(f"'{path}' must have {len(header)} numbers in every row")
     columns = dict(zip(header[1:], data.T[1:], strict=True))
-    return _of_columns(data[:, 0], columns)
-
-
-def _of_columns(times: Array, columns: dict[str, Array]) -> Demonstration:
-    derived = {
-        base + ending
-        for base in columns
-        for ending in _ORDERS
-        if ending and base + ending in columns
-    }
+    derived = {base + ending for base in columns for ending in _ARRAYS.values() if ending}
     names = tuple(name for name in columns if name not in derived)
-    parts: list[Array | None] = []
-    for ending in _ORDERS:
-        there = all(name + ending in columns for name in names)
-        parts.append(np.stack([columns[n + ending] for n in names], axis=1) if there else None)
-    positions, velocities, accelerations = parts
-    if positions is None:
-        raise DataError('a demonstration needs positions')
-    return Demonstration(times, positions, velocities, accelerations, names)
+    parts: dict[str, Any] = {
+        field: np.stack([columns[name + ending] for name in names], axis=1)
+        for field, ending in _ARRAYS.items() if all(name + ending in columns for name in names)}
+    return Demonstration(data[:, 0], **parts, names=names)
 
 
 def _from_numpy(path: Path) -> Demonstration:
@@ -127,99 +148,152 @@ def _from_numpy(path: Path) -> Demonstration:
         if content.ndim != 2 or content.shape[1] < 2 or not np.isrealobj(content):
             raise DataError(
                 f"'{path}' must hold an array (m, 1 + n) with the time [s] in its first column, "
-                f'not one of shape {content.shape}'
-            )
+                f'not one of shape {content.shape}')
         return Demonstration(content[:, 0], content[:, 1:])
     with content:
-        for needed in _ARRAYS[:2]:
+        for needed in ('times', 'positions'):
             if needed not in content.files:
-                raise DataError(
-                    f"'{path}' has no array '{needed}'; needed are {', '.join(_ARRAYS[:2])}, "
-                    f'possible {", ".join(_ARRAYS[2:])}, names'
-                )
+                raise DataError(f"'{path}' has no array '{needed}'; needed are times, positions, "
+                                'possible velocities, accelerations, names')
         try:
-            arrays: list[Any] = [
-                np.asarray(content[a]) if a in content.files else None for a in _ARRAYS
-            ]
-            names = tuple(map(str, content['names'])) if 'names' in content.files else ()
+            arrays: dict[str, Any] = {name: content[name] for name in ('times', *_ARRAYS, 'names')
+                                      if name in content.files}
         except ValueError as error:
             raise DataError(f"'{path}' holds more than plain arrays: {error}") from error
-    times, positions, velocities, accelerations = arrays
-    return Demonstration(times, positions, velocities, accelerations, names)
+    names = tuple(map(str, arrays.pop('names', ())))
+    return Demonstration(**arrays, names=names)
 
 
 def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:
     """Positions by joint name at every stamp at which all wanted joints are known."""
     samples: dict[int, dict[str, tuple[float, float | None]]] = {}
-    with opened(find_bag(path)) as reader:
+    with bag.opened(bag.find_bag(path)) as reader:
         kinds = {c.topic: c.msgtype for c in reader.connections}
         full = next((t for t in kinds if t == topic or t.endswith('/' + topic.lstrip('/'))), None)
         usable = sorted(t for t, kind in kinds.items() if kind == _JOINT_STATE)
-        if full is None or full not in usable:
-            raise DataError(
-                f"'{path}' has no topic '{topic}' of joint states; valid are "
-                f'{", ".join(usable) or "none in this bag"}'
-            )
+        if full not in usable:
+            raise DataError(f"'{path}' has no topic '{topic}' of joint states; valid are "
+                            f'{", ".join(usable) or "none in this bag"}')
         chosen = [c for c in reader.connections if c.topic == full]
-        for _, bag_ns, message in decoded(reader, chosen, Counter()):
+        for _, bag_ns, message in bag.decoded(reader, chosen, Counter()):
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
-            row = samples.setdefault(stamp or bag_ns, {})
-            for i, name in enumerate(message.name):
-                if i < len(message.position):
-                    speed = float(message.velocity[i]) if i < len(message.velocity) else None
-                    row[name] = (float(message.position[i]), speed)
-    names = tuple(joints) or tuple(dict.fromkeys(n for row in samples.values() for n in row))
-    unknown = [n for n in names if not any(n in row for row in samples.values())]
-    if unknown:
-        known = dict.fromkeys(n for row in samples.values() for n in row)
-        raise DataError(f"'{path}' has no joint '{unknown[0]}'; valid are {', '.join(known)}")
-    stamps = sorted(stamp for stamp, row in samples.items() if all(n in row for n in names))
+            samples.setdefault(stamp or bag_ns, {}).update(
+                (name, (position, speed)) for name, position, speed
+                in zip_longest(message.name, message.position, message.velocity)
+                if name is not None and position is not None)
+    known = dict.fromkeys(name for row in samples.values() for name in row)
+    names = tuple(joints or known)
+    _check_joints(path, names, known)
+    stamps = sorted(stamp for stamp, row in samples.items() if row.keys() >= set(names))
     if not stamps:
         raise DataError(f"'{path}': no message on '{full}' holds all of {', '.join(names)}")
     rows = [[samples[stamp][name] for name in names] for stamp in stamps]
+    complete = all(speed is not None for row in rows for _, speed in row)
+    values = np.array(rows, dtype=float)  # (m, n, 2)
     times = np.array([stamp - stamps[0] for stamp in stamps]) * 1e-9
-    speeds = [[speed for _, speed in row] for row in rows]
-    complete = all(speed is not None for row in speeds for speed in row)
-    velocities = np.array(speeds, dtype=float) if complete else None
-    return Demonstration(
-        times, np.array([[p for p, _ in r] for r in rows]), velocities, None, names
-    )
+    return Demonstration(times, values[..., 0], values[..., 1] if complete else None, None, names)
 
 
-def _chosen(demonstration: Demonstration, joints: Sequence[str], path: Path) -> Demonstration:
-    if not joints or tuple(joints) == demonstration.names:
-        return demonstration
-    for name in joints:
-        if name not in demonstration.names:
-            valid = ', '.join(demonstration.names) or 'none, for the file names no joints'
-            raise DataError(f"'{path}' has no joint '{name}'; valid are {valid}")
-    index = [demonstration.names.index(name) for name in joints]
-    v, a = demonstration.velocities, demonstration.accelerations
-    return Demonstration(
-        demonstration.times,
-        demonstration.positions[:, index],
-        None if v is None else v[:, index],
-        None if a is None else a[:, index],
-        tuple(joints),
-    )
+def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | None = None
+                ) -> tuple[list[list[FootSamples]], RobotDescription]:
+    """Steady walking in a recording.
+
+    Parameters
+    ----------
+    path : Path
+        Run's folder, or a bag, which is then taken for one of the package's robot and gaits.
+    topic : str
+        ``joint_targets`` or ``joint_states``.
+    robot_file : Path, optional
+        Robot that walked; the one that the run names without.
+
+    Returns
+    -------
+    feet : list (4,) of lists of FootSamples
+        For every foot, one entry per stretch.
+    robot : RobotDescription
+
+    Raises
+    ------
+    DmpCpgError
+        If there is no such recording, joints or canonical states are not in it, or the robot
+        nowhere walks steadily straight on.
+    """
+    if topic not in ('joint_targets', 'joint_states'):
+        raise DataError(f"a motion is learned from joint_targets or joint_states, not '{topic}'")
+    recording, file = load_recording(path), bag.find_bag(path)
+    run = (file if file.is_dir() else file.parent).parent
+    joints = recording.targets if topic == 'joint_targets' else recording.joints
+    canonical = recording.canonical
+    walked = next((gait.before for gait in canonical.gaits if not gait.after), 'amble')
+    parameters = read_json(run / 'manifest.json').get('parameters') or {'gait': walked}
+    context, _ = run_context(parameters, robot_file)
+    rows, at, attitude = motion.common_rows(joints.time, canonical.time, recording.odometry.time)
+    if not len(rows):
+        raise DataError(f"'{path}': no stamp has all of {topic}, canonical_state and odom")
+    missing = [JOINT_NAMES[j] for j in np.flatnonzero(np.isnan(joints.position[rows]).any(axis=0))]
+    if missing:
+        raise DataError(f"'{path}': {topic} lacks the joints {', '.join(missing)}")
+    if context.robot is None or context.gait is None:
+        raise DataError(f"'{path}': the robot or the gait that walked is not known here")
+    gaits = episodes.gait_rows(recording, context)
+    if gaits is None or not recording.reference.time.size:
+        raise DataError(f"'{path}': the reference or the gait in force was not recorded")
+    times, scale = canonical.time[at], body_scale(context.robot)
+    position, duty, cycle, bounce, steady = _planned(recording, gaits, at, scale)
+    angles = joints.position[rows]
+    if topic == 'joint_targets':
+        angles = _goals(times, angles, joints.velocity[rows], parameters)
+    up = motion.rotations(recording.odometry.quaternion[attitude])[:, 2]
+    feet: list[list[FootSamples]] = [[] for _ in context.robot.legs]
+    for first, past in motion.stretches(steady):
+        part = slice(int(np.searchsorted(times, times[first] + SETTLING)), past)
+        if times[past - 1] - times[first] < SETTLING + SHORTEST:
+            continue
+        for i, leg in enumerate(context.robot.legs):
+            foot = motion.feet_in_base(leg, angles[part, 3 * i : 3 * i + 3])
+            away = foot - nominal_foothold(context.robot, leg.name)
+            away[:, 2] = np.sum(up[part] * foot, axis=1) + bounce[part, i]
+            feet[i].append(FootSamples(position[part, i], duty[part], cycle[part], away))
+    if not feet[0]:
+        raise DataError(
+            f"'{path}': the robot nowhere walks straight on for {SETTLING + SHORTEST:g} s at one "
+            f'speed of at least {SLOWEST:g} m/s')
+    return feet, context.robot
 
 
-def _part(demonstration: Demonstration, start: float | None, end: float | None) -> Demonstration:
-    since = demonstration.times - demonstration.times[0]
-    keep = (since >= (start or 0.0)) & (since <= (np.inf if end is None else end))
-    v, a = demonstration.velocities, demonstration.accelerations
-    return Demonstration(
-        demonstration.times[keep],
-        demonstration.positions[keep],
-        None if v is None else v[keep],
-        None if a is None else a[keep],
-        demonstration.names,
-    )
+def _planned(recording: Recording, gaits: list[episodes.GaitRow], at: NDArray[np.int64],
+             scale: BodyScale) -> tuple[Array, Array, Array, Array, NDArray[np.bool_]]:
+    """Cycle positions (m, 4), duty, cycle, bounce (m, 4) that the gaits plan at rows of the
+    canonical states, and whether the robot does so steadily; NaN within changes of gait.
+    """
+    canonical, reference = recording.canonical, recording.reference
+    in_force = [entry.gait for entry in gaits for _ in range(entry.rows.start, entry.rows.stop)]
+    times = canonical.time[at]
+    r, before = (motion.held(reference.time, reference.value, times - ago) for ago in (0.0, 0.1))
+    speed = np.array([scale.foot_speed(*row) for row in r])
+    phi, rate = phase(canonical.x[at]), phase_rate(canonical.x[at], canonical.x_dot[at])
+    omega, duty = np.full((2, len(at)), np.nan)
+    c, bounce = np.full((2, len(at), 4), np.nan)
+    for k, row in enumerate(at):
+        gait = in_force[row]
+        if isinstance(gait, Gait):
+            omega[k], duty[k] = gait.omega(speed[k], scale), gait.duty(speed[k], scale)
+            c[k] = gait.cycle_position(phi[k])
+            bounce[k] = [gait.bounce(float(p), duty[k], omega[k]).height for p in c[k]]
+    steady = ((np.hypot(r[:, 0], r[:, 1]) > SLOWEST) & (np.abs(r[:, 2]) < STRAIGHT)
+              & (np.abs(r - before).max(axis=1) < STEADY * speed)
+              & (np.abs(rate - omega[:, None]).max(axis=1) < STEADY * omega))
+    return c, duty, 2.0 * np.pi / omega, bounce, steady
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+def _goals(times: Array, angles: Array, rates: Array, parameters: Mapping[str, Any]) -> Array:
+    """Goals that the targets of the joints followed: targets lag behind, and a goal that is
+    learned shall not be filtered twice.
+    """
+    usual = LegParameters()
+    stiffness, damping = (
+        np.full(len(JOINT_NAMES), find_parameter(parameters, name, getattr(usual, name)))
+        for name in ('stiffness', 'damping'))
+    goals = SpringDamper(stiffness, damping).goals(angles, rates, np.diff(times))
+    return np.vstack([angles[:1], goals])

@@ -1,13 +1,15 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``film``: a recorded run as a film, drawn after the run."""
+"""``film``: a recorded run as a GIF (always) or an MP4 (with imageio-ffmpeg), drawn after it."""
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 
 import matplotlib
@@ -19,16 +21,13 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import held, smoothed, velocity_in_heading
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.commands.analyze import read_json
-from dmp_cpg_ros.commands.film_files import Frame, checked_film_path, write_film
-from dmp_cpg_ros.commands.run_knowledge import run_context
-from dmp_cpg_ros.core.errors import DataError, DmpCpgError
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.commands.run_folder import read_json, run_context
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
 
 Array = NDArray[np.float64]
-
-BAD_INPUT = 2
-"""Exit status for a bad recording or file, or where nothing can be drawn."""
+Frame = NDArray[np.uint8]
 
 LOOK_WINDOW, SPEED_WINDOW = 1.2, 0.8
 """The camera follows the path, and the speed is shown, averaged over this [s]."""
@@ -36,8 +35,13 @@ LOOK_WINDOW, SPEED_WINDOW = 1.2, 0.8
 INK, OUTLINE = (255, 255, 255), (30, 40, 55)
 """Colours of the words."""
 
-PALETTE_FRAMES = 6
-"""Frames from which a GIF takes its colours."""
+PALETTE_FRAMES, COLOURS = 6, 128
+"""Frames from which a GIF takes its colours, and their number; one palette for all frames keeps
+what stands still from flickering.
+"""
+
+ENCODER, MP4_QUALITY = 'imageio_ffmpeg', 7
+"""The module that encodes MP4, and the quality, from 0 to 10."""
 
 
 @dataclass(frozen=True)
@@ -46,16 +50,16 @@ class Shot:
 
     Attributes
     ----------
-    start, end : float or None
-        On the robot's clock [s]; None: from the beginning, to the end.
+    start, end : float
+        On the robot's clock [s].
     fps : float
         Frames per second, at the robot's own pace.
     width, height : int
         [pixels]
     """
 
-    start: float | None = None
-    end: float | None = None
+    start: float = -np.inf
+    end: float = np.inf
     fps: float = 20.0
     width: int = 640
     height: int = 360
@@ -92,57 +96,43 @@ def film(recording: Recording, context: RunContext, robot_file: Path | None, pat
     odometry, joints = recording.odometry, recording.joints
     if not (odometry.time.size and joints.time.size):
         raise DataError('a film needs recorded joint_states and odom')
-    first = max(odometry.time[0], joints.time[0], -np.inf if shot.start is None else shot.start)
-    last = min(odometry.time[-1], joints.time[-1], np.inf if shot.end is None else shot.end)
+    first = max(odometry.time[0], joints.time[0], shot.start)
+    last = min(odometry.time[-1], joints.time[-1], shot.end)
     times = np.arange(first, last + 1e-9, 1.0 / shot.fps)
     if not times.size:
         raise DataError(f'nothing was recorded between {shot.start} s and {shot.end} s; the '
                         f'recording is from {odometry.time[0]:g} s to {odometry.time[-1]:g} s')
     with Camera(robot_file, shot.width, shot.height, context.world, plain=True) as camera:
-        draw = _Painter(recording, camera, shot)
+        draw = _painter(recording, camera, shot.height)
         sample = [draw(t) for t in np.linspace(first, last, min(PALETTE_FRAMES, len(times)))]
-        write_film(path, _painted(draw, times), sample, shot.fps)
+        write_film(path, map(draw, times), sample, shot.fps)
     return len(times)
 
 
-def _painted(draw: _Painter, times: Array) -> Iterator[Frame]:
-    for time in times:
-        yield draw(float(time))
+def _painter(recording: Recording, camera: Camera, height: int) -> Callable[[float], Frame]:
+    """Return what draws the recording at a time [s], with its state and speed written on it."""
+    odometry, joints = recording.odometry, recording.joints
+    moving = (odometry.position_in_world, odometry.quaternion,
+              smoothed(odometry.time, odometry.position_in_world, LOOK_WINDOW),
+              smoothed(odometry.time, velocity_in_heading(odometry)[:, :1], SPEED_WINDOW))
+    file = Path(matplotlib.get_data_path()) / 'fonts' / 'ttf' / 'DejaVuSans-Bold.ttf'
+    font, margin = ImageFont.truetype(str(file), max(height // 18, 11)), height // 24
 
-
-class _Painter:
-    """Draws the recording at a time, with its state and speed written on it."""
-
-    def __init__(self, recording: Recording, camera: Camera, shot: Shot) -> None:
-        self._recording, self._camera = recording, camera
-        odometry = recording.odometry
-        self._look = smoothed(odometry.time, odometry.position_in_world, LOOK_WINDOW)
-        self._speed = smoothed(odometry.time, velocity_in_heading(odometry)[:, :1], SPEED_WINDOW)
-        font = Path(matplotlib.get_data_path()) / 'fonts' / 'ttf' / 'DejaVuSans-Bold.ttf'
-        self._font = ImageFont.truetype(str(font), max(shot.height // 18, 11))
-        self._margin = shot.height // 24
-
-    def __call__(self, time: float) -> Frame:
-        """Frame at a time [s]."""
-        odometry, at = self._recording.odometry, np.array([time])
-        place, quaternion, look, speed = (
-            held(odometry.time, values, at)[0]
-            for values in (odometry.position_in_world, odometry.quaternion, self._look,
-                           self._speed))
-        joints = held(self._recording.joints.time, self._recording.joints.position, at)[0]
-        picture = Image.fromarray(
-            self._camera.drawn(place, quaternion, joints, look_at=look))
-        words = [event.message for event in self._recording.inhibition if event.time <= time]
-        self._write(picture, (words[-1] if words else '').replace('_', ' '),
-                    f'{round(float(speed[0]), 2) + 0.0:.2f} m/s   {time:.1f} s')
+    def draw(time: float) -> Frame:
+        at = np.array([time])
+        place, quaternion, look, speed = (held(odometry.time, values, at)[0] for values in moving)
+        angles = held(joints.time, joints.position, at)[0]
+        picture = Image.fromarray(camera.drawn(place, quaternion, angles, look_at=look))
+        words = [event.message for event in recording.inhibition if event.time <= time]
+        left = (words[-1] if words else '').replace('_', ' ')
+        right = f'{round(float(speed[0]), 2) + 0.0:.2f} m/s   {time:.1f} s'
+        pen = ImageDraw.Draw(picture)
+        end = picture.width - margin - pen.textlength(right, font=font)
+        for x, text in ((margin, left), (end, right)):
+            pen.text((x, margin), text, font=font, fill=INK, stroke_width=2, stroke_fill=OUTLINE)
         return np.asarray(picture, dtype=np.uint8)
 
-    def _write(self, picture: Image.Image, left: str, right: str) -> None:
-        pen, margin = ImageDraw.Draw(picture), self._margin
-        width = pen.textlength(right, font=self._font)
-        for x, text in ((margin, left), (picture.width - margin - width, right)):
-            pen.text((x, margin), text, font=self._font, fill=INK, stroke_width=2,
-                     stroke_fill=OUTLINE)
+    return draw
 
 
 def film_run(run: Path, path: Path, shot: Shot | None = None) -> int:
@@ -158,19 +148,78 @@ def film_run(run: Path, path: Path, shot: Shot | None = None) -> int:
     return film(load_recording(run), context, robot_file, path, shot)
 
 
+def has_encoder() -> bool:
+    """Whether MP4 can be written."""
+    return find_spec(ENCODER) is not None
+
+
+def checked_film_path(path: Path) -> Path:
+    """Return a film's path, or say why it cannot be written.
+
+    Raises
+    ------
+    ParameterError
+        If its ending is neither ``.gif`` nor ``.mp4``, or nothing here encodes MP4.
+    """
+    if path.suffix.lower() not in ('.gif', '.mp4'):
+        raise ParameterError(f"a film must end in .gif or .mp4, not '{path.name}'")
+    if path.suffix.lower() == '.mp4' and not has_encoder():
+        raise ParameterError(
+            f"'{path.name}' needs an encoder: pip install imageio-ffmpeg; a .gif needs none")
+    return path
+
+
+def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame], fps: float) -> None:
+    """Write frames as they come.
+
+    Parameters
+    ----------
+    path : Path
+        Ends in ``.gif`` or ``.mp4``.
+    frames : iterator of ndarray (height, width, 3) of uint8
+        At least one, all of one size.
+    palette_from : list of ndarray
+        Frames that have the colours of the film, for a GIF.
+    fps : float
+        Frames per second.
+
+    Raises
+    ------
+    ParameterError
+        See :func:`checked_film_path`.
+    """
+    checked_film_path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    first = next(frames)
+    frames = chain([first], frames)
+    if path.suffix.lower() == '.gif':
+        palette = Image.fromarray(np.concatenate(palette_from)).quantize(
+            COLOURS, Image.Quantize.MAXCOVERAGE)
+        pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+                    for frame in frames)
+        next(pictures).save(path, save_all=True, append_images=pictures, loop=0,
+                            duration=max(round(1000.0 / fps), 20), optimize=False)
+        return
+    import imageio_ffmpeg
+
+    writer = imageio_ffmpeg.write_frames(
+        str(path), first.shape[1::-1], fps=fps, quality=MP4_QUALITY, macro_block_size=2,
+        ffmpeg_log_level='error')
+    writer.send(None)
+    for frame in frames:
+        writer.send(np.ascontiguousarray(frame))
+    writer.close()
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    options = _parser().parse_args(arguments)
+    return run_command(_parser(), arguments, _film)
+
+
+def _film(options: argparse.Namespace, _: RosArguments) -> int:
     height = 2 * round(options.width * 9 / 32)
     shot = Shot(options.start, options.end, options.fps, options.width, height)
-    try:
-        frames = film_run(options.run, options.film, shot)
-    except DmpCpgError as error:
-        print(f'film: {error}', file=sys.stderr)
-        return BAD_INPUT
-    except OSError as error:
-        print(f"film: cannot write '{error.filename}': {error.strerror}", file=sys.stderr)
-        return BAD_INPUT
+    frames = film_run(options.run, options.film, shot)
     print(f'{options.film}: {frames} frames, {options.film.stat().st_size / 1e6:.2f} MB')
     return 0
 
@@ -178,15 +227,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='film', description="Draw a recorded run as a film, from the run's folder.")
-    parser.add_argument('run', metavar='RUN', type=Path, help="a run's folder, with bag/ inside")
-    parser.add_argument('film', metavar='FILE', type=Path,
-                        help='FILE.gif, or FILE.mp4 when imageio-ffmpeg is installed')
-    parser.add_argument('--start', metavar='S', type=float, help="begin, on the robot's clock")
-    parser.add_argument('--end', metavar='S', type=float, help='end')
-    parser.add_argument('--fps', metavar='HZ', type=float, default=Shot.fps,
-                        help=f'frames per second (default: {Shot.fps:g})')
-    parser.add_argument('--width', metavar='PIXELS', type=int, default=Shot.width,
-                        help=f'width, of 16:9 (default: {Shot.width})')
+    add = parser.add_argument
+    add('run', metavar='RUN', type=Path, help="a run's folder, with bag/ inside")
+    add('film', metavar='FILE', type=Path,
+        help='FILE.gif, or FILE.mp4 when imageio-ffmpeg is installed')
+    add('--start', metavar='S', type=float, default=Shot.start, help="begin, on the robot's clock")
+    add('--end', metavar='S', type=float, default=Shot.end, help='end')
+    add('--fps', metavar='HZ', type=float, default=Shot.fps,
+        help='frames per second (default: %(default)g)')
+    add('--width', metavar='PIXELS', type=int, default=Shot.width,
+        help='width, of 16:9 (default: %(default)s)')
     return parser
 
 

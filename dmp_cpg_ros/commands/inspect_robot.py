@@ -10,36 +10,28 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from dmp_cpg_ros.commands.ros_arguments import parse_arguments
-from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.inspector import Inspection, inspect_model
-
-BAD_INPUT = 2
-"""Exit status for a missing file, a model that is no quadruped, or a picture that cannot be."""
-
-KNEES = {-1: 'backwards', 1: 'forwards'}
-"""Sign of the knees' rotation to the way in which they bend."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    options, _ = parse_arguments(_parser(), arguments)
-    try:
-        found = inspect_model(options.model)
-        text = robot_yaml(found, None if options.output is None else options.output.parent)
-        if options.output is None:
-            print(text, end='')
-        else:
-            options.output.write_text(text, encoding='utf-8')
-        if options.picture is not None:
-            _draw(found, options.picture)
-    except DmpCpgError as error:
-        print(f'inspect_robot: {error}', file=sys.stderr)
-        return BAD_INPUT
-    except OSError as error:
-        print(f"inspect_robot: cannot write '{error.filename}': {error.strerror}", file=sys.stderr)
-        return BAD_INPUT
+    return run_command(_parser(), arguments, _inspect)
+
+
+def _inspect(options: argparse.Namespace, _: RosArguments) -> int:
+    found = inspect_model(options.model)
+    if options.output is None:
+        print(robot_yaml(found), end='')
+    else:
+        options.output.write_text(robot_yaml(found, options.output.parent), encoding='utf-8')
+    if options.picture is not None:
+        from matplotlib import image
+
+        from dmp_cpg_ros.robot.camera import leg_picture
+
+        image.imsave(options.picture, leg_picture(found.file))
     print(summary(found), file=sys.stderr if options.output is None else sys.stdout)
     return 0
 
@@ -55,26 +47,20 @@ def robot_yaml(found: Inspection, folder: Path | None = None) -> str:
         Where the file will be; the model is then named relative to it when it lies below it.
     """
     file = found.file
-    joints = (f'  {leg}: [{", ".join(names)}]'
+    joints = (f'  {leg}: [{", ".join(names)}]\n'
               for leg, names in zip(LEGS, file.joints, strict=True))
     feet = ', '.join(f'{leg}: {foot}' for leg, foot in zip(LEGS, file.feet, strict=True))
-    return '\n'.join((
-        f'# Found by inspect_robot in {file.model.name}; everything else is read from the model.',
-        f'model: {model_name(file.model, folder)}',
-        f'base: {file.base}',
-        'joints:',
-        *joints,
-        f'feet: {{{feet}}}',
-        ''))
+    return (
+        f'# Found by inspect_robot in {file.model.name}; everything else is read from the model.\n'
+        f'model: {model_name(file.model, folder)}\nbase: {file.base}\njoints:\n'
+        f'{"".join(joints)}feet: {{{feet}}}\n')
 
 
 def model_name(model: Path, folder: Path | None) -> str:
     """Name of a model in a robot file: inside a Python package, relative, or its full path."""
-    for entry in sys.path:
-        root = Path(entry).resolve() if entry else None
-        if root is not None and root.name in ('site-packages', 'dist-packages'):
-            if model.is_relative_to(root):
-                return f'package://{model.relative_to(root).as_posix()}'
+    for root in (Path(entry).resolve() for entry in sys.path if entry):
+        if root.name in ('site-packages', 'dist-packages') and model.is_relative_to(root):
+            return f'package://{model.relative_to(root).as_posix()}'
     if folder is not None and model.is_relative_to(folder.resolve()):
         return os.path.relpath(model, folder.resolve())
     return str(model)
@@ -83,39 +69,27 @@ def model_name(model: Path, folder: Path | None) -> str:
 def summary(found: Inspection) -> str:
     """What was found, in a few lines for people."""
     d, legs = found.description, found.description.legs
-    knees = {KNEES[leg.knee_sign] for leg in legs}
+    knees = {'forwards' if leg.knee_sign > 0 else 'backwards' for leg in legs}
     lengths = [sum((part @ part) ** 0.5 for part in (leg.thigh, leg.shank)) for leg in legs]
-    lines = [
+    limits, kp, kd = (', '.join(f'{value:.{digits}f}' for value in values) for values, digits in (
+        (legs[0].torque_limit, 1), (d.kp, 0), (d.kd, 1)))
+    others = f'\njoints of no leg, left alone: {", ".join(found.others)}' if found.others else ''
+    return (
         f'{d.name}: four legs, {d.mass:.1f} kg, base {d.stance_height:.3f} m over the ground when '
-        'it stands',
-        f'legs of {sum(lengths) / 4:.3f} m, knees bend {" and ".join(sorted(knees))}, feet of '
-        f'{1e3 * legs[0].foot_radius:.0f} mm radius',
-        'torque limits ' + ', '.join(f'{t:.1f}' for t in legs[0].torque_limit)
-        + ' N m; drive gains ' + ', '.join(f'{k:.0f}' for k in d.kp) + ' N m/rad, '
-        + ', '.join(f'{k:.1f}' for k in d.kd) + ' N m s/rad']
-    if found.others:
-        lines.append(f'joints of no leg, left alone: {", ".join(found.others)}')
-    return '\n'.join(lines)
-
-
-def _draw(found: Inspection, path: Path) -> None:
-    from matplotlib import image
-
-    from dmp_cpg_ros.robot.camera import leg_picture
-
-    image.imsave(path, leg_picture(found.file))
+        f'it stands\nlegs of {sum(lengths) / 4:.3f} m, knees bend {" and ".join(sorted(knees))}, '
+        f'feet of {1e3 * legs[0].foot_radius:.0f} mm radius\ntorque limits {limits} N m; drive '
+        f'gains {kp} N m/rad, {kd} N m s/rad{others}')
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog='inspect_robot',
-        description='Find the legs of a quadruped in an MJCF and write its robot file, which '
-        'walk --robot takes.')
-    parser.add_argument('model', metavar='FILE.xml', type=Path, help='MJCF file')
-    parser.add_argument('--output', metavar='FILE.yaml', type=Path,
-                        help='where to write the robot file (default: print it)')
-    parser.add_argument('--picture', metavar='FILE.png', type=Path,
-                        help='draw the robot with its legs in colours')
+    parser = argparse.ArgumentParser(prog='inspect_robot', description=(
+        'Find the legs of a quadruped in an MJCF and write its robot file, which walk --robot '
+        'takes.'))
+    add = parser.add_argument
+    add('model', metavar='FILE.xml', type=Path, help='MJCF file')
+    add('--output', metavar='FILE.yaml', type=Path,
+        help='where to write the robot file (default: print it)')
+    add('--picture', metavar='FILE.png', type=Path, help='draw the robot with its legs in colours')
     return parser
 
 

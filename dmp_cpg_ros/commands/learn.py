@@ -12,14 +12,11 @@ from time import perf_counter
 
 import numpy as np
 
-from dmp_cpg_ros.commands.demonstration_files import read_demonstration
-from dmp_cpg_ros.commands.motion_demonstrations import read_motion
-from dmp_cpg_ros.commands.ros_arguments import parse_arguments
-from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
-from dmp_cpg_ros.core.learning import discrete as learning_discrete
-from dmp_cpg_ros.core.learning import rhythmic as learning_rhythmic
+from dmp_cpg_ros.commands.demonstration_files import read_demonstration, read_motion
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.learning import discrete, period, rhythmic
 from dmp_cpg_ros.core.learning.learning import METHODS, FitOptions, ranges
-from dmp_cpg_ros.core.learning.period import spread_between_cycles
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
@@ -27,8 +24,7 @@ from dmp_cpg_ros.core.primitives.spring_damper import FORMS
 from dmp_cpg_ros.core.transformation.learned_motion import LearnedMotion, learn_motion
 from dmp_cpg_ros.primitive_files import save_primitive
 
-BAD_INPUT = 2
-"""Exit status for files and arguments that cannot be used."""
+Primitive = DiscretePrimitive | RhythmicPrimitive
 
 _EXAMPLES = """\
 files:
@@ -47,21 +43,34 @@ examples:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    options, _ = parse_arguments(_parser(), arguments)
-    try:
-        if options.motion is not None:
-            return _motion(options)
-        if options.out is None:
-            raise ParameterError('name the file to write, with --out FILE or --motion FILE')
-        demonstrations = [_read(path, options) for path in options.demonstrations]
-        began = perf_counter()
-        primitive, errors = _learn(demonstrations, options)
-        seconds = perf_counter() - began
-        save_primitive(primitive, options.out)
-    except DmpCpgError as error:
-        print(f'learn: {error}', file=sys.stderr)
-        return BAD_INPUT
-    _report(primitive, errors, _irregularity(demonstrations, primitive), seconds, options.out)
+    return run_command(_parser(), arguments, _main)
+
+
+def _main(options: argparse.Namespace, _: RosArguments) -> int:
+    if options.motion is not None:
+        return _motion(options)
+    if options.out is None:
+        raise ParameterError('name the file to write, with --out FILE or --motion FILE')
+    demonstrations = [
+        read_demonstration(path, options.joints, options.topic or 'joint_states', options.start,
+                           options.end) for path in options.demonstrations]
+    if options.positions_only:
+        demonstrations = [Demonstration(read.times, read.positions, names=read.names)
+                          for read in demonstrations]
+    began = perf_counter()
+    primitive, errors = _learn(demonstrations, options)
+    seconds = perf_counter() - began
+    save_primitive(primitive, options.out)
+    kind, time = (('discrete', f'duration {primitive.duration:.6g} s')
+                  if isinstance(primitive, DiscretePrimitive) else
+                  ('rhythmic', f'period {primitive.period:.6g} s'))
+    print(f'{kind} primitive, {primitive.bases.count} bases, {time}')
+    print(f'largest reproduction error in % of the range: {_listed(primitive, errors)}')
+    irregular = _irregularity(demonstrations, primitive)
+    if irregular is not None:
+        print('the cycles themselves differ from their mean by up to: '
+              f'{_listed(primitive, irregular)}')
+    print(f'learned and checked in {seconds:.3g} s\nwrote {options.out}')
     return 0
 
 
@@ -75,9 +84,9 @@ def _motion(options: argparse.Namespace) -> int:
     if len(heights) > 1:
         raise DataError('a motion is learned from walks of one robot')
     bases = 25 if options.bases == 'auto' else options.bases
-    gains = {'stiffness': options.stiffness, 'damping': options.damping}
-    primitive, errors = learn_motion(
-        feet, heights.pop(), bases, **{k: v for k, v in gains.items() if v is not None})
+    gains = {name: value for name in ('stiffness', 'damping')
+             if (value := getattr(options, name)) is not None}
+    primitive, errors = learn_motion(feet, heights.pop(), bases, **gains)
     motion = LearnedMotion(primitive)
     save_primitive(primitive, options.motion)
     stride, side, lift = errors.reshape(-1, 3).max(axis=0)
@@ -89,70 +98,37 @@ def _motion(options: argparse.Namespace) -> int:
     return 0
 
 
-def _read(path: Path, options: argparse.Namespace) -> Demonstration:
-    topic = options.topic or 'joint_states'
-    read = read_demonstration(path, options.joints, topic, options.start, options.end)
-    if options.positions_only:
-        return Demonstration(read.times, read.positions, names=read.names)
-    return read
-
-
-def _learn(
-    demonstrations: list[Demonstration], options: argparse.Namespace
-) -> tuple[DiscretePrimitive | RhythmicPrimitive, np.ndarray]:
+def _learn(demonstrations: list[Demonstration], options: argparse.Namespace
+           ) -> tuple[Primitive, np.ndarray]:
     fit = FitOptions(options.method, options.ridge, options.overlap)
     bases = None if options.bases == 'auto' else options.bases
     common = {'stiffness': options.stiffness, 'damping': options.damping, 'form': options.form}
     if options.kind == 'discrete':
-        reach = learning_discrete.learn_discrete(demonstrations, bases, options=fit, **common)
-        return reach, learning_discrete.reproduction_errors(reach, demonstrations)
-    cycle = learning_rhythmic.learn_rhythmic(
-        demonstrations, bases, period=options.period, options=fit, **common
-    )
-    return cycle, learning_rhythmic.reproduction_errors(cycle, demonstrations, options.period)
+        reach = discrete.learn_discrete(demonstrations, bases, options=fit, **common)
+        return reach, discrete.reproduction_errors(reach, demonstrations)
+    cycle = rhythmic.learn_rhythmic(demonstrations, bases, period=options.period, options=fit,
+                                    **common)
+    return cycle, rhythmic.reproduction_errors(cycle, demonstrations, options.period)
 
 
-def _irregularity(
-    demonstrations: list[Demonstration], primitive: DiscretePrimitive | RhythmicPrimitive
-) -> np.ndarray | None:
+def _irregularity(demonstrations: list[Demonstration], primitive: Primitive) -> np.ndarray | None:
     """Departure of cycles from their mean, of the range; None without one recording of two."""
     first = demonstrations[0]
-    if isinstance(primitive, DiscretePrimitive) or len(demonstrations) > 1:
+    if (isinstance(primitive, DiscretePrimitive) or len(demonstrations) > 1
+            or first.duration < 2.0 * primitive.period):
         return None
-    if first.duration < 2.0 * primitive.period:
-        return None
-    return spread_between_cycles(first, primitive.period) / ranges([first])
+    return period.spread_between_cycles(first, primitive.period) / ranges([first])
 
 
-def _report(
-    primitive: DiscretePrimitive | RhythmicPrimitive,
-    errors: np.ndarray,
-    irregular: np.ndarray | None,
-    seconds: float,
-    out: Path,
-) -> None:
-    if isinstance(primitive, DiscretePrimitive):
-        kind, time = 'discrete', f'duration {primitive.duration:.6g} s'
-    else:
-        kind, time = 'rhythmic', f'period {primitive.period:.6g} s'
-    names = primitive.names or tuple(str(i + 1) for i in range(primitive.dofs))
-    listed = ', '.join(f'{name} {100.0 * e:.3g} %' for name, e in zip(names, errors, strict=True))
-    print(f'{kind} primitive, {primitive.bases.count} bases, {time}')
-    print(f'largest reproduction error in % of the range: {listed}')
-    if irregular is not None:
-        listed = ', '.join(f'{n} {100.0 * e:.3g} %' for n, e in zip(names, irregular, strict=True))
-        print(f'the cycles themselves differ from their mean by up to: {listed}')
-    print(f'learned and checked in {seconds:.3g} s')
-    print(f'wrote {out}')
+def _listed(primitive: Primitive, shares: np.ndarray) -> str:
+    names = primitive.names or range(1, primitive.dofs + 1)
+    return ', '.join(f'{name} {100.0 * e:.3g} %' for name, e in zip(names, shares, strict=True))
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='learn',
-        description='Learn a discrete or rhythmic movement primitive from demonstrations.',
-        epilog=_EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+        prog='learn', epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Learn a discrete or rhythmic movement primitive from demonstrations.')
     add = parser.add_argument
     add('demonstrations', metavar='DEMO', nargs='+', type=Path, help='CSV or NumPy file, or bag')
     add('--out', metavar='FILE', type=Path, help='YAML file to write')
@@ -161,14 +137,10 @@ def _parser() -> argparse.ArgumentParser:
     add('--robot', metavar='FILE', type=Path,
         help='robot that walked, for --motion (default: the one of the run)')
     add('--kind', choices=('discrete', 'rhythmic'), default='discrete', help='default: discrete')
-    add(
-        '--bases',
-        type=_bases,
-        default=25,
-        help="number of bases, or 'auto' to choose it by the held-out error (default: 25)",
-    )
+    add('--bases', type=_bases, default=25,
+        help="number of bases, or 'auto' to choose it by the held-out error (default: 25)")
     add('--period', metavar='S', type=float, help='period of a rhythm (default: found from data)')
-    add('--joints', metavar='A,B', type=_names, default=(), help='joints to take (default: all)')
+    add('--joints', metavar='A,B', type=_words, default=(), help='joints to take (default: all)')
     add('--topic', help='topic of a bag (default: joint_states; joint_targets for --motion)')
     add('--start', metavar='S', type=float, help='take samples from here on, after the first [s]')
     add('--end', metavar='S', type=float, help='take samples up to here, after the first [s]')
@@ -183,16 +155,13 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _bases(text: str) -> int | str:
-    if text == 'auto':
-        return text
-    if not text.isdecimal() or int(text) < 1:
+    if text != 'auto' and (not text.isdecimal() or int(text) < 1):
         raise argparse.ArgumentTypeError(
-            f"must be a whole number of at least 1 or 'auto', not {text!r}"
-        )
-    return int(text)
+            f"must be a whole number of at least 1 or 'auto', not {text!r}")
+    return text if text == 'auto' else int(text)
 
 
-def _names(text: str) -> tuple[str, ...]:
+def _words(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(',') if name.strip())
 
 

@@ -16,37 +16,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-
-
-@dataclass(frozen=True)
-class Ended:
-    """A process that has ended.
-
-    Attributes
-    ----------
-    name : str
-        Its name.
-    status : int
-        Its exit status; negative for a signal.
-    log : Path
-        Its output.
-    """
-
-    name: str
-    status: int
-    log: Path
-
-    def __str__(self) -> str:
-        """Say what happened, with the last line of the output."""
-        how = (
-            f'was ended by signal {-self.status}'
-            if self.status < 0
-            else f'ended with status {self.status}'
-        )
-        lines = self.log.read_text(encoding='utf-8', errors='replace').strip().splitlines()
-        return f'{self.name} {how}{": " + lines[-1] if lines else ""}'
 
 
 class ProcessGroup:
@@ -73,20 +43,21 @@ class ProcessGroup:
         with (self._logs / f'{name}.log').open('wb') as log:
             self._processes[name] = subprocess.Popen(
                 [sys.executable, '-m', __name__, str(os.getpid()), module, *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-                env=environment,
-            )
+                stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                start_new_session=True, env=environment)
 
-    def ended(self) -> list[Ended]:
-        """Processes that have ended."""
-        return [
-            Ended(name, process.returncode, self._logs / f'{name}.log')
-            for name, process in self._processes.items()
-            if process.poll() is not None
-        ]
+    def ended(self) -> list[str]:
+        """Say of every process that has ended how, with the last line of its output."""
+        found = []
+        for name, process in self._processes.items():
+            status = process.poll()
+            if status is not None:
+                how = (f'was ended by signal {-status}' if status < 0 else
+                       f'ended with status {status}')
+                log = (self._logs / f'{name}.log').read_text(encoding='utf-8', errors='replace')
+                last = log.strip().rpartition('\n')[2]
+                found.append(f'{name} {how}{last and ": " + last}')
+        return found
 
     def stop(self, patience_s: float = 15.0) -> list[str]:
         """End all processes: interrupt, and after a time kill.
@@ -96,9 +67,8 @@ class ProcessGroup:
         list of str
             Names of those that had to be killed.
         """
-        running = {
-            name: process for name, process in self._processes.items() if process.poll() is None
-        }
+        running = {name: process for name, process in self._processes.items()
+                   if process.poll() is None}
         for process in running.values():
             process.send_signal(signal.SIGINT)
         deadline, killed = time.monotonic() + patience_s, []

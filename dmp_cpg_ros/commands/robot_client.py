@@ -7,9 +7,14 @@ from __future__ import annotations
 import argparse
 import importlib
 import math
+import os
+import re
+import select
 import signal
 import sys
+import termios
 import time
+import tty
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,23 +22,19 @@ import rclpy
 import yaml
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
-from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.commands.suite_client import (
-    ClientError,
-    SuiteClient,
-    VelocityCommand,
-    deliver,
-)
+from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, deliver, velocity_command
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.framework.parameters import plain
+from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
@@ -42,6 +43,22 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 ENDLESS = ('cmd_vel', 'teleop', 'echo')
 """Commands that Ctrl-C ends as it should."""
+
+STILL = (0.0, 0.0, 0.0)
+
+STEPS = {'w': (0.1, 0.0), 's': (-0.1, 0.0), 'a': (0.0, 0.2), 'd': (0.0, -0.2)}
+"""Change of v_x [m/s] and of the yaw rate [rad/s] by one press of a key."""
+
+ARROWS = {'A': 'w', 'B': 's', 'D': 'a', 'C': 'd'}
+"""Last letter of what an arrow key sends, and the key that does the same."""
+
+SERVICES = {' ': 'inhibit', 'u': 'stand_up', 'l': 'lie_down', 'r': 'recover'}
+"""Keys that call a service; the first stops the gait or starts it again."""
+
+HELP = """\
+w/s or up/down: faster, slower; a/d or left/right: turn; x: no velocity
+space: inhibit or resume; u: stand up, l: lie down, r: recover; q: quit
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,44 +74,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rclpy.init(args=['robot_client', *arguments],
                    signal_handler_options=SignalHandlerOptions.NO)
         node = Node('robot_client', enable_rosout=False, start_parameter_services=False)
-        status: int = options.run(SuiteClient(node, options.wait), options)
-        return status
-    except ParameterError as error:
-        return _said(error, BAD_INPUT)
+        options.run(SuiteClient(node, options.wait), options)
     except (DmpCpgError, RuntimeError) as error:
-        return _said(error, FAILED)
+        print(f'robot_client: {error}', file=sys.stderr)
+        return BAD_INPUT if isinstance(error, ParameterError) else FAILED
     except KeyboardInterrupt:
         return OK if options.command in ENDLESS else INTERRUPTED
     finally:
         rclpy.try_shutdown()
-
-
-def request_stop(client: SuiteClient, options: argparse.Namespace) -> int:
-    """Inhibit or resume the gait."""
-    return _told(client.call('inhibit', SetBool.Request(data=options.command == 'inhibit')))
-
-
-def request_mode(client: SuiteClient, options: argparse.Namespace) -> int:
-    """Stand up, lie down or recover."""
-    return _told(client.call(options.command, Trigger.Request()))
-
-
-def publish_command(client: SuiteClient, options: argparse.Namespace) -> int:
-    """Command a velocity for some time or until Ctrl-C; the last command is zero."""
-    command = VelocityCommand(client, stamped=options.stamped)
-    begin, sent = time.monotonic(), 0
-    try:
-        while time.monotonic() - begin < options.seconds:
-            command.send((options.v_x, options.v_y, options.yaw_rate))
-            sent += 1
-            client.spin_until(lambda: False, max(
-                0.0, begin + min(sent / options.rate, options.seconds) - time.monotonic()))
-    finally:
-        command.end()
     return OK
 
 
-def push(client: SuiteClient, options: argparse.Namespace) -> int:
+def request(client: SuiteClient, options: argparse.Namespace) -> None:
+    """Inhibit or resume the gait, stand up, lie down or recover; a refusal is an error."""
+    stop = {'inhibit': True, 'resume': False}.get(options.command)
+    answer = (client.call(options.command, Trigger.Request()) if stop is None else
+              client.call('inhibit', SetBool.Request(data=stop)))
+    if not answer.success:
+        raise ClientError(answer.message)
+    print(answer.message)
+
+
+def publish_command(client: SuiteClient, options: argparse.Namespace) -> None:
+    """Command a velocity for some time or until Ctrl-C; the last command is zero."""
+    with velocity_command(client, stamped=options.stamped) as send:
+        begin, sent = time.monotonic(), 0
+        while time.monotonic() - begin < options.seconds:
+            send((options.v_x, options.v_y, options.yaw_rate))
+            sent += 1
+            client.spin_until(lambda: False, max(
+                0.0, begin + min(sent / options.rate, options.seconds) - time.monotonic()))
+
+
+def push(client: SuiteClient, options: argparse.Namespace) -> None:
     """Push the simulated robot."""
     message = WrenchStamped()
     vector = message.wrench.force
@@ -102,48 +114,43 @@ def push(client: SuiteClient, options: argparse.Namespace) -> int:
     publisher = client.publisher(interface('push'))
     publisher.publish(message)
     deliver(publisher)
-    return OK
 
 
-def parameter(client: SuiteClient, options: argparse.Namespace) -> int:
+def parameter(client: SuiteClient, options: argparse.Namespace) -> None:
     """Get, set or list the parameters of a node."""
-    node, name, value = options.node, options.name, options.value
-    if (options.action == 'list') != (name is None) or (options.action == 'set') != (
-            value is not None):
+    action, node, name, value = options.action, options.node, options.name, options.value
+    if (action == 'list') != (name is None) or (action == 'set') != (value is not None):
         raise ParameterError('param takes: list NODE, get NODE NAME, or set NODE NAME VALUE')
     client.meet(['inhibition'])
-
-    def service(kind: Any, end: str) -> Client:
-        return client.node.create_client(kind, f'{node}/{end}')
-
-    if options.action == 'list':
-        answer = client.ask(service(ListParameters, 'list_parameters'), ListParameters.Request())
-        print('\n'.join(sorted(answer.result.names)))
-        return OK
-    setter = service(SetParameters, 'set_parameters')
-    known = client.ask(service(GetParameters, 'get_parameters'),
-                       GetParameters.Request(names=[name])).values
+    # The one that must not be repeated first: see SuiteClient.
+    setting, getting, listing = (
+        client.node.create_client(kind, f'{node}/{end}_parameters') for kind, end in (
+            (SetParameters, 'set'), (GetParameters, 'get'), (ListParameters, 'list')))
+    if action == 'list':
+        print('\n'.join(sorted(client.ask(listing, ListParameters.Request()).result.names)))
+        return
+    known = client.ask(getting, GetParameters.Request(names=[name])).values
     if not known or known[0].type == Parameter.Type.NOT_SET.value:
         raise ClientError(f"{node} has no parameter '{name}'; see: robot_client param list {node}")
-    if options.action == 'get':
+    if action == 'get':
         print(plain(parameter_value_to_python(known[0])))
-        return OK
+        return
     given = parameter_value_to_python(get_parameter_value(value))
     if known[0].type == Parameter.Type.DOUBLE.value and type(given) is int:
         given = float(given)
-    client.meet([], setter)
-    request = SetParameters.Request(parameters=[Parameter(name, value=given).to_parameter_msg()])
-    result = client.answer([setter.call_async(request)], setter.service_name).results[0]
+    client.meet([], setting)
+    change = SetParameters.Request(parameters=[Parameter(name, value=given).to_parameter_msg()])
+    result = client.answer([setting.call_async(change)], setting.service_name).results[0]
     if not result.successful:
         raise ClientError(f'Setting parameter failed: {result.reason}')
     print('Set parameter successful')
-    return OK
 
 
-def show_nodes(client: SuiteClient, options: argparse.Namespace) -> int:
+def show_nodes(client: SuiteClient, options: argparse.Namespace) -> None:
     """List the nodes of the suite with what they wait for, and the others."""
     client.meet(['inhibition'])
-    clients = {name: client.node.create_client(Trigger, f'{name}/ready')
+    node = client.node
+    clients = {name: node.create_client(Trigger, f'{name}/ready')
                for name in (*WALKING_NODES, RECORDER)}
     client.spin_until(lambda: all(each.service_is_ready() for each in clients.values()),
                       options.wait)
@@ -151,72 +158,137 @@ def show_nodes(client: SuiteClient, options: argparse.Namespace) -> int:
         state = (client.ask(each, Trigger.Request()).message if each.service_is_ready()
                  else 'does not run')
         print(f'{name:24}{state}')
-    here = {name for name, space in client.node.get_node_names_and_namespaces()
-            if space == client.node.get_namespace()}
-    for name in sorted(here - set(clients) - {client.node.get_name()}):
+    here = {name for name, space in node.get_node_names_and_namespaces()
+            if space == node.get_namespace()}
+    for name in sorted(here - set(clients) - {node.get_name()}):
         print(f'{name:24}not of the suite')
-    return OK
 
 
-def echo(client: SuiteClient, options: argparse.Namespace) -> int:
+def echo(client: SuiteClient, options: argparse.Namespace) -> None:
     """Print the messages of a topic as YAML."""
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # echo TOPIC | head ends quietly
     client.meet(['inhibition'])
-    known = INTERFACES.get(options.topic)
     name = client.node.resolve_topic_name(options.topic)
-    ends: list[Any] = []
-
-    def found() -> list[Any]:
-        ends[:] = client.node.get_publishers_info_by_topic(name)
-        return ends
-
-    if not client.spin_until(found, options.wait):
-        raise ClientError(f"nobody publishes {name}; the suite's topics are {_topics()}")
-    profile = known.reader_qos if known else ends[0].qos_profile
+    ends = client.node.get_publishers_info_by_topic
+    if not client.spin_until(lambda: ends(name), options.wait):
+        raise ClientError(f"nobody publishes {name}; the suite's topics are "
+                          f'{", ".join(topic.name for topic in TOPICS)}')
+    known, end = INTERFACES.get(options.topic), ends(name)[0]
+    package, _, kind = end.topic_type.split('/')
+    try:
+        message_type = getattr(importlib.import_module(f'{package}.msg'), kind)
+    except ImportError as error:
+        raise ClientError(f'messages of {package} are not installed: {error}') from None
     messages: list[Any] = []
-    client.node.create_subscription(
-        _message_type(ends[0].topic_type), name, messages.append, profile)
+    client.node.create_subscription(message_type, name, messages.append,
+                                    known.reader_qos if known else end.qos_profile)
     while client.spin_until(lambda: messages):
         for message in messages:
             print(yaml.safe_dump(_as_mapping(message), sort_keys=False), end='---\n', flush=True)
             if options.once:
-                return OK
+                return
         messages.clear()
-    return OK
 
 
-def drive(client: SuiteClient, options: argparse.Namespace) -> int:
-    """Drive by keyboard."""
-    from dmp_cpg_ros.commands.teleop import drive_by_keyboard
+class Teleop:
+    """What the keys do.
 
-    command = VelocityCommand(client, stamped=options.stamped)
-    return drive_by_keyboard(client, command, options.rate)
+    Parameters
+    ----------
+    client : SuiteClient
+        The suite.
+
+    Attributes
+    ----------
+    velocity : tuple of 3 floats
+        Commanded v_x, v_y [m/s] and yaw rate [rad/s].
+    """
+
+    def __init__(self, client: SuiteClient) -> None:
+        """Create clients, and listen to the state of the stop."""
+        node, gains = client.node, InhibitionGainsReader()
+
+        def on_state(message: Any) -> None:
+            self._word = read_state_word(message)
+
+        def on_gains(message: Any) -> None:
+            self._requested = gains.read(message).requested
+
+        self.velocity = STILL
+        self._word, self._requested, self._shown = '', False, ''
+        services = {key: interface(name) for key, name in SERVICES.items()}
+        self._clients = {key: node.create_client(service.type, service.name)
+                         for key, service in services.items()}
+        for name, callback in (('inhibition_state', on_state), ('inhibition_gains', on_gains)):
+            topic = interface(name)
+            node.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
+        kinds = {kind for service in services.values() for kind in service.publishers}
+        client.meet(sorted(kinds), *self._clients.values())
+
+    def press(self, key: str) -> None:
+        """Take a key; unknown ones do nothing."""
+        v_x, _, yaw_rate = self.velocity
+        if key in STEPS:
+            faster, further = STEPS[key]
+            self.velocity = (round(v_x + faster, 3), 0.0, round(yaw_rate + further, 3))
+        elif key == 'x':
+            self.velocity = STILL
+        elif key in self._clients:
+            client = self._clients[key]
+            request = client.srv_type.Request()
+            if key == ' ':
+                request.data = not self._requested
+            client.call_async(request).add_done_callback(self._answered)
+
+    def show(self) -> None:
+        """Rewrite the last line of the terminal where it has changed."""
+        v_x, _, yaw_rate = self.velocity
+        line = f'{v_x:+.1f} m/s, {yaw_rate:+.1f} rad/s, {self._word.replace("_", " ")}'
+        if line != self._shown:
+            self._shown = line
+            print(f'\r\x1b[K{line}', end='', flush=True)
+
+    def _answered(self, future: Future) -> None:
+        answer = future.result()
+        print(f'\r\x1b[K{"" if answer.success else "refused: "}{answer.message}')
+        self._shown = ''
 
 
-def _told(answer: Any) -> int:
-    """Print the answer of a service; a refusal is an error."""
-    if not answer.success:
-        raise ClientError(answer.message)
-    print(answer.message)
-    return OK
+def drive(client: SuiteClient, options: argparse.Namespace) -> None:
+    """Drive by keyboard until q, Ctrl-C or the end of the input; the last command is zero."""
+    terminal = sys.stdin.fileno()
+    if not os.isatty(terminal):
+        raise ClientError('teleop reads keys from a terminal, and this input is none')
+    with velocity_command(client, stamped=options.stamped) as send:
+        teleop = Teleop(client)
+        print(HELP, end='')
+        former = termios.tcgetattr(terminal)
+        try:
+            tty.setcbreak(terminal)  # gives every key at once and shows none
+            while True:
+                send(teleop.velocity)
+                teleop.show()
+                client.spin_until(lambda: _waiting(terminal), 1.0 / options.rate)
+                for key in _keys(terminal):
+                    if key == 'q':
+                        return
+                    teleop.press(key)
+        finally:
+            termios.tcsetattr(terminal, termios.TCSADRAIN, former)
+            print()
 
 
-def _said(error: Exception, status: int) -> int:
-    print(f'robot_client: {error}', file=sys.stderr)
-    return status
+def _waiting(terminal: int) -> bool:
+    return bool(select.select([terminal], [], [], 0.0)[0])
 
 
-def _topics() -> str:
-    return ', '.join(topic.name for topic in TOPICS)
-
-
-def _message_type(name: str) -> Any:
-    """Class of a type such as ``std_msgs/msg/String``."""
-    package, _, message = name.split('/')
-    try:
-        return getattr(importlib.import_module(f'{package}.msg'), message)
-    except ImportError as error:
-        raise ClientError(f'messages of {package} are not installed: {error}') from None
+def _keys(terminal: int) -> list[str]:
+    """Keys that were pressed, arrows by the letter that does the same; q at the end of input."""
+    if not _waiting(terminal):
+        return []
+    text = os.read(terminal, 1024).decode(errors='replace')
+    pressed = re.findall(r'\x1b[\[O](.)|(.)', text, re.DOTALL)
+    return [ARROWS.get(arrow, '') or key for arrow, key in pressed] or ['q']
 
 
 def _as_mapping(value: Any) -> Any:
@@ -253,8 +325,7 @@ def _parser() -> argparse.ArgumentParser:
         description='Command a running suite (start one with walk). It is looked for in the '
         'domain of ROS_DOMAIN_ID; --ros-args are taken as by every node.',
         epilog='Exit status: 0 when it was done, 1 when no suite is found or it refuses, 2 '
-        'for bad input, 130 for Ctrl-C before it was done.',
-    )
+        'for bad input, 130 for Ctrl-C before it was done.')
     parser.add_argument('--namespace', metavar='NAME', help="the suite's namespace")
     parser.add_argument('--wait', metavar='SECONDS', type=_positive, default=10.0,
                         help='how long to look for the suite (default: 10)')
@@ -272,25 +343,25 @@ def _parser() -> argparse.ArgumentParser:
                            help='send TwistStamped, for a suite with stamped_cmd_vel:=true')
 
     velocity = command('cmd_vel', publish_command, 'command a velocity until Ctrl-C')
-    for name, text, default in (('v_x', 'forward [m/s]', None), ('v_y', 'to the left [m/s]', 0.0),
-                                ('yaw_rate', 'to the left [rad/s]', 0.0)):
-        velocity.add_argument(name, type=_number, help=text, default=default,
-                              nargs=None if default is None else '?')
+    velocity.add_argument('v_x', type=_number, help='forward [m/s]')
+    for name, unit in (('v_y', 'm/s'), ('yaw_rate', 'rad/s')):
+        velocity.add_argument(name, type=_number, help=f'to the left [{unit}]', default=0.0,
+                              nargs='?')
     velocity.add_argument('--for', metavar='SECONDS', dest='seconds', type=_positive,
                           default=math.inf, help='end after so long')
     sending(velocity)
-    command('inhibit', request_stop, 'stop the gait')
-    command('resume', request_stop, 'start the gait')
+    command('inhibit', request, 'stop the gait')
+    command('resume', request, 'start the gait')
     for name in REQUESTS:
-        command(name, request_mode, interface(name).meaning)
+        command(name, request, interface(name).meaning)
     pushing = command('push', push, 'push the simulated robot for 0.1 s')
     pushing.add_argument('force', metavar='F', type=_number, nargs=3,
                          help='forward, to the left, up [N]')
     parameters = command('param', parameter, 'get, set or list parameters of a node')
     parameters.add_argument('action', choices=('get', 'set', 'list'))
     parameters.add_argument('node', metavar='NODE')
-    parameters.add_argument('name', metavar='NAME', nargs='?')
-    parameters.add_argument('value', metavar='VALUE', nargs='?')
+    for name in ('name', 'value'):
+        parameters.add_argument(name, metavar=name.upper(), nargs='?')
     command('nodes', show_nodes, 'list the nodes and what they wait for')
     printing = command('echo', echo, 'print what is published on a topic')
     printing.add_argument('topic', metavar='TOPIC')

@@ -1,22 +1,24 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``--ros-args`` of the commands that are not nodes: which of them are accepted."""
+"""What the command lines of commands share: ``--ros-args``, and how bad input is refused."""
 
 from __future__ import annotations
 
 import argparse
 import logging
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from dmp_cpg_ros.configuration import parse_yaml
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 
-LEVELS = {'debug': logging.DEBUG, 'info': logging.INFO, 'warn': logging.WARNING,
-          'error': logging.ERROR, 'fatal': logging.CRITICAL}
-"""Log levels of ROS as those of Python."""
+BAD_INPUT = 2
+"""Exit status of a command whose arguments or files cannot be used."""
+
+LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
+"""Log levels of ROS; Python's have the same names."""
 
 VALUED = {'-p': '--param', '-r': '--remap', '-e': '--enclave', '--param': '--param',
           '--remap': '--remap', '--params-file': '--params-file', '--log-level': '--log-level',
@@ -52,9 +54,36 @@ class RosArguments:
     others: list[str] = field(default_factory=list)
 
 
-def parse_arguments(
-    parser: argparse.ArgumentParser, arguments: Sequence[str] | None, *, parameters: bool = False
-) -> tuple[argparse.Namespace, RosArguments]:
+def run_command(parser: argparse.ArgumentParser, arguments: Sequence[str] | None,
+                run: Callable[[argparse.Namespace, RosArguments], int], *,
+                parameters: bool = False) -> int:
+    """Body of a command: parse, run, say in one line what cannot be used.
+
+    Parameters
+    ----------
+    parser, arguments, parameters
+        As for :func:`parse_arguments`.
+    run : callable (options, ros arguments) → int
+        What the command does; returns the exit status.
+
+    Returns
+    -------
+    int
+        Exit status: ``BAD_INPUT`` after a DmpCpgError or OSError.
+    """
+    options, ros = parse_arguments(parser, arguments, parameters=parameters)
+    try:
+        return run(options, ros)
+    except DmpCpgError as error:
+        problem = str(error)
+    except OSError as error:
+        problem = f"cannot write '{error.filename or 'output'}': {error.strerror}"
+    print(f'{parser.prog}: {problem}', file=sys.stderr)
+    return BAD_INPUT
+
+
+def parse_arguments(parser: argparse.ArgumentParser, arguments: Sequence[str] | None, *,
+                    parameters: bool = False) -> tuple[argparse.Namespace, RosArguments]:
     """Parse a command line with ``--ros-args``; exits with status 2 where it is wrong.
 
     Parameters
@@ -119,10 +148,8 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
     ros: list[str] = []
     into = own
     for argument in arguments:
-        if argument == '--ros-args':
-            into = ros
-        elif argument == '--' and into is ros:
-            into = own
+        if argument == '--ros-args' or (argument == '--' and into is ros):
+            into = own if argument == '--' else ros
         else:
             into.append(argument)
     return own, ros
@@ -130,39 +157,33 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
 
 def _read(arguments: list[str]) -> RosArguments:
     read, waiting = RosArguments(), iter(arguments)
-    for flag in waiting:
-        if flag in SWITCHES:
-            read.others.append(flag)
+    for given in waiting:
+        if given in SWITCHES:
+            read.others.append(given)
             continue
-        if flag not in VALUED:
-            raise ParameterError(f"unknown ROS argument '{flag}'; valid are "
+        flag, value = VALUED.get(given), next(waiting, None)
+        if flag is None:
+            raise ParameterError(f"unknown ROS argument '{given}'; valid are "
                                  f"{', '.join([*VALUED, *SWITCHES])}")
-        value = next(waiting, None)
         if value is None:
-            raise ParameterError(f"'{flag}' needs a value")
-        _take(read, VALUED[flag], value)
-    return read
-
-
-def _take(read: RosArguments, flag: str, value: str) -> None:
-    if flag == '--param':
-        name, parsed = read_parameter(value)
-        read.parameters[name] = parsed
-    elif flag == '--params-file':
-        if read.parameters_file is not None:
-            raise ParameterError('only one --params-file can be taken')
-        read.parameters_file = value
-    elif flag == '--remap':
-        name, target = read_pair(value)
-        if name == '__ns':
-            read.namespace = checked_namespace(target)
+            raise ParameterError(f"'{given}' needs a value")
+        if flag == '--param':
+            read.parameters.update([read_parameter(value)])
+        elif flag == '--params-file':
+            if read.parameters_file is not None:
+                raise ParameterError('only one --params-file can be taken')
+            read.parameters_file = value
+        elif flag == '--remap':
+            name, target = read_pair(value)
+            if name == '__ns':
+                read.namespace = checked_namespace(target)
+            else:
+                read.remappings.append((name, target))
         else:
-            read.remappings.append((name, target))
-    else:
-        read.others += [flag, value]
-        level = value.rpartition(':=')[2].lower()
+            read.others += [flag, value]
         if flag == '--log-level':
+            level = value.rpartition(':=')[2].lower()
             if level not in LEVELS:
-                raise ParameterError(
-                    f"'{value}' is no log level; valid are {', '.join(LEVELS)}")
-            logging.getLogger().setLevel(LEVELS[level])
+                raise ParameterError(f"'{value}' is no log level; valid are {', '.join(LEVELS)}")
+            logging.getLogger().setLevel(level.upper())
+    return read

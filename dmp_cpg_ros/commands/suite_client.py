@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from rclpy.client import Client
@@ -63,8 +64,8 @@ class SuiteClient:
         """Run callbacks until a condition holds; returns whether it does."""
         deadline = time.monotonic() + within_s
         while not condition() and time.monotonic() < deadline:
-            self._executor.spin_once(timeout_sec=max(0.0, min(
-                STEP_S, deadline - time.monotonic())))
+            left_s = max(0.0, deadline - time.monotonic())
+            self._executor.spin_once(timeout_sec=min(STEP_S, left_s))
         return bool(condition())
 
     def meet(self, kinds: Sequence[str], *clients: Client) -> None:
@@ -104,10 +105,9 @@ class SuiteClient:
         """Publisher whose readers all know it; raises ClientError when they want another type."""
         publisher = self.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self.meet(topic.subscribers)
-        expected = len(topic.subscribers)
 
         def matched() -> bool:
-            return bool(publisher.get_subscription_count() >= expected)
+            return bool(publisher.get_subscription_count() >= len(topic.subscribers))
 
         def others() -> list[str]:
             ends = self.node.get_subscriptions_info_by_topic(publisher.topic_name)
@@ -121,55 +121,63 @@ class SuiteClient:
         return publisher
 
     def _find(self, client: Client) -> None:
-        if not self.spin_until(client.service_is_ready, self._wait_s):
-            raise ClientError(self._nobody(client.service_name))
-
-    def _nobody(self, service: str) -> str:
-        """Say that nobody offers a service, and what is there."""
-        node = self.node
+        """Wait for a server; raises ClientError with what is there instead."""
+        if self.spin_until(client.service_is_ready, self._wait_s):
+            return
+        node, service = self.node, client.service_name
         nodes = node.get_node_names_and_namespaces()
         suites = {space for name, space in nodes if name == 'inhibition'}
         if node.get_namespace() in suites:
             names = {name for name, space in nodes if space == node.get_namespace()}
-            return (f'nobody offers {service}; nodes are '
-                    f'{", ".join(sorted(names - {node.get_name()}))}')
+            raise ClientError(f'nobody offers {service}; nodes are '
+                              f'{", ".join(sorted(names - {node.get_name()}))}')
         hint = f' (there is one with --namespace {", ".join(sorted(suites))})' if suites else ''
-        return (f'no suite answers in ROS domain {node.context.get_domain_id()}{hint}: nobody '
-                f'offers {service}; start one with walk, such as: walk stand_by.yaml')
+        raise ClientError(
+            f'no suite answers in ROS domain {node.context.get_domain_id()}{hint}: nobody offers '
+            f'{service}; start one with walk, such as: walk stand_by.yaml')
 
 
-class VelocityCommand:
-    """Sends velocity commands, as ``Twist`` or ``TwistStamped``.
+@contextmanager
+def velocity_command(client: SuiteClient, *, stamped: bool
+                     ) -> Iterator[Callable[[Sequence[float]], None]]:
+    """Find the readers of velocity commands, and command zero at the end.
 
     Parameters
     ----------
     client : SuiteClient
         Who sends.
     stamped : bool
-        Whether the suite runs with ``stamped_cmd_vel:=true``.
+        Whether the suite runs with ``stamped_cmd_vel:=true``: ``TwistStamped``, not ``Twist``.
+
+    Yields
+    ------
+    callable ((v_x, v_y, γ) [m/s, m/s, rad/s])
+        Sends a command; raises ClientError when nobody reads it.
+
+    Raises
+    ------
+    ClientError
+        If there are no readers of this type.
     """
+    topic = STAMPED_CMD_VEL if stamped else interface('cmd_vel')
+    publisher = client.publisher(topic)
 
-    def __init__(self, client: SuiteClient, *, stamped: bool) -> None:
-        """Find the readers; raises ClientError when there are none of this type."""
-        self._topic = STAMPED_CMD_VEL if stamped else interface('cmd_vel')
-        self._publisher = client.publisher(self._topic)
-
-    def send(self, velocity: Sequence[float]) -> None:
-        """Send (v_x, v_y, γ) [m/s, m/s, rad/s]; raises ClientError when nobody reads it."""
-        if not self._publisher.get_subscription_count():
-            raise ClientError('the suite has ended')
-        self._publish(velocity)
-
-    def end(self) -> None:
-        """Command zero."""
-        self._publish((0.0, 0.0, 0.0))
-        deliver(self._publisher)
-
-    def _publish(self, velocity: Sequence[float]) -> None:
-        message = self._topic.type()
+    def publish(velocity: Sequence[float]) -> None:
+        message = topic.type()
         twist = getattr(message, 'twist', message)
         twist.linear.x, twist.linear.y, twist.angular.z = velocity
-        self._publisher.publish(message)
+        publisher.publish(message)
+
+    def send(velocity: Sequence[float]) -> None:
+        if not publisher.get_subscription_count():
+            raise ClientError('the suite has ended')
+        publish(velocity)
+
+    try:
+        yield send
+    finally:
+        publish((0.0, 0.0, 0.0))
+        deliver(publisher)
 
 
 def deliver(publisher: Publisher) -> None:

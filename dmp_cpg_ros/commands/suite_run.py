@@ -10,8 +10,7 @@ import signal
 import stat
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -28,9 +27,7 @@ from rclpy.task import Future
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, already_running, claim, claimed
-from dmp_cpg_ros.nodes.framework.execution import make_executor, prepare_middleware
-from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers
+from dmp_cpg_ros.nodes.framework import claims, execution, health
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES, instances
@@ -82,35 +79,6 @@ class InterruptedRunError(DmpCpgError):
         self.signal = number
 
 
-@dataclass(frozen=True)
-class RunPlan:
-    """What to run.
-
-    Attributes
-    ----------
-    scenario : Scenario
-        What is asked of the robot.
-    tick_ns : int
-        Control tick [ns].
-    parameters : Path
-        Parameter file with every node's parameters.
-    logs : Path
-        Folder for the output of the processes.
-    lock_step, composed : bool
-        How to run.
-    ros_arguments : list of str
-        Remapping rules and log levels of all nodes, as after ``--ros-args``.
-    """
-
-    scenario: Scenario
-    tick_ns: int
-    parameters: Path
-    logs: Path
-    lock_step: bool
-    composed: bool
-    ros_arguments: list[str] = field(default_factory=list)
-
-
 @contextmanager
 def alone_in_domain(namespace: str) -> Iterator[None]:
     """Hold the ROS domain for one suite in a namespace.
@@ -121,22 +89,23 @@ def alone_in_domain(namespace: str) -> Iterator[None]:
         If another has it, or nodes of one are in the graph, left over perhaps.
     """
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    prepare_middleware()
+    execution.prepare_middleware()
     context = Context()
     rclpy.init(context=context, args=[])
     try:
         domain = context.get_domain_id()
-        held = claim(f'{namespace}/suite', domain)
+        held = claims.claim(f'{namespace}/suite', domain)
         names = [f'{namespace}/{name}' for name in (*WALKING_NODES, RECORDER)]
         lookout = Node('lookout', context=context, namespace=namespace)
         # Claims tell at once of nodes on this machine; the graph, after a while, of all others.
-        others = claimed(names, domain) or _in_graph(lookout, names)
+        others = claims.claimed(names, domain) or _in_graph(lookout, names)
         lookout.destroy_node()
     finally:
         context.try_shutdown()
     with held:
         if others:
-            raise AlreadyRunningError(already_running(domain, f'nodes {", ".join(others)}'))
+            raise claims.AlreadyRunningError(
+                claims.already_running(domain, f'nodes {", ".join(others)}'))
         yield
 
 
@@ -152,15 +121,24 @@ def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
     return found
 
 
-def run_suite(plan: RunPlan, say: Say) -> None:
+def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say, *,
+              lock_step: bool, composed: bool) -> None:
     """Run the suite from nothing to nothing.
 
     Parameters
     ----------
-    plan : RunPlan
-        What to run.
+    scenario : Scenario
+        What is asked of the robot.
+    tick_ns : int
+        Control tick [ns].
+    arguments : sequence of str
+        ``--ros-args`` of all nodes, with the file of their parameters.
+    logs : Path
+        Folder for the output of the processes.
     say : callable (time_s, text)
         Told what happens.
+    lock_step, composed : bool
+        How to run.
 
     Raises
     ------
@@ -171,25 +149,28 @@ def run_suite(plan: RunPlan, say: Say) -> None:
     InterruptedRunError
         On Ctrl-C, SIGTERM, SIGHUP or SIGQUIT; everything is shut down cleanly all the same.
     """
-    group = ProcessGroup(plan.logs)
+    group = ProcessGroup(logs)
     with _interrupt() as interrupted:
-        rclpy.init(
-            args=['walk', '--ros-args', *plan.ros_arguments],
-            signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=['walk', *arguments], signal_handler_options=SignalHandlerOptions.NO)
         try:
-            _start(plan, group)
-            player = ScenarioPlayer(plan.scenario, plan.tick_ns, plan.lock_step, say)
-            executor = make_executor('events')
+            if composed:
+                group.start('composed_suite', 'dmp_cpg_ros.commands.composed_suite', arguments)
+            for kind, name, _ in instances():
+                if kind.name == RECORDER or not composed:
+                    group.start(
+                        name, 'dmp_cpg_ros', [kind.name, *arguments, '-r', f'__node:={name}'])
+            player = ScenarioPlayer(scenario, tick_ns, lock_step, say)
+            executor = execution.make_executor('events')
             executor.add_node(player)
             watch = _Watch(executor, player, group, interrupted, say)
             try:
-                watch.until_ready([*WALKING_NODES, RECORDER])
+                watch.until_ready()
                 player.begin()
-                watch.until(player.finished, float('inf'))
+                watch.until(player.finished, math.inf)
                 player.finished.result()
             finally:
                 # In lock-step no time passes that nobody asks for: nothing can fall.
-                if not plan.lock_step and player.time_ns > 0:
+                if not lock_step and player.time_ns > 0:
                     watch.lay_down()
                 watch.finish_work()
                 executor.remove_node(player)
@@ -198,17 +179,7 @@ def run_suite(plan: RunPlan, say: Say) -> None:
             killed = group.stop()
             rclpy.try_shutdown()
             if killed:
-                say(float('nan'), f'had to kill {", ".join(killed)}')
-
-
-def _start(plan: RunPlan, group: ProcessGroup) -> None:
-    files = ['--ros-args', '--params-file', str(plan.parameters), *plan.ros_arguments]
-    if plan.composed:
-        group.start('composed_suite', 'dmp_cpg_ros.commands.composed_suite', files)
-        group.start(RECORDER, 'dmp_cpg_ros', [RECORDER, *files])
-        return
-    for kind, name, _ in instances():
-        group.start(name, 'dmp_cpg_ros', [kind.name, *files, '-r', f'__node:={name}'])
+                say(math.nan, f'had to kill {", ".join(killed)}')
 
 
 class _Watch:
@@ -221,47 +192,36 @@ class _Watch:
     its answer proves that it knows the clients that were made before.
     """
 
-    def __init__(
-        self,
-        executor: Executor,
-        player: ScenarioPlayer,
-        group: ProcessGroup,
-        interrupted: list[int],
-        say: Say,
-    ) -> None:
-        self._executor, self._player, self._group, self._interrupted, self._say = (
-            executor,
-            player,
-            group,
-            interrupted,
-            say,
-        )
-        self._transitions = {
-            name: player.create_client(ChangeState, f'{name}/change_state')
-            for name in (*WALKING_NODES, RECORDER)
-        }
-        self._recording = True
+    def __init__(self, executor: Executor, player: ScenarioPlayer, group: ProcessGroup,
+                 interrupted: list[int], say: Say) -> None:
+        self._executor, self._player, self._group = executor, player, group
+        self._interrupted, self._say = interrupted, say
+        self._transitions = {name: player.create_client(ChangeState, f'{name}/change_state')
+                             for name in (*WALKING_NODES, RECORDER)}
+        self._recording, self._ending = True, False
         self._recorded: Any = None
         topic = interface('~/recorded')
         player.create_subscription(
             topic.type, f'{RECORDER}/recorded', self._on_recorded, topic.reader_qos)
 
     def until(self, future: Future, patience_s: float) -> bool:
-        """Spin until a future is done; returns whether it is."""
+        """Spin until a future is done; returns whether it is. Ctrl-C cuts it short, but not while
+        the suite is brought to its end.
+        """
         deadline = time.monotonic() + patience_s
         while not future.done() and time.monotonic() < deadline:
             self._executor.spin_until_future_complete(future, timeout_sec=SLICE_S)
-            if self._interrupted:
+            if self._interrupted and not self._ending:
                 raise InterruptedRunError(self._interrupted[0])
             ended = self._group.ended()
             if ended:
-                raise SuiteError('; '.join(map(str, ended)))
+                raise SuiteError('; '.join(ended))
         return bool(future.done())
 
-    def until_ready(self, names: list[str]) -> None:
+    def until_ready(self) -> None:
         """Ask every node whether it is active and connected until all say yes."""
-        deadline, tell = time.monotonic() + READY_WITHIN_S, Intervals(FIRST_WORD_S)
-        others = ReadinessOfOthers(self._player, names)
+        deadline, tell = time.monotonic() + READY_WITHIN_S, health.Intervals(FIRST_WORD_S)
+        others = health.ReadinessOfOthers(self._player, list(self._transitions))
         while (missing := others.missing()) or not self._player.connected():
             waiting = '; '.join(missing) or 'topics and services of the player'
             if time.monotonic() > deadline:
@@ -272,45 +232,34 @@ class _Watch:
 
     def lay_down(self) -> None:
         """End the recording, then lay the robot down; a second Ctrl-C cuts it short."""
+        self._ending, begun = True, len(self._interrupted)
         if self._group.ended():
             return
-        interrupted, self._interrupted = self._interrupted, []
-        begun = len(interrupted)
-        try:
+        with suppress(DmpCpgError):
             for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
                 self._change_state(RECORDER, transition)
             self._recording = False
             down, deadline = self._player.lie_down(), time.monotonic() + LYING_WITHIN_S
-            while len(interrupted) == begun and time.monotonic() < deadline:
+            while len(self._interrupted) == begun and time.monotonic() < deadline:
                 if self.until(down, SLICE_S):
                     return
-        except DmpCpgError:
-            return
-        finally:
-            self._interrupted = interrupted
 
     def finish_work(self) -> None:
         """Stop the robot, let the recorder take all that was said, deactivate everything."""
+        self._ending = True
         if self._group.ended():
             return
-        others = [name for name in WALKING_NODES if name != ROBOT]
-        try:
-            self._deactivate(ROBOT)
+        with suppress(DmpCpgError):
+            self._change_state(ROBOT)
             if self._recording:
                 self._until_recorded()
-            for name in (*others, RECORDER) if self._recording else others:
-                self._deactivate(name)
-        except DmpCpgError:
-            return
+            for name in self._transitions:
+                if name != ROBOT and (name != RECORDER or self._recording):
+                    self._change_state(name)
 
-    def _deactivate(self, name: str) -> None:
-        self._change_state(name, Transition.TRANSITION_DEACTIVATE)
-
-    def _change_state(self, name: str, transition: int) -> None:
-        client = self._transitions[name]
-        client.wait_for_service(timeout_sec=LAST_WORDS_S)
+    def _change_state(self, name: str, transition: int = Transition.TRANSITION_DEACTIVATE) -> None:
         request = ChangeState.Request(transition=Transition(id=transition))
-        self._ask(client, request, LAST_WORDS_S)
+        self._ask(self._transitions[name], request, LAST_WORDS_S)
 
     def _on_recorded(self, counts: Any) -> None:
         self._recorded = counts
@@ -319,30 +268,19 @@ class _Watch:
         """Wait until nothing more arrives at the recorder."""
         deadline, before = time.monotonic() + LAST_WORDS_S, self._recorded
         while time.monotonic() < deadline:
-            self._pause(SETTLED_S)
+            self.until(Future(), SETTLED_S)
             counts = self._recorded
             if before is not None and counts is not before and (
                     counts.position == before.position):
                 return
             before = counts
 
-    def _pause(self, seconds: float) -> None:
-        interrupted, self._interrupted = self._interrupted, []
-        self.until(Future(), seconds)
-        self._interrupted = interrupted
-
-    def _ask(self, client: Any, request: Any, patience_s: float = 2.0) -> Any:
+    def _ask(self, client: Any, request: Any, patience_s: float) -> Any:
         """Answer of a service, or None when it is not there or does not answer."""
-        if not client.service_is_ready():
+        if not client.wait_for_service(timeout_sec=LAST_WORDS_S):
             return None
         future = client.call_async(request)
-        interrupted, self._interrupted = self._interrupted, []
-        try:
-            if not self.until(future, patience_s):
-                return None
-            return future.result()
-        finally:
-            self._interrupted = interrupted
+        return future.result() if self.until(future, patience_s) else None
 
 
 @contextmanager

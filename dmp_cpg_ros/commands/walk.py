@@ -11,116 +11,108 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.analysis.facts import facts
-from dmp_cpg_ros.commands.analyze import MARKS, analyze_run
-from dmp_cpg_ros.commands.ros_arguments import (
-    RosArguments,
-    checked_namespace,
-    parse_arguments,
-    read_parameter,
-)
-from dmp_cpg_ros.commands.run_folder import make_run_folder, resolved_parameters, write_parameters
-from dmp_cpg_ros.configuration import (
-    config_folders,
-    find_config,
-    load_yaml,
-    unused_sections,
-)
+from dmp_cpg_ros.commands import film, ros_arguments, run_folder
+from dmp_cpg_ros.commands.analyze import analyze_run, print_facts
+from dmp_cpg_ros.commands.certify import running_parameters
+from dmp_cpg_ros.configuration import config_folders, find_config, load_yaml, unused_sections
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
-from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.primitive_files import motion_overrides
-from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.suite import Suite, load_suite
-from dmp_cpg_ros.suite_table import KINDS, WALKING, namespace_rules
+from dmp_cpg_ros.suite_table import KINDS, RECORDER, WALKING, namespace_rules
 
-OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 128
-"""Exit statuses: a run that ended well, a fall or a dead node, bad input; plus the number of the
-signal that ended it.
+OK, FAILED, INTERRUPTED = 0, 1, 128
+"""Exit statuses: a run that ended well, a fall or a dead node; plus the number of the signal that
+ended it.
 """
 
-DEFAULT_SCENARIO = 'scenarios/start_stop.yaml'
+
+@dataclass(frozen=True)
+class _Plan:
+    """A run that nothing speaks against."""
+
+    scenario: Scenario
+    suite: Suite
+    certificate: Certificate
+    overrides: dict[str, Any]
+    options: argparse.Namespace
+    ros: ros_arguments.RosArguments
+
+    def resolved(self, **more: Any) -> dict[str, dict[str, Any]]:
+        """Every parameter of every node that walks, by the node's name."""
+        overrides = {**self.overrides, **more}
+        return run_folder.resolved_parameters(self.suite.file, overrides, self.ros.namespace)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    options, ros = parse_arguments(_parser(), arguments, parameters=True)
-    try:
-        scenario = load_scenario(options.scenario)
-        overrides = {
-            **scenario.parameters, **motion_overrides(options.motion or ''), **ros.parameters,
-            **dict(map(read_parameter, options.set))}
-        ros.namespace = checked_namespace(options.namespace or ros.namespace)
-        if options.parameters and ros.parameters_file:
-            raise ParameterError('give --parameters or --params-file, not both')
-        if options.robot is not None:
-            overrides['robot'] = str(find_config(options.robot).resolve())
-        if options.rate is not None:
-            overrides['control_rate'] = options.rate
-        file = options.parameters or ros.parameters_file
-        suite = load_suite(file, overrides, ros.namespace)
-        if suite.robot.physics != 'mujoco' and any(e.kind == 'push' for e in scenario.events):
-            raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')
-        _check_votes(scenario, suite)
-        certificate = _certificate(suite)
-        if not certificate.holds and not overrides.get('allow_uncertified', False):
-            raise ParameterError(
-                f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
-                'proposes gains that hold; --set allow_uncertified:=true walks all the same)'
-            )
-        if options.video:
-            film_path(options.video, Path())
-        for section in unused_sections(suite.file, ros.namespace, KINDS):
-            print(f"walk: '{suite.file}': section '{section}' means no node in namespace "
-                  f"'{ros.namespace or '/'}'; '/**/{section.rpartition('/')[2]}' would",
-                  file=sys.stderr)
-        from dmp_cpg_ros.commands.suite_run import alone_in_domain
-
-        with alone_in_domain(ros.namespace):
-            return _walk(scenario, suite, certificate, overrides, options, ros)
-    except DmpCpgError as error:
-        print(f'walk: {error}', file=sys.stderr)
-        return BAD_INPUT
+    return ros_arguments.run_command(_parser(), arguments, _main, parameters=True)
 
 
-def _walk(
-    scenario: Scenario,
-    suite: Suite,
-    certificate: Certificate,
-    overrides: dict[str, Any],
-    options: argparse.Namespace,
-    ros: RosArguments,
-) -> int:
+def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
+    plan = _planned(options, ros)
+    for section in unused_sections(plan.suite.file, ros.namespace, KINDS):
+        print(f"walk: '{plan.suite.file}': section '{section}' means no node in namespace "
+              f"'{ros.namespace or '/'}'; '/**/{section.rpartition('/')[2]}' would",
+              file=sys.stderr)
+    from dmp_cpg_ros.commands.suite_run import alone_in_domain
+
+    with alone_in_domain(ros.namespace):
+        return _walk(plan)
+
+
+def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _Plan:
+    """Read everything; raises DmpCpgError for what cannot be run."""
+    scenario = load_scenario(options.scenario)
+    overrides = {**scenario.parameters, **motion_overrides(options.motion or ''),
+                 **ros.parameters, **dict(map(ros_arguments.read_parameter, options.set))}
+    ros.namespace = ros_arguments.checked_namespace(options.namespace or ros.namespace)
+    if options.parameters and ros.parameters_file:
+        raise ParameterError('give --parameters or --params-file, not both')
+    if options.robot is not None:
+        overrides['robot'] = str(find_config(options.robot).resolve())
+    if options.rate is not None:
+        overrides['control_rate'] = options.rate
+    suite = load_suite(options.parameters or ros.parameters_file, overrides, ros.namespace)
+    events = {event.kind for event in scenario.events}
+    if 'push' in events and suite.robot.physics != 'mujoco':
+        raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')
+    if 'votes' in events and not suite.parameters.voting.voting:
+        raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
+    certificate = certify(**running_parameters(suite), voting=suite.parameters.voting)
+    if not certificate.holds and not overrides.get('allow_uncertified', False):
+        raise ParameterError(
+            f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
+            'proposes gains that hold; --set allow_uncertified:=true walks all the same)')
+    if options.video:
+        film.checked_film_path(Path(options.video))
+    return _Plan(scenario, suite, certificate, overrides, options, ros)
+
+
+def _walk(plan: _Plan) -> int:
     """Run, record and report; returns the exit status."""
-    begin = time.monotonic()
-    folder = make_run_folder(options.out)
-    print(
-        f'{scenario.name}: {scenario.duration_s:g} s, {suite.gait.name}, '
-        f'{"lock-step" if options.lock_step else "real time"}, '
-        f'{"one process" if options.composed else "a process per node"}, '
-        f'{1e9 / suite.tick_ns:g} Hz',
-        flush=True,
-    )
-    print(
-        f'certificate: {certificate.explained()}; {certificate.contraction_grade} grade; '
-        f'at rest at most {certificate.time_to_rest:.3f} s after a request',
-        flush=True,
-    )
-    status = _run(scenario, suite, overrides, folder, options, ros)
-    recorded = (folder / 'bag').is_dir()
+    begin, options = time.monotonic(), plan.options
+    folder = run_folder.make_run_folder(options.out)
+    print(f'{plan.scenario.name}: {plan.scenario.duration_s:g} s, {plan.suite.gait.name}, '
+          f'{"lock-step" if options.lock_step else "real time"}, '
+          f'{"one process" if options.composed else "a process per node"}, '
+          f'{1e9 / plan.suite.tick_ns:g} Hz', flush=True)
+    print(f'certificate: {plan.certificate.explained()}; {plan.certificate.contraction_grade} '
+          f'grade; at rest at most {plan.certificate.time_to_rest:.3f} s after a request',
+          flush=True)
+    status = _run(plan, folder)
     try:
-        if recorded and status > INTERRUPTED:
-            print('walk: making the report, which a second Ctrl-C skips', file=sys.stderr)
-        if recorded:
-            found = _analyze(scenario, suite, certificate, overrides, folder, options, ros)
-            status = max(status, found)
-        if recorded and options.video is not None:
-            _film(folder, film_path(options.video, folder))
+        if (folder / 'bag').is_dir():
+            if status > INTERRUPTED:
+                print('walk: making the report, which a second Ctrl-C skips', file=sys.stderr)
+            status = max(status, _analyze(plan, folder))
+            if options.video is not None:
+                _film(folder, options.video)
     except KeyboardInterrupt:
         print(f'walk: report skipped; make it with: analyze {folder}', file=sys.stderr)
         status = INTERRUPTED + signal.SIGINT
@@ -148,38 +140,23 @@ def load_scenario(name: str | Path) -> Scenario:
     return Scenario.from_mapping(load_yaml(path), f"'{path}'")
 
 
-def _run(
-    scenario: Scenario,
-    suite: Suite,
-    overrides: dict[str, Any],
-    folder: Path,
-    options: argparse.Namespace,
-    ros: RosArguments,
-) -> int:
+def _run(plan: _Plan, folder: Path) -> int:
     """Bring the suite up, play, bring it down; returns the exit status."""
-    from dmp_cpg_ros.commands.suite_run import InterruptedRunError, RunPlan, run_suite
+    from dmp_cpg_ros.commands.suite_run import InterruptedRunError, run_suite
 
-    shared = {**overrides, 'lock_step': options.lock_step, 'gated': True}
-    resolved = resolved_parameters(
-        suite.file, {name: value for name, value in shared.items() if name != 'lock_step'},
-        ros.namespace,
-    )
+    options, ros = plan.options, plan.ros
+    resolved = plan.resolved(gated=True)
     for values in resolved.values():
-        values['lock_step'] = options.lock_step
-        values['expected_nodes'] = list(KINDS)
-    parameters = write_parameters(
-        folder,
-        resolved,
-        {'output': str(folder / 'bag'), 'expected_nodes': [kind.name for kind in WALKING]},
-    )
+        values.update(lock_step=options.lock_step, expected_nodes=list(KINDS))
+    resolved[RECORDER] = {'output': str(folder / 'bag'),
+                          'expected_nodes': [kind.name for kind in WALKING]}
     rules = [*ros.remappings, *namespace_rules(ros.namespace)]
-    remapped = [word for name, to in rules for word in ('-r', f'{name}:={to}')]
-    plan = RunPlan(
-        scenario, suite.tick_ns, parameters, folder / 'logs', options.lock_step, options.composed,
-        [*ros.others, *remapped],
-    )
+    file = run_folder.write_parameters(folder, resolved)
+    arguments = ['--ros-args', '--params-file', str(file), *ros.others,
+                 *(word for name, to in rules for word in ('-r', f'{name}:={to}'))]
     try:
-        run_suite(plan, _say)
+        run_suite(plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say,
+                  lock_step=options.lock_step, composed=options.composed)
         return OK
     except InterruptedRunError as error:
         print(f'walk: {error}; the recording up to here is complete', file=sys.stderr)
@@ -189,73 +166,32 @@ def _run(
         return FAILED
 
 
-def _analyze(
-    scenario: Scenario,
-    suite: Suite,
-    certificate: Certificate,
-    overrides: dict[str, Any],
-    folder: Path,
-    options: argparse.Namespace,
-    ros: RosArguments,
-) -> int:
+def _analyze(plan: _Plan, folder: Path) -> int:
     """Write the run's folder and print what it says; returns the exit status."""
+    lock_step = plan.options.lock_step
     try:
         results = analyze_run(
-            folder,
-            robot_file=suite.robot_file,
-            parameters=resolved_parameters(suite.file, overrides, ros.namespace),
-            seeds={'robot': suite.robot.seed},
-            lock_step=options.lock_step,
-            report=not options.no_report,
-            scenario=scenario.name,
-            composed=options.composed,
-            certificate=[entry.as_mapping() for entry in certificate.inequalities],
-        )
+            folder, robot_file=plan.suite.robot_file, parameters=plan.resolved(),
+            certificate=[entry.as_mapping() for entry in plan.certificate.inequalities],
+            seeds={'robot': plan.suite.robot.seed}, lock_step=lock_step,
+            report=not plan.options.no_report, scenario=plan.scenario.name,
+            composed=plan.options.composed)
     except DmpCpgError as error:
         print(f'walk: cannot analyze the recording: {error}', file=sys.stderr)
         return FAILED
-    for fact in facts(results.metrics, options.lock_step):
-        print(f'{MARKS[fact.holds]} {fact.statement}: {fact.finding}')
+    print_facts(results, lock_step)
     if results.report is not None:
         print(f'report: {os.path.relpath(results.report)}')
     return FAILED if results.metrics['robot']['fell'] else OK
 
 
-def _check_votes(scenario: Scenario, suite: Suite) -> None:
-    """Raise ParameterError when a scenario votes where nobody counts."""
-    votes = any(event.kind == 'votes' for event in scenario.events)
-    if votes and not suite.parameters.voting.voting:
-        raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
-
-
-def film_path(given: str, folder: Path) -> Path:
-    """Return the film's file, by default in the run's folder; raises ParameterError before the
-    run when it could not be written after it.
-    """
-    from dmp_cpg_ros.commands.film_files import checked_film_path, has_encoder
-
-    return checked_film_path(
-        Path(given) if given else folder / f'walk.{"mp4" if has_encoder() else "gif"}'
-    )
-
-
-def _film(folder: Path, path: Path) -> None:
+def _film(folder: Path, given: str) -> None:
     """Film the run; one that cannot be drawn here is no failure of the run."""
-    from dmp_cpg_ros.commands.film import film_run
-
+    path = Path(given) if given else folder / f'walk.{"mp4" if film.has_encoder() else "gif"}'
     try:
-        frames = film_run(folder, path)
-        print(f'video: {os.path.relpath(path)}, {frames} frames')
+        print(f'video: {os.path.relpath(path)}, {film.film_run(folder, path)} frames')
     except (DmpCpgError, OSError) as error:
         print(f'walk: no video: {error}', file=sys.stderr)
-
-
-def _certificate(suite: Suite) -> Certificate:
-    """Certificate of the parameters that the nodes will run with."""
-    p = suite.parameters
-    network = GaitNetwork(p.canonical, suite.gait, body_scale(load_description(suite.robot_file)))
-    return certify(network, p.inhibition, p.reference, p.leg, p.posture, suite.tick_ns * 1e-9,
-                   voting=p.voting)
 
 
 def _say(time_s: float, text: str) -> None:
@@ -263,69 +199,34 @@ def _say(time_s: float, text: str) -> None:
     print(f'{stamp}  {text}', flush=True)
 
 
-def scenario_names() -> list[str]:
-    """Names of the scenarios of the package."""
-    return sorted({path.stem for folder in config_folders()
-                   for path in (folder / 'scenarios').glob('*.yaml')})
-
-
 def _parser() -> argparse.ArgumentParser:
+    scenarios = {path.stem for folder in config_folders()
+                 for path in (folder / 'scenarios').glob('*.yaml')}
     parser = argparse.ArgumentParser(
         prog='walk',
         description='Bring the suite up, play a scenario, record, report, shut everything down.',
         epilog='Exit status: 0 when all went well, 1 when the robot fell or a node died, 2 for '
         'bad input or where a suite is running already, 130 for Ctrl-C. '
-        f'Scenarios: {", ".join(scenario_names())}.',
-    )
-    parser.add_argument(
-        'scenario',
-        nargs='?',
-        default=DEFAULT_SCENARIO,
-        help=f'scenario file, by its path or in config/scenarios (default: {DEFAULT_SCENARIO})',
-    )
-    parser.add_argument(
-        '--lock-step',
-        action='store_true',
-        help='wait for every target, so that the run does not depend on the speed of the machine',
-    )
-    parser.add_argument(
-        '--composed', action='store_true', help='all nodes in one process and one executor'
-    )
-    parser.add_argument(
-        '--robot', metavar='FILE', help='robot file (default: the one of the parameter file)'
-    )
-    parser.add_argument(
-        '--motion', metavar='FILE', help='motion of the feet, from learn --motion'
-    )
-    parser.add_argument(
-        '--parameters', metavar='FILE', help='parameter file (default: config/suite.yaml)'
-    )
-    parser.add_argument(
-        '--set',
-        metavar='NAME:=VALUE',
-        action='append',
-        default=[],
-        help='parameter of every node that has it; may be repeated',
-    )
-    parser.add_argument(
-        '--namespace',
-        metavar='NS',
-        default='',
-        help='namespace of all nodes and topics, /clock and /diagnostics included',
-    )
-    parser.add_argument('--rate', metavar='HZ', type=float, help='control rate (default: 250)')
-    parser.add_argument(
-        '--out', metavar='DIR', type=Path, help="the run's folder (default: a new one in runs)"
-    )
-    parser.add_argument(
-        '--video',
-        metavar='FILE',
-        nargs='?',
-        const='',
-        help='draw the run as FILE.gif or, with imageio-ffmpeg, FILE.mp4, after its end (default: '
-        "walk.mp4 or walk.gif in the run's folder)",
-    )
-    parser.add_argument('--no-report', action='store_true', help='write metrics and manifest only')
+        f'Scenarios: {", ".join(sorted(scenarios))}.')
+    add = parser.add_argument
+    add('scenario', nargs='?', default='scenarios/start_stop.yaml',
+        help='scenario file, by its path or in config/scenarios (default: %(default)s)')
+    add('--lock-step', action='store_true',
+        help='wait for every target, so that the run does not depend on the speed of the machine')
+    add('--composed', action='store_true', help='all nodes in one process and one executor')
+    add('--robot', metavar='FILE', help='robot file (default: the one of the parameter file)')
+    add('--motion', metavar='FILE', help='motion of the feet, from learn --motion')
+    add('--parameters', metavar='FILE', help='parameter file (default: config/suite.yaml)')
+    add('--set', metavar='NAME:=VALUE', action='append', default=[],
+        help='parameter of every node that has it; may be repeated')
+    add('--namespace', metavar='NS', default='',
+        help='namespace of all nodes and topics, /clock and /diagnostics included')
+    add('--rate', metavar='HZ', type=float, help='control rate (default: 250)')
+    add('--out', metavar='DIR', type=Path, help="the run's folder (default: a new one in runs)")
+    add('--video', metavar='FILE', nargs='?', const='',
+        help='draw the run as FILE.gif or, with imageio-ffmpeg, FILE.mp4, after its end '
+        "(default: walk.mp4 or walk.gif in the run's folder)")
+    add('--no-report', action='store_true', help='write metrics and manifest only')
     return parser
 
 

@@ -28,7 +28,8 @@ from dmp_cpg_ros.analysis.pictures import moments, write_pictures
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
 from dmp_cpg_ros.analysis.report import flattened, label
 from dmp_cpg_ros.analysis.run import RunResults, write_results
-from dmp_cpg_ros.commands.analyze import BAD_INPUT, analyze_run, main
+from dmp_cpg_ros.commands.analyze import analyze_run, main
+from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 
 WALK = SyntheticWalk(rate_hz=50.0, turn_rate=0.3)

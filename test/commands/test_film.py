@@ -13,8 +13,14 @@ from PIL import Image
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
-from dmp_cpg_ros.commands.film import Shot, film, main
-from dmp_cpg_ros.commands.film_files import checked_film_path, has_encoder, write_film
+from dmp_cpg_ros.commands.film import (
+    Shot,
+    checked_film_path,
+    film,
+    has_encoder,
+    main,
+    write_film,
+)
 from dmp_cpg_ros.commands.walk import main as walk
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
@@ -87,7 +93,7 @@ def test_an_mp4_is_written_where_there_is_an_encoder(tmp_path):
 def test_what_cannot_be_written_is_refused_before_the_run(tmp_path, capsys, monkeypatch):
     with pytest.raises(ParameterError, match='must end in .gif or .mp4'):
         checked_film_path(tmp_path / 'film.avi')
-    monkeypatch.setattr('dmp_cpg_ros.commands.film_files.find_spec', lambda name: None)
+    monkeypatch.setattr('dmp_cpg_ros.commands.film.find_spec', lambda name: None)
     with pytest.raises(ParameterError, match='pip install imageio-ffmpeg; a .gif needs none'):
         checked_film_path(tmp_path / 'film.mp4')
     if find_spec('rclpy') is not None:

@@ -12,7 +12,8 @@ import pytest
 from demonstrations import joint_angles, walking_joints
 
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration
-from dmp_cpg_ros.commands.learn import BAD_INPUT, main
+from dmp_cpg_ros.commands.learn import main
+from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.primitive_files import load_primitive
