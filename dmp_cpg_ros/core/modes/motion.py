@@ -24,9 +24,8 @@ from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.modes.motion_library import Movement, Movements
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, minimum_jerk
-from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
+from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive, DiscreteState
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
-from dmp_cpg_ros.core.primitives.states import DiscreteInput, DiscreteState
 from dmp_cpg_ros.core.transformation.leg import LegState
 
 Array = NDArray[np.float64]

@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import phase_generator
+from dmp_cpg_ros.core.primitives.time_scaling import StepGrid
 
 Array = NDArray[np.float64]
 
 
-def hopf_flow(
-    x: Array, omega: float, rho: float, radii: Array, scaled: Array, density: Array, length: float
-) -> Array:
+def hopf_flow(x: Array, omega: float, rho: float, radii: Array, grid: StepGrid) -> Array:
     """States at the start, middle and end of a step.
 
     Exact in the angle; exact in the radius for constant r, else of fourth order in the length of
@@ -32,11 +31,10 @@ def hopf_flow(
         State at the start.
     omega, rho : float
         ω [rad/s] and ρ [1/s].
-    radii, scaled, density : ndarray (5,)
-        r, scaled time since the start [s] and derivative of scaled time by the step variable, at
-        five nodes that are evenly spaced in that variable.
-    length : float
-        Length of the step in the step variable.
+    radii : ndarray (5,)
+        r at the nodes.
+    grid : StepGrid
+        With five nodes.
 
     Returns
     -------
@@ -45,17 +43,17 @@ def hopf_flow(
     squared = float(x @ x)
     growth = np.ones(3)
     if squared > 0.0:
-        middle = _squared_radius(squared, rho, radii[:3], density[:3], 0.5 * length)
-        end = _squared_radius(middle, rho, radii[2:], density[2:], 0.5 * length)
+        density, half = grid.density, 0.5 * grid.length
+        middle = _squared_radius(squared, rho, radii[:3], density[:3], half)
+        end = _squared_radius(middle, rho, radii[2:], density[2:], half)
         growth[1:] = np.sqrt(np.array([middle, end]) / squared)
-    angle = omega * scaled[::2]
+    angle = omega * grid.scaled[::2]
     turned = x @ phase_generator().T
     return growth[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * turned)
 
 
-def _squared_radius(
-    squared: float, rho: float, radii: Array, density: Array, length: float
-) -> float:
+def _squared_radius(squared: float, rho: float, radii: Array, density: Array, length: float
+                    ) -> float:
     """Squared radius after a step: 1/R² = e^{−P}/R₀² + ∫ e^{p − P}/r² dp, p = 2ρ ∫ r² ds.
 
     P is p at the end. 1/r² is replaced by the quadratic in p through three nodes, and the integral
@@ -68,12 +66,8 @@ def _squared_radius(
     # Newton's divided differences
     slope = (values[1] - values[0]) / p_middle
     bend = ((values[2] - values[1]) / (p_end - p_middle) - slope) / p_end
-    decay = np.exp(-p_end)
-    # ∫ e^{p − P} dp
-    one = -np.expm1(-p_end)
-    # ∫ e^{p − P} p dp
-    first = p_end - one
-    # ∫ e^{p − P} p² dp
-    second = p_end**2 - 2.0 * first
+    one = -np.expm1(-p_end)  # ∫ e^{p − P} dp
+    first = p_end - one  # ∫ e^{p − P} p dp
+    second = p_end**2 - 2.0 * first  # ∫ e^{p − P} p² dp
     integral = values[0] * one + slope * first + bend * (second - p_middle * first)
-    return float(1.0 / (decay / squared + integral))
+    return float(1.0 / (np.exp(-p_end) / squared + integral))

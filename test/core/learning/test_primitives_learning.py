@@ -25,7 +25,8 @@ from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.learning.learning import FitOptions, ridge_regression, smallest_good
 from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, derivatives
-from dmp_cpg_ros.core.primitives.states import DiscreteInput, RhythmicInput
+from dmp_cpg_ros.core.primitives.discrete import DiscreteInput
+from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput
 from dmp_cpg_ros.paper.algebra import transformed
 from dmp_cpg_ros.paper.homogeneous import Homogeneous
 

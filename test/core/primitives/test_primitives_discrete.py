@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.primitives.basis import GaussianBases
-from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
+from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
-from dmp_cpg_ros.core.primitives.states import DiscreteInput
 from dmp_cpg_ros.core.primitives.time_scaling import scaled_times
 
 DECAY = 4.6

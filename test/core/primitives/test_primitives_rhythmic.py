@@ -16,9 +16,9 @@ from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.primitives.basis import VonMisesBases
 from dmp_cpg_ros.core.primitives.hopf_flow import hopf_flow
-from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
+from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput, RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
-from dmp_cpg_ros.core.primitives.states import RhythmicInput
+from dmp_cpg_ros.core.primitives.time_scaling import StepGrid
 
 OMEGA = 2.0 * np.pi
 
@@ -37,7 +37,8 @@ def primitive(seed=0, dofs=2, form='scaled', count=9):
 
 def flow(x, omega, rho, radius_of, h):
     nodes = np.linspace(0.0, h, 5)
-    return hopf_flow(x, omega, rho, np.array([radius_of(s) for s in nodes]), nodes, np.ones(5), h)
+    grid = StepGrid(nodes, nodes, np.ones(5), h, np.ones(5))
+    return hopf_flow(x, omega, rho, np.array([radius_of(s) for s in nodes]), grid)
 
 
 def runge_kutta(x, omega, rho, radius_of, h, steps=400):
