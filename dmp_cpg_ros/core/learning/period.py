@@ -72,10 +72,13 @@ def find_period(
     }
     least = min(error for _, error in coarse.values())
     plausible = [f for f, error in coarse.values() if error < 3.0 * least + 0.01]
-    refined = [whole.refined(f, 0.06 / span) for f in plausible]
+    reach = 0.06 / span
+    refined = [whole.refined(f, reach) for f in plausible]
     least = min(error for _, error in refined)
     frequency = max(f for f, error in refined if error <= 1.1 * least + 1e-6)
-    if least > 0.5 or (least > WANDERING and whole.residual_correlation(frequency) > 0.5):
+    longer = frequency < low - 0.98 * reach  # no minimum: longer periods would fit even better
+    wanders = least > WANDERING and whole.residual_correlation(frequency) > 0.5
+    if longer or least > 0.5 or wanders:
         raise DataError(
             f'no period between {1.0 / high:g} s and {1.0 / low:g} s explains the movement; the '
             f'best, {1.0 / frequency:.4g} s, leaves {100.0 * least:.0f} % of the variance. Valid '
