@@ -72,7 +72,7 @@ class DiscretePrimitive(Primitive):
         Rate of the filter on the goal [1/s].
     """
 
-    WEIGHT, TARGET = (), 'goal'
+    WEIGHT, TARGET, LENGTH = (), 'goal', 'duration'
     SCALARS = ('phase_decay', 'duration', 'goal_rate', 'tau_rate')
     VECTORS = ('start', 'goal', 'start_velocity')
 

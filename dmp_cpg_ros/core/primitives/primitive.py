@@ -7,6 +7,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 from typing import Any, ClassVar
 
 import numpy as np
@@ -21,13 +22,17 @@ from dmp_cpg_ros.core.primitives.time_scaling import Form, StepGrid, TimeScaling
 
 Array = NDArray[np.float64]
 
+LONGEST_STEP = 0.01
+"""Longest step of a rollout, as a share of the time that a movement or cycle takes."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Primitive(ABC):
     """Canonical system, forcing function and transformation system.
 
     A subclass names its numbers in ``SCALARS`` (positive) and ``VECTORS`` (one entry per degree
-    of freedom); the first vector that inputs and states have too is what the spring pulls to.
+    of freedom), what the spring pulls to, ``TARGET``, and how long a movement or a cycle takes at
+    τ = 1, ``LENGTH``.
 
     Attributes
     ----------
@@ -50,6 +55,7 @@ class Primitive(ABC):
 
     WEIGHT: ClassVar[tuple[int, ...]]
     TARGET: ClassVar[str]
+    LENGTH: ClassVar[str]
     SCALARS: ClassVar[tuple[str, ...]]
     VECTORS: ClassVar[tuple[str, ...]]
 
@@ -144,7 +150,8 @@ class Primitive(ABC):
         Parameters
         ----------
         times : array_like (m,)
-            Increasing times; the state holds at the first [s].
+            Increasing times; the state holds at the first [s]. Intervals of more than
+            ``LONGEST_STEP`` of a movement or cycle are taken in several steps.
         command : DiscreteInput or RhythmicInput, optional
             The demonstration's without.
         state : DiscreteState or RhythmicState, optional
@@ -158,7 +165,12 @@ class Primitive(ABC):
         command = command or self.default_input()
         times, states = np.asarray(times, dtype=float), [state or self._start(command)]
         for dt in np.diff(times).tolist():
-            states.append(self.step(states[-1], command, dt))
+            tau, after = min(states[-1].tau, command.tau), states[-1]
+            check_positive(dt=dt, tau=tau)
+            parts = max(1, ceil(dt / (LONGEST_STEP * getattr(self, self.LENGTH) * tau) - 1e-6))
+            for _ in range(parts):
+                after = self.step(after, command, dt / parts)
+            states.append(after)
         return Trajectory(
             times, np.array([s.position for s in states]), np.array([s.velocity for s in states]),
             np.array([self.acceleration(s, command) for s in states]))

@@ -83,7 +83,7 @@ class RhythmicPrimitive(Primitive):
         Rates of the filters on g and r [1/s].
     """
 
-    WEIGHT, TARGET, VECTORS = (2,), 'centre', ('centre',)
+    WEIGHT, TARGET, LENGTH, VECTORS = (2,), 'centre', 'period', ('centre',)
     SCALARS = ('omega', 'rho', 'centre_rate', 'amplitude_rate', 'tau_rate')
 
     omega: float

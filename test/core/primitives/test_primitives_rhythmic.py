@@ -220,6 +220,17 @@ def test_at_rest_in_the_origin_there_is_no_force():
     np.testing.assert_allclose(state.position, p.centre, atol=1e-6)
 
 
+@pytest.mark.parametrize('tau', [0.5, 1.0])
+def test_a_rollout_between_few_times_is_that_between_many(tau):
+    p = primitive()
+    command, times = RhythmicInput(p.centre + 0.5, 0.7, tau), np.linspace(0.0, tau, 801)
+    exact, few = p.rollout(times, command), np.array([0, 30, 400, 800])
+    made = p.rollout(times[few], command)
+    scale = np.ptp(exact.positions)
+    np.testing.assert_allclose(made.positions, exact.positions[few], atol=1e-4 * scale)
+    np.testing.assert_allclose(made.velocities, exact.velocities[few], atol=1e-2 * scale)
+
+
 @pytest.mark.parametrize(
     'change',
     [
