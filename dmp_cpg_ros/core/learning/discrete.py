@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.learning.learning import (
     BASIS_CANDIDATES,
     Demonstrations,
     FitOptions,
     as_demonstrations,
+    check_range,
     check_reproduction,
     chosen_gains,
     largest_errors,
@@ -22,7 +24,7 @@ from dmp_cpg_ros.core.learning.learning import (
     targets_of,
 )
 from dmp_cpg_ros.core.learning.regression import Indices, Rows, Task
-from dmp_cpg_ros.core.primitives.basis import GaussianBases
+from dmp_cpg_ros.core.primitives.basis import Bases, GaussianBases
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive
 from dmp_cpg_ros.core.primitives.responses import Force, transient_responses
 from dmp_cpg_ros.core.primitives.time_scaling import Form
@@ -67,6 +69,12 @@ class DiscreteTask(Task):
     def _scaled_times(self, i: int) -> Array:
         times = self.demonstrations[i].times
         return (times - times[0]) / self.taus[i]
+
+    def has_gaps(self, bases: Bases) -> bool:
+        """Whether some interval without samples spans more than two bases."""
+        times = np.unique(np.concatenate([self._scaled_times(i)
+                                          for i in range(len(self.demonstrations))]))
+        return bool(np.diff(times).max() * bases.count > 2.0 * self.duration)
 
     def initial(self, rows: list[tuple[Indices, list[Rows]]], weights: Array
                 ) -> tuple[Array, Array]:
@@ -126,6 +134,10 @@ def learn_discrete(
     """
     task = _task(demonstrations, stiffness, damping, goals, form, options)
     made = task.chosen_bases(bases)
+    gaps = task.has_gaps(made)
+    if gaps and task.options.method != 'response':
+        raise DataError(f"method '{task.options.method}' knows no forces in gaps of the samples "
+                        "that several bases share; use the method 'response', or fewer bases")
     rows = task.rows(made) if task.options.method == 'response' else []
     weights = task.fit(made, rows)
     start, velocity = task.initial(rows, weights)
@@ -136,6 +148,9 @@ def learn_discrete(
     if task.options.method != 'response':
         errors = reproduction_errors(primitive, task.demonstrations, task.goals)
         check_reproduction(errors, task.options)
+    if gaps:
+        check_range(task.demonstrations,
+                    primitive.rollout(np.linspace(0.0, task.duration, 101)).positions)
     return primitive
 
 

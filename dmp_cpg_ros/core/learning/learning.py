@@ -36,8 +36,11 @@ METHODS: tuple[Method, ...] = ('response', 'joint', 'local')
 BASIS_CANDIDATES = (5, 7, 10, 14, 19, 25, 33, 43)
 """Numbers of bases that are tried when the number is to be chosen."""
 
-LARGEST_ERROR = 1.0
+LARGEST_ERROR = 0.5
 """Error of a reproduced position, as a fraction of the range, that is no reproduction."""
+
+WIDEST = 1.25
+"""Range of a movement, in ranges of its demonstrations, that shows what they never did."""
 
 _LOCAL_OVERLAP = 0.03
 
@@ -260,3 +263,14 @@ def check_reproduction(errors: Array, options: FitOptions) -> None:
             f"method '{options.method}' misses the demonstrations by {100.0 * worst:.0f} % of "
             "their range: noise or gaps spoil their derivatives; use the method 'response', "
             'or record velocities and accelerations')
+
+
+def check_range(demonstrations: Sequence[Demonstration], made: Array) -> None:
+    """Raise DataError where the positions (m, n) of a whole movement go much farther than those of
+    its demonstrations: between their samples nothing told the weights apart.
+    """
+    wide = float(np.max(np.ptp(made, axis=0) / ranges(demonstrations)))
+    if not wide < WIDEST:
+        raise DataError(
+            f'the movement takes {wide:.3g} times the range of its demonstrations, in gaps of '
+            'their samples; take fewer bases or a larger ridge, or record what is missing')

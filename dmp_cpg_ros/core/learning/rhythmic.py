@@ -18,6 +18,7 @@ from dmp_cpg_ros.core.learning.learning import (
     Demonstrations,
     FitOptions,
     as_demonstrations,
+    check_range,
     check_reproduction,
     chosen_gains,
     largest_errors,
@@ -135,6 +136,7 @@ def learn_rhythmic(
         cycles = [primitive.on_cycle(task.phases(i), task.taus[i])[0] + task.goals[i]
                   for i in range(len(movements))]
         check_reproduction(largest_errors(movements, cycles), task.options)
+    check_range(movements, primitive.on_cycle(np.linspace(0.0, 2.0 * np.pi, 200))[0])
     return primitive
 
 

@@ -349,6 +349,27 @@ def test_forces_of_noisy_samples_with_a_gap_are_refused_and_responses_are_not(me
     assert np.abs(learned.rollout(clean.times).positions - clean.positions).max() < 0.2
 
 
+@pytest.mark.parametrize('method', ['response', 'joint', 'local'])
+@pytest.mark.parametrize('gap', [0.0, 0.3])
+@pytest.mark.parametrize('noise', [0.0, 1e-3, 1e-2])
+def test_what_is_learned_from_uneven_samples_is_right_or_refused(method, gap, noise):
+    rng, clean = np.random.default_rng(1), straight_reach([0.0, 1.0], [1.0, -1.0], dt=0.002)
+    kept = np.sort(rng.choice(len(clean.times), 350, replace=False))
+    kept = kept[np.abs(clean.times[kept] - 0.5) > 0.5 * gap]
+    recorded = Demonstration(
+        clean.times[kept], clean.positions[kept] + noise * rng.normal(size=(len(kept), 2)))
+    try:
+        learned = learn_discrete(recorded, 25, options=FitOptions(method))
+    except DataError as error:
+        assert 'gaps' in str(error) and (gap or noise)
+    else:
+        made, size = learned.rollout(clean.times).positions, np.ptp(clean.positions, axis=0)
+        errors = np.abs(made - clean.positions) / size
+        assert errors[kept].max() < 0.55
+        assert (np.ptp(made, axis=0) / size).max() < 1.4
+        assert gap or errors.max() < 0.55
+
+
 @pytest.mark.parametrize('goal', [np.full(2, np.nan), np.zeros(5), np.zeros(1)])
 def test_a_goal_that_does_not_fit_is_refused_in_flight(goal):
     reach = learn_discrete(straight_reach([0.0, 1.0], [1.0, -1.0]), 10)
