@@ -21,14 +21,9 @@ from math import exp, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.estimation import terrain_plane, velocity_filter
+from dmp_cpg_ros.core.estimation import leg_odometry, terrain_plane, velocity_filter
 from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
-from dmp_cpg_ros.core.estimation.leg_odometry import (
-    FootMotion,
-    LegOdometry,
-    force_from_torque,
-    turn_rate_of_feet,
-)
+from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.terrain_plane import TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.velocity_filter import FilterNoise, FilterState
@@ -114,7 +109,7 @@ class BodyEstimator:
                  legs: RobotLegs | None = None) -> None:
         """Scale the thresholds by the robot's weight."""
         self.parameters = parameters
-        self.odometry = LegOdometry(description, legs)
+        self.odometry = leg_odometry.LegOdometry(description, legs)
         self._weight = description.mass * GRAVITY
 
     @property
@@ -208,7 +203,7 @@ class BodyEstimator:
         rate = memory.rate if blind <= BLIND else state.gyro_bias
         if trust.any():
             motion, _ = self._motion(memory.terrain, state, readings)
-            rate = state.gyro_bias + turn_rate_of_feet(
+            rate = state.gyro_bias + leg_odometry.turn_rate_of_feet(
                 np.array(motion.contact_in_base), np.array(motion.velocity_in_base), trust)
         return rate, GRAVITY * up + state.accelerometer_bias
 
@@ -228,7 +223,7 @@ class BodyEstimator:
         force = readings.foot_force.tolist()
         for i, usable in enumerate(readings.usable_contacts):
             if not usable:
-                felt = force_from_torque(np.array(motion.jacobian_in_base[i]),
+                felt = leg_odometry.force_from_torque(np.array(motion.jacobian_in_base[i]),
                                          readings.joint_effort[3 * i : 3 * i + 3],
                                          np.array(normal))
                 force[i] = felt if isfinite(felt) else 0.0

@@ -11,18 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.learning.learning import (
-    BASIS_CANDIDATES,
-    Demonstrations,
-    FitOptions,
-    as_demonstrations,
-    check_range,
-    check_reproduction,
-    chosen_gains,
-    largest_errors,
-    prepared,
-    targets_of,
-)
+from dmp_cpg_ros.core.learning import learning
+from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, Demonstrations, FitOptions
 from dmp_cpg_ros.core.learning.regression import Indices, Rows, Task
 from dmp_cpg_ros.core.primitives.basis import Bases, GaussianBases
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive
@@ -147,9 +137,9 @@ def learn_discrete(
         start_velocity=velocity, names=task.demonstrations[0].names)
     if task.options.method != 'response':
         errors = reproduction_errors(primitive, task.demonstrations, task.goals)
-        check_reproduction(errors, task.options)
+        learning.check_reproduction(errors, task.options)
     if gaps:
-        check_range(task.demonstrations,
+        learning.check_range(task.demonstrations,
                     primitive.rollout(np.linspace(0.0, task.duration, 101)).positions)
     return primitive
 
@@ -196,13 +186,13 @@ def reproduction_errors(primitive: DiscretePrimitive, demonstrations: Demonstrat
     ndarray (n,)
         Largest error per degree of freedom, divided by that degree's range.
     """
-    movements, made = as_demonstrations(demonstrations), []
-    ends = targets_of(goals, [movement.positions[-1] for movement in movements], 'goal')
+    movements, made = learning.as_demonstrations(demonstrations), []
+    ends = learning.targets_of(goals, [movement.positions[-1] for movement in movements], 'goal')
     for movement, goal in zip(movements, ends, strict=True):
         tau = movement.duration / primitive.duration
         state = primitive.initial_state(movement.positions[0], None, goal, tau)
         made.append(primitive.rollout(movement.times, DiscreteInput(goal, tau), state).positions)
-    return largest_errors(movements, made)
+    return learning.largest_errors(movements, made)
 
 
 def _task(
@@ -211,8 +201,8 @@ def _task(
     form: Form = 'scaled', options: FitOptions | None = None,
 ) -> DiscreteTask:
     options = options or FitOptions()
-    movements = prepared(demonstrations, options)
+    movements = learning.prepared(demonstrations, options)
     durations = [movement.duration for movement in movements]
-    spring = chosen_gains(float(np.mean(durations)), stiffness, damping, movements[0].dofs, form)
-    ends = targets_of(goals, [movement.positions[-1] for movement in movements], 'goal')
+    spring = learning.chosen_gains(durations, stiffness, damping, movements[0].dofs, form)
+    ends = learning.targets_of(goals, [movement.positions[-1] for movement in movements], 'goal')
     return DiscreteTask(movements, durations, ends, spring, options)

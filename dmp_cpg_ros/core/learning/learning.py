@@ -175,14 +175,14 @@ def targets_of(given: Sequence[ArrayLike] | None, usual: list[Array], name: str)
     return [vector(target, len(usual[0]), name) for target in given]
 
 
-def chosen_gains(duration: float, stiffness: ArrayLike | None, damping: ArrayLike | None,
-                 dofs: int, form: Form) -> SpringDamper:
+def chosen_gains(durations: Sequence[float], stiffness: ArrayLike | None,
+                 damping: ArrayLike | None, dofs: int, form: Form) -> SpringDamper:
     """Spring-damper with the given gains; what is missing is chosen for critical damping.
 
     Parameters
     ----------
-    duration : float
-        Duration or period, which sets the gains when none is given [s].
+    durations : sequence of float
+        Durations or periods, whose mean sets the gains when none is given [s].
     stiffness, damping : array_like (n,) or float, optional
         k [1/s²] and b [1/s].
     dofs : int
@@ -195,7 +195,7 @@ def chosen_gains(duration: float, stiffness: ArrayLike | None, damping: ArrayLik
     SpringDamper
     """
     if stiffness is None and damping is None:
-        stiffness, damping = default_gains(duration)
+        stiffness, damping = default_gains(float(np.mean(durations)))
     elif damping is None:
         damping = 2.0 * np.sqrt(np.maximum(np.asarray(stiffness, dtype=float), 0.0))
     elif stiffness is None:
@@ -238,14 +238,6 @@ def ranges(demonstrations: Sequence[Demonstration]) -> Array:
     return np.where(span > 1e-9 * largest, span, largest)
 
 
-def check_bases(count: int | None, demonstrations: Sequence[Demonstration]) -> None:
-    """Raise DataError for more bases than samples; nothing would tell their weights apart."""
-    samples = sum(len(d.times) for d in demonstrations)
-    if count is not None and count > samples:
-        raise DataError(f'{count} bases cannot be learned from {samples} samples; valid are at '
-                        f'most as many bases as samples')
-
-
 def largest_errors(demonstrations: Sequence[Demonstration], made: Sequence[Array]) -> Array:
     """Largest distance of positions that were made (m, n) from the demonstrated ones, (n,), as a
     fraction of the range.
@@ -258,7 +250,7 @@ def largest_errors(demonstrations: Sequence[Demonstration], made: Sequence[Array
 def check_reproduction(errors: Array, options: FitOptions) -> None:
     """Raise DataError where a fit of forces, which needs derivatives, reproduces nothing."""
     worst = float(np.max(errors))
-    if options.method != 'response' and not worst < LARGEST_ERROR:
+    if not worst < LARGEST_ERROR:
         raise DataError(
             f"method '{options.method}' misses the demonstrations by {100.0 * worst:.0f} % of "
             "their range: noise or gaps spoil their derivatives; use the method 'response', "

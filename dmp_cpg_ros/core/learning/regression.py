@@ -17,15 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.learning.learning import (
-    BASIS_CANDIDATES,
-    FitOptions,
-    check_bases,
-    locally_weighted_regression,
-    ranges,
-    ridge_regression,
-    smallest_good,
-)
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.learning import learning
+from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, FitOptions
 from dmp_cpg_ros.core.primitives.basis import Bases
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.responses import Force
@@ -130,8 +124,13 @@ class Task(ABC):
 
     def chosen_bases(self, count: int | None) -> Bases:
         """Bases of the given number, or of the smallest number with a good held-out error."""
-        check_bases(count, self.demonstrations)
-        return self.bases(smallest_good(self.held_out_errors()) if count is None else count)
+        if count is None:
+            count = learning.smallest_good(self.held_out_errors())
+        samples = sum(len(movement.times) for movement in self.demonstrations)
+        if count > samples:  # nothing would tell their weights apart
+            raise DataError(f'{count} bases cannot be learned from {samples} samples; valid are '
+                            'at most as many bases as samples')
+        return self.bases(count)
 
     def held_out_errors(self, candidates: Sequence[int] = BASIS_CANDIDATES) -> dict[int, float]:
         """Error at samples that took no part in the fit, for several numbers of bases: root mean
@@ -169,15 +168,16 @@ class Task(ABC):
             for members, parts in rows:
                 used = [part.of(keep).without_initial_state()
                         for part, keep in zip(parts, kept, strict=True) if keep.any()]
-                weights[:, members] = ridge_regression(
+                weights[:, members] = learning.ridge_regression(
                     np.vstack([A for A, _ in used]), np.vstack([B for _, B in used]),
                     options.ridge)
             return weights
         phases = np.concatenate([self.phases(i)[keep] for i, keep in enumerate(kept)])
         forces = np.vstack([self._required_force(i)[keep] for i, keep in enumerate(kept)])
         if options.method == 'joint':
-            return ridge_regression(self._regressors(bases, phases), forces, options.ridge)
-        local = locally_weighted_regression(
+            return learning.ridge_regression(
+                self._regressors(bases, phases), forces, options.ridge)
+        local = learning.locally_weighted_regression(
             bases.activations(phases), self.inputs(phases), forces, options.ridge)
         return local.reshape(-1, forces.shape[1])
 
@@ -212,7 +212,8 @@ class Task(ABC):
         return Rows(*(np.vstack(kind) for kind in zip(*parts, strict=True)))
 
     def _held_out_error(self, bases: Bases) -> float:
-        span, rows, squares, samples = ranges(self.demonstrations), self.rows(bases), 0.0, 0
+        span, rows = learning.ranges(self.demonstrations), self.rows(bases)
+        squares, samples = 0.0, 0
         for hidden in self._folds():
             weights = self.fit(bases, rows, [~mask for mask in hidden])
             for members, parts in rows:

@@ -13,19 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.learning.learning import (
-    BASIS_CANDIDATES,
-    Demonstrations,
-    FitOptions,
-    as_demonstrations,
-    check_range,
-    check_reproduction,
-    chosen_gains,
-    largest_errors,
-    prepared,
-    ranges,
-    targets_of,
-)
+from dmp_cpg_ros.core.learning import learning
+from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, Demonstrations, FitOptions
 from dmp_cpg_ros.core.learning.period import find_period, fourier_series, phase_lead
 from dmp_cpg_ros.core.learning.regression import Task
 from dmp_cpg_ros.core.primitives.basis import VonMisesBases
@@ -135,8 +124,8 @@ def learn_rhythmic(
     if task.options.method != 'response':
         cycles = [primitive.on_cycle(task.phases(i), task.taus[i])[0] + task.goals[i]
                   for i in range(len(movements))]
-        check_reproduction(largest_errors(movements, cycles), task.options)
-    check_range(movements, primitive.on_cycle(np.linspace(0.0, 2.0 * np.pi, 200))[0])
+        learning.check_reproduction(learning.largest_errors(movements, cycles), task.options)
+    learning.check_range(movements, primitive.on_cycle(np.linspace(0.0, 2.0 * np.pi, 200))[0])
     return primitive
 
 
@@ -206,12 +195,12 @@ def reproduction_errors(primitive: RhythmicPrimitive, demonstrations: Demonstrat
     -------
     ndarray (n,)
     """
-    movements, made = as_demonstrations(demonstrations), []
+    movements, made = learning.as_demonstrations(demonstrations), []
     for movement in movements:
         phi, command = place(primitive, movement, period)
         state = primitive.initial_state(phi, command)
         made.append(primitive.rollout(movement.times, command, state).positions)
-    return largest_errors(movements, made)
+    return learning.largest_errors(movements, made)
 
 
 def _series(demonstration: Demonstration, period: float) -> Array:
@@ -227,7 +216,7 @@ def _task(
     options: FitOptions | None = None,
 ) -> RhythmicTask:
     options = options or FitOptions()
-    movements = prepared(demonstrations, options)
+    movements = learning.prepared(demonstrations, options)
     if period is None:
         periods = [find_period(movement) for movement in movements]
     else:
@@ -236,9 +225,9 @@ def _task(
             raise ParameterError(f'period = {period!r} s must be positive')
     series = [_series(m, p) for m, p in zip(movements, periods, strict=True)]
     if leads is None:
-        first, *others = (coefficients / ranges(movements) for coefficients in series)
+        first, *others = (coefficients / learning.ranges(movements) for coefficients in series)
         leads = [0.0, *(phase_lead(first, other) for other in others)]
-    spring = chosen_gains(float(np.mean(periods)), stiffness, damping, movements[0].dofs, form)
-    middles = targets_of(centres, [coefficients[0].real for coefficients in series], 'centre')
+    spring = learning.chosen_gains(periods, stiffness, damping, movements[0].dofs, form)
+    middles = learning.targets_of(centres, [c[0].real for c in series], 'centre')
     phases = vector(leads, len(movements), 'leads').tolist()
     return RhythmicTask(movements, periods, middles, spring, options, phases)

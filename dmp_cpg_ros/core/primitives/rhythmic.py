@@ -101,9 +101,8 @@ class RhythmicPrimitive(Primitive):
                 spring, stiffness=spring.stiffness[dofs], damping=spring.damping[dofs]))
 
     @classmethod
-    def joined(
-        cls, parts: Sequence[RhythmicPrimitive], names: tuple[str, ...] = ()
-    ) -> RhythmicPrimitive:
+    def joined(cls, parts: Sequence[RhythmicPrimitive], names: tuple[str, ...] = ()
+               ) -> RhythmicPrimitive:
         """Primitive of the degrees of freedom of several that share bases and oscillator."""
         springs = [part.transformation for part in parts]
         return replace(

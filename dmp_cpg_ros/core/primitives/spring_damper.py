@@ -217,18 +217,17 @@ class SpringDamper:
     def _runge_kutta(self, y: Array, v: Array, drives: Array, grid: StepGrid
                      ) -> tuple[Array, Array]:
         """One step of the classical fourth-order method on the printed form."""
-        k, b, h = self.stiffness, self.damping, grid.length
-        first, middle, last = drives
-        tau_0, tau_m, tau_1 = grid.tau
-        a_1 = (first - k * y - b * v) / tau_0
-        v_2 = v + 0.5 * h * a_1
-        a_2 = (middle - k * (y + 0.5 * h * v) - b * v_2) / tau_m
-        v_3 = v + 0.5 * h * a_2
-        a_3 = (middle - k * (y + 0.5 * h * v_2) - b * v_3) / tau_m
-        v_4 = v + h * a_3
-        a_4 = (last - k * (y + h * v_3) - b * v_4) / tau_1
-        return (y + h / 6.0 * (v + 2.0 * v_2 + 2.0 * v_3 + v_4),
-                v + h / 6.0 * (a_1 + 2.0 * a_2 + 2.0 * a_3 + a_4))
+        def slope(state: Array, drive: Array, tau: float) -> Array:
+            spring = drive - self.stiffness * state[0] - self.damping * state[1]
+            return np.stack([state[1], spring / tau])
+
+        s, h = np.stack([y, v]), grid.length
+        k_1 = slope(s, drives[0], grid.tau[0])
+        k_2 = slope(s + 0.5 * h * k_1, drives[1], grid.tau[1])
+        k_3 = slope(s + 0.5 * h * k_2, drives[1], grid.tau[1])
+        k_4 = slope(s + h * k_3, drives[2], grid.tau[2])
+        position, velocity = s + h / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
+        return position, velocity
 
 
 def quadratic_drive_step(k: float | Array, b: float | Array, propagator: Array, y: Array, z: Array,
