@@ -149,9 +149,7 @@ def as_demonstrations(demonstrations: Demonstrations) -> list[Demonstration]:
     DataError
         If there is none or the numbers of degrees of freedom differ.
     """
-    if isinstance(demonstrations, Demonstration):
-        demonstrations = [demonstrations]
-    result = list(demonstrations)
+    result = [demonstrations] if isinstance(demonstrations, Demonstration) else [*demonstrations]
     if not result:
         raise DataError('learning needs at least one demonstration')
     dofs = [demonstration.dofs for demonstration in result]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import upward
+from dmp_cpg_ros.core.maths.vec3 import dot, triple, upward
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
@@ -70,15 +70,14 @@ class BodySense:
 
     def condition(self, state: RobotState) -> BodyCondition:
         """Condition in a measured state."""
-        down_x, down_y, down_z = (-part for part in upward(state.base_quaternion.tolist()))
-        legs, height = self._legs.at(state.joint_position.tolist()), -inf
-        for ((foot_x, foot_y, foot_z), _), radius in zip(legs, self._radius, strict=True):
-            height = max(height, down_x * foot_x + down_y * foot_y + down_z * foot_z + radius)
-        down = np.array((down_x, down_y, down_z))
+        towards = triple([-part for part in upward(state.base_quaternion.tolist())])
+        legs, down = self._legs.at(state.joint_position.tolist()), np.array(towards)
+        height = max([-inf, *(dot(towards, foot) + radius
+                              for (foot, _), radius in zip(legs, self._radius, strict=True))])
         support = sum(state.foot_force.tolist()) / self._weight
         if support < CERTAIN_SUPPORT:
             support = max(support, self._pressed(state, down))
-        return BodyCondition(down, acos(min(max(-down_z, -1.0), 1.0)), height, support)
+        return BodyCondition(down, acos(min(max(-towards[2], -1.0), 1.0)), height, support)
 
     def _pressed(self, state: RobotState, down: Array) -> float:
         """Share of the weight that the joint torques press onto the ground.

@@ -139,13 +139,12 @@ class Movements:
 
     def __init__(self, description: RobotDescription) -> None:
         """Derive the postures."""
-        self.time_unit = sqrt(body_scale(description).leg_length / GRAVITY)
-        self.pause = PAUSE * self.time_unit
+        self.time_unit = unit = sqrt(body_scale(description).leg_length / GRAVITY)
+        self.pause = PAUSE * unit
         shares = minimum_jerk(np.linspace(0.0, 1.0, PATH_SAMPLES))
         rise = np.array([raised_posture(description, share) for share in shares])
         tucked = _posture(description, 'left', TUCKED, TUCKED)
         lying, standing = lying_posture(description), standing_posture(description)
-        unit = self.time_unit
         movements = [
             Movement('rise', standing, RISE * unit, rise, (0.0, 1.0)),
             Movement('lower', lying, RISE * unit, rise[::-1].copy(), (1.0, 0.0)),
@@ -157,11 +156,10 @@ class Movements:
 
     def named(self, name: str) -> Movement:
         """Movement of a name; raises DataError that lists the valid names."""
-        try:
-            return self._by_name[name]
-        except KeyError:
-            raise DataError(f"there is no movement '{name}'; valid are "
-                            f"{', '.join(self._by_name)}") from None
+        if name not in self._by_name:
+            raise DataError(
+                f"there is no movement '{name}'; valid are {', '.join(self._by_name)}")
+        return self._by_name[name]
 
     def duration(self, names: tuple[str, ...]) -> float:
         """Time that movements take one after the other, pauses included [s]."""

@@ -11,12 +11,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dmp_cpg_ros.core.canonical.phase import phase, state_at
+from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.demonstration import vector
-from dmp_cpg_ros.core.primitives.hopf_flow import hopf_flow
 from dmp_cpg_ros.core.primitives.primitive import Primitive, check_positive
 from dmp_cpg_ros.core.primitives.responses import periodic_responses
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.primitives.time_scaling import StepGrid
 
 Array = NDArray[np.float64]
@@ -97,20 +97,18 @@ class RhythmicPrimitive(Primitive):
         spring = self.transformation
         return replace(
             self, weights=self.weights[:, dofs], centre=self.centre[dofs], names=self.names[dofs],
-            transformation=replace(
-                spring, stiffness=spring.stiffness[dofs], damping=spring.damping[dofs]))
+            transformation=SpringDamper(spring.stiffness[dofs], spring.damping[dofs], self.form))
 
     @classmethod
     def joined(cls, parts: Sequence[RhythmicPrimitive], names: tuple[str, ...] = ()
                ) -> RhythmicPrimitive:
         """Primitive of the degrees of freedom of several that share bases and oscillator."""
-        springs = [part.transformation for part in parts]
+        k, b = (np.concatenate([getattr(part.transformation, name) for part in parts])
+                for name in ('stiffness', 'damping'))
         return replace(
             parts[0], weights=np.concatenate([part.weights for part in parts], axis=1),
             centre=np.concatenate([part.centre for part in parts]), names=names,
-            transformation=replace(
-                springs[0], stiffness=np.concatenate([spring.stiffness for spring in springs]),
-                damping=np.concatenate([spring.damping for spring in springs])))
+            transformation=SpringDamper(k, b, parts[0].form))
 
     @cached_property
     def _amplitude_filter(self) -> FirstOrderFilter:
@@ -243,3 +241,61 @@ class RhythmicPrimitive(Primitive):
                grid: StepGrid) -> RhythmicState:
         position, velocity, centre = self._transformed(state, command, x, grid.halved())
         return RhythmicState(position, velocity, x[-1], centre, amplitude, float(grid.tau[-1]))
+
+
+def hopf_flow(x: Array, omega: float, rho: float, radii: Array, grid: StepGrid) -> Array:
+    """States at the start, middle and end of a step of an Andronov-Hopf oscillator whose radius
+    follows a reference.
+
+    In polar coordinates the angle turns at ω and the squared radius obeys a logistic equation
+    (Bernoulli), which is linear in 1/R². So the flow of
+    :class:`~dmp_cpg_ros.core.canonical.hopf.AndronovHopf` has no stability limit, however large
+    ρr² is. Exact in the angle; exact in the radius for constant r, else of fourth order in the
+    length of the step.
+
+    Parameters
+    ----------
+    x : ndarray (2,)
+        State at the start.
+    omega, rho : float
+        ω [rad/s] and ρ [1/s].
+    radii : ndarray (5,)
+        r at the nodes.
+    grid : StepGrid
+        With five nodes.
+
+    Returns
+    -------
+    ndarray (3, 2)
+    """
+    squared = float(x @ x)
+    growth = np.ones(3)
+    if squared > 0.0:
+        density, half = grid.density, 0.5 * grid.length
+        middle = _squared_radius(squared, rho, radii[:3], density[:3], half)
+        end = _squared_radius(middle, rho, radii[2:], density[2:], half)
+        growth[1:] = np.sqrt(np.array([middle, end]) / squared)
+    angle = omega * grid.scaled[::2]
+    turned = x @ phase_generator().T
+    return growth[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * turned)
+
+
+def _squared_radius(squared: float, rho: float, radii: Array, density: Array, length: float
+                    ) -> float:
+    """Squared radius after a step: 1/R² = e^{−P}/R₀² + ∫ e^{p − P}/r² dp, p = 2ρ ∫ r² ds.
+
+    P is p at the end. 1/r² is replaced by the quadratic in p through three nodes, and the integral
+    is then taken exactly.
+    """
+    rate = 2.0 * rho * radii**2 * density  # dp/du at the nodes
+    p_middle = length * float(rate @ (5.0, 8.0, -1.0)) / 24.0
+    p_end = length * float(rate @ (1.0, 4.0, 1.0)) / 6.0
+    values = 1.0 / radii**2
+    # Newton's divided differences
+    slope = (values[1] - values[0]) / p_middle
+    bend = ((values[2] - values[1]) / (p_end - p_middle) - slope) / p_end
+    one = -np.expm1(-p_end)  # ∫ e^{p − P} dp
+    first = p_end - one  # ∫ e^{p − P} p dp
+    second = p_end**2 - 2.0 * first  # ∫ e^{p − P} p² dp
+    integral = values[0] * one + slope * first + bend * (second - p_middle * first)
+    return float(1.0 / (np.exp(-p_end) / squared + integral))

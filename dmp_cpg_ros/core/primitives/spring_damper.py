@@ -185,9 +185,8 @@ class SpringDamper:
         (all_a, all_b), (all_c, all_d) = self.propagator(dt).tolist()
         position, velocity = [], []
         for y, y_dot, at, rate, a, b, c, d in zip(
-            state.position.tolist(), state.velocity.tolist(), goal.tolist(),
-            goal_velocity.tolist(), all_a, all_b, all_c, all_d, strict=True,
-        ):  # fmt: skip
+                state.position.tolist(), state.velocity.tolist(), goal.tolist(),
+                goal_velocity.tolist(), all_a, all_b, all_c, all_d, strict=True):
             error, error_rate = y - (at - rate * dt), y_dot - rate
             position.append(at + a * error + b * error_rate)
             velocity.append(rate + c * error + d * error_rate)
