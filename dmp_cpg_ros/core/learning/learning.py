@@ -36,7 +36,7 @@ METHODS: tuple[Method, ...] = ('response', 'joint', 'local')
 BASIS_CANDIDATES = (5, 7, 10, 14, 19, 25, 33, 43)
 """Numbers of bases that are tried when the number is to be chosen."""
 
-LARGEST_ERROR = 0.5
+LARGEST_ERROR = 0.7
 """Error of a reproduced position, as a fraction of the range, that is no reproduction."""
 
 WIDEST = 1.25

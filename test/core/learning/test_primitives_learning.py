@@ -365,9 +365,9 @@ def test_what_is_learned_from_uneven_samples_is_right_or_refused(method, gap, no
     else:
         made, size = learned.rollout(clean.times).positions, np.ptp(clean.positions, axis=0)
         errors = np.abs(made - clean.positions) / size
-        assert errors[kept].max() < 0.55
+        assert errors[kept].max() < 0.75
         assert (np.ptp(made, axis=0) / size).max() < 1.4
-        assert gap or errors.max() < 0.55
+        assert gap or errors.max() < 0.75
 
 
 @pytest.mark.parametrize('goal', [np.full(2, np.nan), np.zeros(5), np.zeros(1)])
