@@ -15,7 +15,7 @@ from dmp_cpg_ros.core.canonical.phase import phase, state_at
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.core.primitives.states import DiscreteInput
+from dmp_cpg_ros.core.primitives.discrete import DiscreteInput
 from dmp_cpg_ros.paper.algebra import slowed, summed, transformed
 from dmp_cpg_ros.paper.daughters import Daughter, DaughterSum, transported_metric
 from dmp_cpg_ros.paper.diffeomorphism import (

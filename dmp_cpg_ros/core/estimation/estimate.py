@@ -56,16 +56,7 @@ class BodyEstimate:
 def estimated_state(readings: SensorReadings, estimate: BodyEstimate) -> RobotState:
     """Robot's state with an estimate in place of the ground truth, for the controllers."""
     return RobotState(
-        readings.time_ns,
-        readings.joint_position,
-        readings.joint_velocity,
-        readings.joint_effort,
-        estimate.position_in_world,
-        estimate.quaternion,
-        estimate.velocity_in_base,
-        estimate.rate_in_base,
-        readings.specific_force_in_base,
-        readings.foot_force,
-        readings.rate_in_base,
-        estimate.normal_in_world,
-    )
+        readings.time_ns, readings.joint_position, readings.joint_velocity, readings.joint_effort,
+        estimate.position_in_world, estimate.quaternion, estimate.velocity_in_base,
+        estimate.rate_in_base, readings.specific_force_in_base, readings.foot_force,
+        readings.rate_in_base, estimate.normal_in_world)

@@ -21,38 +21,15 @@ from math import exp, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.estimation import leg_odometry, terrain_plane, velocity_filter
 from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
-from dmp_cpg_ros.core.estimation.leg_odometry import (
-    FootMotion,
-    LegOdometry,
-    force_from_torque,
-    turn_rate_of_feet,
-)
+from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
-from dmp_cpg_ros.core.estimation.terrain_plane import (
-    TerrainState,
-    initial_terrain,
-    normal_in_world,
-    terrain_step,
-)
-from dmp_cpg_ros.core.estimation.velocity_filter import (
-    FilterNoise,
-    FilterState,
-    predict,
-    settle,
-    update,
-)
+from dmp_cpg_ros.core.estimation.terrain_plane import TerrainState, normal_in_world
+from dmp_cpg_ros.core.estimation.velocity_filter import FilterNoise, FilterState
+from dmp_cpg_ros.core.maths import vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.rotations import levelled
-from dmp_cpg_ros.core.maths.vec3 import (
-    Triple,
-    dot,
-    rotation,
-    times,
-    transposed_times,
-    triple,
-    upward,
-)
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
@@ -128,13 +105,11 @@ class BodyEstimator:
         The robot's legs, where others ask them too.
     """
 
-    def __init__(
-        self, description: RobotDescription, parameters: EstimationParameters,
-        legs: RobotLegs | None = None,
-    ) -> None:
+    def __init__(self, description: RobotDescription, parameters: EstimationParameters,
+                 legs: RobotLegs | None = None) -> None:
         """Scale the thresholds by the robot's weight."""
         self.parameters = parameters
-        self.odometry = LegOdometry(description, legs)
+        self.odometry = leg_odometry.LegOdometry(description, legs)
         self._weight = description.mass * GRAVITY
 
     @property
@@ -146,16 +121,12 @@ class BodyEstimator:
     def parameters(self, parameters: EstimationParameters) -> None:
         self._parameters = p = parameters
         self._seeing_noise, self._blind_noise = (
-            FilterNoise(
-                gyro, accelerometer, p.gyro_bias_walk, p.accelerometer_bias_walk, p.foot_noise,
-                p.foot_freedom,
-            )
-            for gyro, accelerometer in ((p.gyro_noise, p.accelerometer_noise), BLIND_NOISE)
-        )
+            FilterNoise(gyro, accelerometer, p.gyro_bias_walk, p.accelerometer_bias_walk,
+                        p.foot_noise, p.foot_freedom)
+            for gyro, accelerometer in ((p.gyro_noise, p.accelerometer_noise), BLIND_NOISE))
 
-    def step(
-        self, memory: EstimatorState | None, readings: SensorReadings
-    ) -> tuple[EstimatorState, BodyEstimate]:
+    def step(self, memory: EstimatorState | None, readings: SensorReadings
+             ) -> tuple[EstimatorState, BodyEstimate]:
         """Take in the readings of one tick.
 
         Parameters
@@ -173,37 +144,31 @@ class BodyEstimator:
         if memory is None or readings.time_ns <= memory.estimate.time_ns:
             return self._begin(readings)
         dt = (readings.time_ns - memory.estimate.time_ns) * 1e-9
-        legs, contacts = readings.usable_legs, readings.usable_contacts
         seeing = readings.imu_is_usable
         blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
         noise = self._blind_noise if blind else self._seeing_noise
-        if seeing:
-            rate, force = readings.rate_in_base, readings.specific_force_in_base
-        else:
-            rate, force = self._guessed(memory, readings, legs, blind)
-        state = predict(memory.filter, 0.5 * (memory.rate + rate), force, dt, noise)
-        motion, normal = self._motion(memory.terrain, state, readings, legs)
+        rate, force = (
+            (readings.rate_in_base, readings.specific_force_in_base) if seeing
+            else self._guessed(memory, readings, blind))
+        state = velocity_filter.predict(
+            memory.filter, 0.5 * (memory.rate + rate), force, dt, noise)
+        motion, normal = self._motion(memory.terrain, state, readings)
         more = dt / self.parameters.contact_settling
-        trust = [
-            min(now, before + more)
-            for now, before in zip(
-                self._trust(readings, legs, contacts, motion, normal),
-                memory.estimate.trust.tolist(), strict=True)
-        ]
-        state, _ = update(
+        trust = [min(now, before + more)
+                 for now, before in zip(self._trust(readings, motion, normal),
+                                        memory.estimate.trust.tolist(), strict=True)]
+        state, _ = velocity_filter.update(
             state, rate, motion.contact_in_base, motion.velocity_in_base, trust, noise)
         rests = seeing and min(trust) > 0.0 and _is_still(readings, state)
         still = memory.still + dt if rests else 0.0
         if still > STILL_TIME:
-            state = settle(state, rate, STILL_DEVIATION)
-        problems = _problems(legs, contacts, seeing)
+            state = velocity_filter.settle(state, rate, STILL_DEVIATION)
+        problems = _problems(readings)
         covariance, velocity = state.covariance.ravel(), state.velocity_in_base
         if not isfinite(covariance.dot(covariance) + velocity.dot(velocity)):
-            problems = (*problems, 'filter')
-            state = memory.filter
+            problems, state = (*problems, 'filter'), memory.filter
         terrain, estimate = self._finished(
-            memory, state, readings.time_ns, rate, motion, trust, problems
-        )
+            memory, state, readings.time_ns, rate, motion, trust, problems)
         return EstimatorState(state, terrain, estimate, rate, blind, still), estimate
 
     def _begin(self, readings: SensorReadings) -> tuple[EstimatorState, BodyEstimate]:
@@ -213,76 +178,60 @@ class BodyEstimator:
         zero = np.zeros(3)
         covariance = np.diag(np.repeat(np.square(INITIAL_DEVIATION), 3))
         state = FilterState(levelled(up), zero, zero, zero, covariance)
-        legs, contacts = readings.usable_legs, readings.usable_contacts
-        R = rotation(state.quaternion.tolist())
+        R = vec3.rotation(state.quaternion.tolist())
         flat = TerrainState(((0.0, 0.0, 0.0),) * len(LEGS), (0.0, 0.0))
-        motion, normal = self._motion(flat, state, readings, legs)
-        trust = self._trust(readings, legs, contacts, motion, normal)
-        contact = [times(R, place) for place in motion.contact_in_base]
+        motion, normal = self._motion(flat, state, readings)
+        trust, legs = self._trust(readings, motion, normal), readings.usable_legs
+        contact = [vec3.times(R, place) for place in motion.contact_in_base]
         depths = [z for (_, _, z), usable in zip(contact, legs, strict=True) if usable]
         height = -sum(depths) / len(depths) if depths else 0.0
+        rate = readings.rate_in_base if seeing else zero
         estimate = BodyEstimate(
-            readings.time_ns,
-            np.array((0.0, 0.0, height)),
-            state.quaternion,
-            zero,
-            readings.rate_in_base if seeing else zero,
-            height,
-            np.array(normal_in_world(flat.slope)),
-            np.array(trust),
-            covariance.diagonal()[3:6],
-            _problems(legs, contacts, seeing),
-        )
-        terrain = (
-            initial_terrain([(x, y, z + height) for x, y, z in contact]) if all(legs) else flat)
-        rate = estimate.rate_in_base
+            readings.time_ns, np.array((0.0, 0.0, height)), state.quaternion, zero, rate, height,
+            np.array(normal_in_world(flat.slope)), np.array(trust), covariance.diagonal()[3:6],
+            _problems(readings))
+        terrain = terrain_plane.initial_terrain(
+            [(x, y, z + height) for x, y, z in contact]) if all(legs) else flat
         return EstimatorState(state, terrain, estimate, rate, 0.0, 0.0), estimate
 
-    def _guessed(
-        self, memory: EstimatorState, readings: SensorReadings, legs: tuple[bool, ...],
-        blind: float,
-    ) -> tuple[Array, Array]:
+    def _guessed(self, memory: EstimatorState, readings: SensorReadings, blind: float
+                 ) -> tuple[Array, Array]:
         """Guess what a silent IMU would read: the feet tell the turn rate, nothing accelerates."""
-        state, trust = memory.filter, np.where(legs, memory.estimate.trust, 0.0)
-        up = np.array(upward(state.quaternion.tolist()))
+        state = memory.filter
+        trust = np.where(readings.usable_legs, memory.estimate.trust, 0.0)
+        up = np.array(vec3.upward(state.quaternion.tolist()))
         rate = memory.rate if blind <= BLIND else state.gyro_bias
         if trust.any():
-            motion, _ = self._motion(memory.terrain, state, readings, legs)
-            rate = state.gyro_bias + turn_rate_of_feet(
-                np.array(motion.contact_in_base), np.array(motion.velocity_in_base), trust
-            )
+            motion, _ = self._motion(memory.terrain, state, readings)
+            rate = state.gyro_bias + leg_odometry.turn_rate_of_feet(
+                np.array(motion.contact_in_base), np.array(motion.velocity_in_base), trust)
         return rate, GRAVITY * up + state.accelerometer_bias
 
-    def _motion(
-        self, terrain: TerrainState, state: FilterState, readings: SensorReadings,
-        legs: tuple[bool, ...],
-    ) -> tuple[FootMotion, Triple]:
+    def _motion(self, terrain: TerrainState, state: FilterState, readings: SensorReadings
+                ) -> tuple[FootMotion, vec3.Triple]:
         """Motion of the feet, and the normal of the ground in the base."""
-        R = rotation(state.quaternion.tolist())
-        normal = transposed_times(R, normal_in_world(terrain.slope))
-        q, q_dot = readings.joint_position, readings.joint_velocity
+        R = vec3.rotation(state.quaternion.tolist())
+        normal = vec3.transposed_times(R, normal_in_world(terrain.slope))
+        q, q_dot, legs = readings.joint_position, readings.joint_velocity, readings.usable_legs
         if not all(legs):  # a placeholder for legs that are left out later
             q, q_dot = (np.where(np.repeat(legs, 3), values, 0.0) for values in (q, q_dot))
         return self.odometry.motion(q.tolist(), q_dot.tolist(), normal), normal
 
-    def _trust(
-        self, readings: SensorReadings, legs: tuple[bool, ...], contacts: tuple[bool, ...],
-        motion: FootMotion, normal: Triple,
-    ) -> list[float]:
+    def _trust(self, readings: SensorReadings, motion: FootMotion, normal: vec3.Triple
+               ) -> list[float]:
         """Trust in each foot from its force alone, in [0, 1]; 0 for legs without joints."""
         force = readings.foot_force.tolist()
-        if not all(contacts):
-            for i in np.flatnonzero(np.logical_not(contacts)).tolist():
-                torque = readings.joint_effort[3 * i : 3 * i + 3]
-                felt = force_from_torque(
-                    np.array(motion.jacobian_in_base[i]), torque, np.array(normal))
+        for i, usable in enumerate(readings.usable_contacts):
+            if not usable:
+                felt = leg_odometry.force_from_torque(np.array(motion.jacobian_in_base[i]),
+                                         readings.joint_effort[3 * i : 3 * i + 3],
+                                         np.array(normal))
                 force[i] = felt if isfinite(felt) else 0.0
         full = self.parameters.contact_share * self._weight
         return [
             min(max((felt / full - UNTRUSTED_SHARE) / (1.0 - UNTRUSTED_SHARE), 0.0), 1.0)
             if usable else 0.0
-            for felt, usable in zip(force, legs, strict=True)
-        ]
+            for felt, usable in zip(force, readings.usable_legs, strict=True)]
 
     def _finished(
         self, memory: EstimatorState, state: FilterState, time_ns: int, rate: Array,
@@ -291,56 +240,41 @@ class BodyEstimator:
         """Integrate the position, follow the ground, and put the estimate together."""
         last = memory.estimate
         dt = (time_ns - last.time_ns) * 1e-9
-        R, R_before = rotation(state.quaternion.tolist()), rotation(last.quaternion.tolist())
-        v_x, v_y, v_z = times(R, triple(state.velocity_in_base.tolist()))
-        u_x, u_y, u_z = times(R_before, triple(last.velocity_in_base.tolist()))
-        velocity = (0.5 * (v_x + u_x), 0.5 * (v_y + u_y), 0.5 * (v_z + u_z))
-        x, y, z = last.position_in_world.tolist()
-        x, y, z = x + velocity[0] * dt, y + velocity[1] * dt, z + velocity[2] * dt
-        contact = [times(R, place) for place in motion.contact_in_base]
-        terrain = terrain_step(
-            memory.terrain, [(x + a, y + b, z + c) for a, b, c in contact], trust, dt,
-            self.parameters.terrain_time,
-        )
+        R, R_before = (vec3.rotation(of.quaternion.tolist()) for of in (state, last))
+        v, u = (vec3.times(frame, vec3.triple(of.velocity_in_base.tolist()))
+                for frame, of in ((R, state), (R_before, last)))
+        velocity = vec3.triple([0.5 * (now + before) for now, before in zip(v, u, strict=True)])
+        position = vec3.moved(vec3.triple(last.position_in_world.tolist()), velocity, dt)
+        contact = [vec3.times(R, place) for place in motion.contact_in_base]
+        terrain = terrain_plane.terrain_step(
+            memory.terrain, [vec3.plus(position, place) for place in contact], trust, dt,
+            self.parameters.terrain_time)
         normal = normal_in_world(terrain.slope)
-        height, weight = last.height + dot(normal, velocity) * dt, sum(trust)
+        height, weight = last.height + vec3.dot(normal, velocity) * dt, sum(trust)
         if weight > 0.0:
             depths = zip(trust, contact, strict=True)
-            measured = -sum(share * dot(place, normal) for share, place in depths) / weight
+            measured = -sum(share * vec3.dot(place, normal) for share, place in depths) / weight
             share = 1.0 - exp(-HEIGHT_RATE * min(weight, 1.0) * dt)
             height += share * (measured - height)
-        estimate = BodyEstimate(
-            time_ns,
-            np.array((x, y, z)),
-            state.quaternion,
-            state.velocity_in_base,
-            rate - state.gyro_bias,
-            height,
-            np.array(normal),
-            np.array(trust),
-            state.covariance.diagonal()[3:6],
-            problems,
-        )
-        return terrain, estimate
+        return terrain, BodyEstimate(
+            time_ns, np.array(position), state.quaternion, state.velocity_in_base,
+            rate - state.gyro_bias, height, np.array(normal), np.array(trust),
+            state.covariance.diagonal()[3:6], problems)
 
 
 def _is_still(readings: SensorReadings, state: FilterState) -> bool:
     """Whether neither joints nor body move."""
     x, y, z = (readings.rate_in_base - state.gyro_bias).tolist()
-    return (
-        x * x + y * y + z * z < STILL_TURN**2
-        and float(np.abs(readings.joint_velocity).max()) < STILL_JOINT
-    )
+    return (x * x + y * y + z * z < STILL_TURN**2
+            and float(np.abs(readings.joint_velocity).max()) < STILL_JOINT)
 
 
-def _problems(
-    legs: tuple[bool, ...], contacts: tuple[bool, ...], seeing: bool
-) -> tuple[str, ...]:
+def _problems(readings: SensorReadings) -> tuple[str, ...]:
     """Names of the sensors that could not be used."""
-    if seeing and all(legs) and all(contacts):
+    legs, contacts = readings.usable_legs, readings.usable_contacts
+    if readings.imu_is_usable and all(legs) and all(contacts):
         return ()
     return (
-        *(() if seeing else ('imu',)),
+        *(() if readings.imu_is_usable else ('imu',)),
         *(f'joints of {leg}' for leg, usable in zip(LEGS, legs, strict=True) if not usable),
-        *(f'contact of {leg}' for leg, usable in zip(LEGS, contacts, strict=True) if not usable),
-    )
+        *(f'contact of {leg}' for leg, usable in zip(LEGS, contacts, strict=True) if not usable))

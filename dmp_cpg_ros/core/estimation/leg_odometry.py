@@ -14,21 +14,20 @@ joints alone. Without the rolling term the velocity of Mini Cheetah's legs would
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import cos, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, times, triple
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, minus, times, triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class FootMotion:
+class FootMotion(NamedTuple):
     """Where the feet touch the ground, and the velocities that they measure; a tuple per leg.
 
     Attributes
@@ -63,9 +62,8 @@ class LegOdometry:
         self._signs = [triple(leg.axis_sign.tolist()) for leg in description.legs]
         self._radius = [leg.foot_radius for leg in description.legs]
 
-    def motion(
-        self, q: Sequence[float], q_dot: Sequence[float], normal_in_base: Triple
-    ) -> FootMotion:
+    def motion(self, q: Sequence[float], q_dot: Sequence[float], normal_in_base: Triple
+               ) -> FootMotion:
         """Contact points and measured velocities of all feet.
 
         Parameters
@@ -81,22 +79,17 @@ class LegOdometry:
         """
         n_x, n_y, n_z = normal_in_base
         contacts, velocities, jacobians = [], [], []
-        for i, (((x, y, z), J), sign, radius) in enumerate(
-            zip(self.legs.at(q), self._signs, self._radius, strict=True)
-        ):
+        for i, ((place, J), sign, radius) in enumerate(
+                zip(self.legs.at(q), self._signs, self._radius, strict=True)):
             angles, rates = q[3 * i : 3 * i + 3], triple(q_dot[3 * i : 3 * i + 3])
             down = (radius * n_x, radius * n_y, radius * n_z)
-            rolling, moving = cross(shank_rate(sign, angles, rates), down), times(J, rates)
-            contacts.append((x - down[0], y - down[1], z - down[2]))
-            velocities.append(
-                (rolling[0] - moving[0], rolling[1] - moving[1], rolling[2] - moving[2]))
+            contacts.append(minus(place, down))
+            velocities.append(minus(cross(shank_rate(sign, angles, rates), down), times(J, rates)))
             jacobians.append(J)
         return FootMotion(tuple(contacts), tuple(velocities), tuple(jacobians))
 
 
-def shank_rate(
-    sign: Sequence[float], angle: Sequence[float], rate: Sequence[float]
-) -> Triple:
+def shank_rate(sign: Sequence[float], angle: Sequence[float], rate: Sequence[float]) -> Triple:
     """Angular velocity of the shank relative to the base, in the base [rad/s].
 
     Parameters

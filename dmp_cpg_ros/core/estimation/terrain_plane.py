@@ -46,10 +46,8 @@ def initial_terrain(contact_in_world: Sequence[Triple]) -> TerrainState:
     return TerrainState(tuple(contact_in_world), fitted_slope(contact_in_world))
 
 
-def terrain_step(
-    terrain: TerrainState, contact_in_world: Sequence[Triple], trust: Sequence[float], dt: float,
-    time_constant: float,
-) -> TerrainState:
+def terrain_step(terrain: TerrainState, contact_in_world: Sequence[Triple], trust: Sequence[float],
+                 dt: float, time_constant: float) -> TerrainState:
     """Take over new footholds and follow their plane.
 
     Parameters
@@ -69,11 +67,8 @@ def terrain_step(
     -------
     TerrainState
     """
-    footholds = tuple(
-        now if stands >= STANDING else before
-        for now, before, stands in zip(
-            contact_in_world, terrain.foothold_in_world, trust, strict=True)
-    )
+    feet = zip(contact_in_world, terrain.foothold_in_world, trust, strict=True)
+    footholds = tuple(now if stands >= STANDING else before for now, before, stands in feet)
     share = 1.0 - exp(-dt / time_constant)
     (x, y), (x_now, y_now) = terrain.slope, fitted_slope(footholds)
     return TerrainState(footholds, (x + share * (x_now - x), y + share * (y_now - y)))

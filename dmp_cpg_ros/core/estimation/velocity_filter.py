@@ -26,15 +26,16 @@ inverse (3, 3), however many feet stand.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.maths import vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.rotations import turned
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, inverse, triple, upward
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, minus, moved, triple
 
 Array = NDArray[np.float64]
 
@@ -46,20 +47,14 @@ _IDENTITY = np.eye(12)
 
 def _places(rows: slice, columns: slice, diagonal: bool) -> tuple[int, ...]:
     """Places of a block's diagonal, or of all else in it, in a matrix (12, 12) read by rows."""
-    return tuple(
-        12 * (rows.start + i) + columns.start + j
-        for i in range(3) for j in range(3) if (i == j) == diagonal
-    )
+    return tuple(12 * (rows.start + i) + columns.start + j
+                 for i in range(3) for j in range(3) if (i == j) == diagonal)
 
 
 _TRANSITION = (
-    *_places(TILT, TILT, False),
-    *_places(VELOCITY, VELOCITY, False),
-    *_places(VELOCITY, TILT, False),
-    *_places(VELOCITY, GYRO_BIAS, False),
-    *_places(TILT, GYRO_BIAS, True),
-    *_places(VELOCITY, ACCELEROMETER_BIAS, True),
-)
+    *_places(TILT, TILT, False), *_places(VELOCITY, VELOCITY, False),
+    *_places(VELOCITY, TILT, False), *_places(VELOCITY, GYRO_BIAS, False),
+    *_places(TILT, GYRO_BIAS, True), *_places(VELOCITY, ACCELEROMETER_BIAS, True))
 """Places in the transition's matrix of what is neither 0 nor 1, block by block."""
 
 
@@ -147,9 +142,8 @@ def _skew(v: Triple, scale: float) -> tuple[float, ...]:
     return -z, y, z, -x, -y, x
 
 
-def predict(
-    state: FilterState, rate: Array, specific_force: Array, dt: float, noise: FilterNoise
-) -> FilterState:
+def predict(state: FilterState, rate: Array, specific_force: Array, dt: float, noise: FilterNoise
+            ) -> FilterState:
     """Predict by the IMU's readings.
 
     Parameters
@@ -167,43 +161,28 @@ def predict(
     -------
     FilterState
     """
-    up = upward(state.quaternion.tolist())
+    up = vec3.upward(state.quaternion.tolist())
     v = triple(state.velocity_in_base.tolist())
     rate, specific_force = rate - state.gyro_bias, specific_force - state.accelerometer_bias
     turning, force = triple(rate.tolist()), triple(specific_force.tolist())
     turn = (turning[0] * dt, turning[1] * dt, turning[2] * dt)
     # in the base half-way, as the mean force is
     tilted, fallen = cross(turn, up), GRAVITY * dt
-    change = (
-        force[0] * dt - fallen * (up[0] - 0.5 * tilted[0]),
-        force[1] * dt - fallen * (up[1] - 0.5 * tilted[1]),
-        force[2] * dt - fallen * (up[2] - 0.5 * tilted[2]),
-    )
+    change = triple([f * dt - fallen * (u - 0.5 * t)
+                     for f, u, t in zip(force, up, tilted, strict=True)])
     # The new velocity is seen from the new orientation.
-    back = cross(turn, (v[0] + 0.5 * change[0], v[1] + 0.5 * change[1], v[2] + 0.5 * change[2]))
-    twice = cross(turn, cross(turn, v))
-    moved = np.array((
-        v[0] + change[0] - back[0] + 0.5 * twice[0],
-        v[1] + change[1] - back[1] + 0.5 * twice[1],
-        v[2] + change[2] - back[2] + 0.5 * twice[2],
-    ))
+    back, twice = cross(turn, moved(v, change, 0.5)), cross(turn, cross(turn, v))
+    velocity = np.array(moved(minus(vec3.plus(v, change), back), twice, 0.5))
     F = transition(v, up, turning, dt)
     P = F.dot(state.covariance).dot(F.T)
     P.ravel()[::13] += noise.spread * dt
-    return FilterState(
-        turned(state.quaternion, np.array(turn)), moved, state.gyro_bias,
-        state.accelerometer_bias, P,
-    )
+    return FilterState(turned(state.quaternion, np.array(turn)), velocity, state.gyro_bias,
+                       state.accelerometer_bias, P)
 
 
-def update(
-    state: FilterState,
-    rate: Array,
-    contact_in_base: Sequence[Triple],
-    velocity_in_base: Sequence[Triple],
-    trust: Sequence[float],
-    noise: FilterNoise,
-) -> tuple[FilterState, tuple[float, ...]]:
+def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
+           velocity_in_base: Sequence[Triple], trust: Sequence[float], noise: FilterNoise
+           ) -> tuple[FilterState, tuple[float, ...]]:
     """Correct by the velocities that standing feet measure.
 
     A foot measures v + (ω̃ − b_ω) × r, of which the derivative with respect to b_ω is left out on
@@ -233,33 +212,30 @@ def update(
     """
     P = state.covariance
     predicted = P[VELOCITY, VELOCITY].tolist()
+    spread = [predicted[i][i] for i in range(3)]
     turning = triple((rate - state.gyro_bias).tolist())
-    v_x, v_y, v_z = state.velocity_in_base.tolist()
-    nu, total, x, y, z = noise.freedom, 0.0, 0.0, 0.0, 0.0
-    distances = []
+    v, nu = triple(state.velocity_in_base.tolist()), noise.freedom
+    total, pull, distances = 0.0, (0.0, 0.0, 0.0), []
     for contact, measured, share in zip(contact_in_base, velocity_in_base, trust, strict=True):
         if share <= 0.0:
             distances.append(0.0)
             continue
-        around = cross(turning, contact)
-        off_x, off_y, off_z = (
-            measured[0] - v_x - around[0], measured[1] - v_y - around[1],
-            measured[2] - v_z - around[2])
+        off = minus(minus(measured, v), cross(turning, contact))
         variance = (noise.foot / share) ** 2
-        distance = (
-            off_x * off_x / (predicted[0][0] + variance)
-            + off_y * off_y / (predicted[1][1] + variance)
-            + off_z * off_z / (predicted[2][2] + variance))
+        distance = sum([o * o / (s + variance) for o, s in zip(off, spread, strict=True)])
         distances.append(distance)
         weight = 1.0 / (variance * max((nu + distance) / (nu + 3.0), 1.0))
-        total += weight
-        x, y, z = x + weight * off_x, y + weight * off_y, z + weight * off_z
+        total, pull = total + weight, moved(pull, off, weight)
     if total == 0.0:
         return state, tuple(distances)
     HP = P[VELOCITY]
-    KT = np.array(inverse(_with_diagonal(predicted, 1.0 / total))).dot(HP)  # (3, 12)
-    error = np.array((x / total, y / total, z / total)).dot(KT)
-    return _corrected(state, error, P - HP.T.dot(KT)), tuple(distances)
+    KT = np.array(vec3.inverse(_with_diagonal(predicted, 1.0 / total))).dot(HP)  # (3, 12)
+    error = np.array([part / total for part in pull]).dot(KT)
+    P = P - HP.T.dot(KT)
+    return FilterState(
+        turned(state.quaternion, error[TILT]), state.velocity_in_base + error[VELOCITY],
+        state.gyro_bias + error[GYRO_BIAS], state.accelerometer_bias + error[ACCELEROMETER_BIAS],
+        0.5 * (P + P.T)), tuple(distances)
 
 
 def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
@@ -284,24 +260,12 @@ def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
     P = state.covariance.copy()
     rows = P[GYRO_BIAS]
     S = _with_diagonal(rows[:, GYRO_BIAS].tolist(), deviation * deviation)
-    left = np.array(inverse(S)) * (deviation * deviation)  # I − K = I − P S⁻¹ = (S − P) S⁻¹
+    left = np.array(vec3.inverse(S)) * (deviation * deviation)  # I − K = I − P S⁻¹ = (S − P) S⁻¹
     after = left.dot(rows)
     P[GYRO_BIAS] = after
     P[:, GYRO_BIAS] = after.T
     bias = rate - left.dot(rate - state.gyro_bias)
-    return FilterState(
-        state.quaternion, state.velocity_in_base, bias, state.accelerometer_bias, 0.5 * (P + P.T)
-    )
-
-
-def _corrected(state: FilterState, error: Array, covariance: Array) -> FilterState:
-    return FilterState(
-        turned(state.quaternion, error[TILT]),
-        state.velocity_in_base + error[VELOCITY],
-        state.gyro_bias + error[GYRO_BIAS],
-        state.accelerometer_bias + error[ACCELEROMETER_BIAS],
-        0.5 * (covariance + covariance.T),
-    )
+    return replace(state, gyro_bias=bias, covariance=0.5 * (P + P.T))
 
 
 def _with_diagonal(M: list[list[float]], more: float) -> Matrix:

@@ -4,44 +4,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.learning.discrete_regression import (
-    DiscreteTask,
-    fit_force,
-    fit_response,
-    held_out_error,
-)
-from dmp_cpg_ros.core.learning.learning import (
-    BASIS_CANDIDATES,
-    FitOptions,
-    as_demonstrations,
-    check_bases,
-    check_reproduction,
-    chosen_gains,
-    ranges,
-    smallest_good,
-)
-from dmp_cpg_ros.core.primitives.demonstration import Demonstration, vector
-from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
-from dmp_cpg_ros.core.primitives.states import DiscreteInput
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.learning import learning
+from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, Demonstrations, FitOptions
+from dmp_cpg_ros.core.learning.regression import Indices, Rows, Task
+from dmp_cpg_ros.core.primitives.basis import Bases, GaussianBases
+from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive
+from dmp_cpg_ros.core.primitives.responses import Force, transient_responses
 from dmp_cpg_ros.core.primitives.time_scaling import Form
 
 Array = NDArray[np.float64]
 
+FINAL_PHASE = 0.01
+"""Phase x at the end of the demonstration, the usual choice; it fixes α_x = −ln(0.01)/T."""
+
+_OVERLAP = 0.6
+_STEPS_PER_MOVEMENT = 400
+
+
+class DiscreteTask(Task):
+    """Phases that decay, and an unknown initial state of every demonstration."""
+
+    @property
+    def decay(self) -> float:
+        """Phase decay α_x [1/s]."""
+        return float(-np.log(FINAL_PHASE) / self.duration)
+
+    def bases(self, count: int) -> GaussianBases:
+        """Bases of the given number over the movement."""
+        return GaussianBases.evenly_in_time(
+            count, self.decay, self.duration, self.options.overlap_or(_OVERLAP))
+
+    def phases(self, i: int) -> Array:
+        """Phases x of the samples of demonstration i."""
+        return np.exp(-self.decay * self._scaled_times(i))
+
+    def inputs(self, phases: Array) -> Array:
+        """The phase, (m, 1)."""
+        return phases[:, None]
+
+    def responses(self, i: int, k: float, b: float, force: Force, count: int
+                  ) -> tuple[Array, Array]:
+        """Movements that forces cause from rest, and the two free ones."""
+        return transient_responses(
+            k, b, self._scaled_times(i), lambda s: force(np.exp(-self.decay * s)),
+            self.duration / _STEPS_PER_MOVEMENT)
+
+    def _scaled_times(self, i: int) -> Array:
+        times = self.demonstrations[i].times
+        return (times - times[0]) / self.taus[i]
+
+    def has_gaps(self, bases: Bases) -> bool:
+        """Whether some interval without samples spans more than two bases."""
+        times = np.unique(np.concatenate([self._scaled_times(i)
+                                          for i in range(len(self.demonstrations))]))
+        return bool(np.diff(times).max() * bases.count > 2.0 * self.duration)
+
+    def initial(self, rows: list[tuple[Indices, list[Rows]]], weights: Array
+                ) -> tuple[Array, Array]:
+        """Mean start, and mean velocity there at τ = 1: measured, or what fits the weights best
+        where responses are fitted.
+        """
+        movements, taus = self.demonstrations, self.taus[:, None]
+        if self.options.method == 'response':
+            initial = np.empty((len(movements), 2, movements[0].dofs))
+            for members, parts in rows:
+                for i, part in enumerate(parts):
+                    initial[i][:, members] = part.initial_state(weights[:, members])
+            starts, rates = initial[:, 0] + np.array(self.goals), initial[:, 1]
+        else:
+            starts = np.array([movement.positions[0] for movement in movements])
+            rates = taus * [np.asarray(movement.velocities)[0] for movement in movements]
+        velocities = rates / (1.0 if self.spring.form == 'scaled' else taus)
+        return np.mean(starts, axis=0), np.mean(velocities, axis=0)
+
 
 def learn_discrete(
-    demonstrations: Demonstration | Iterable[Demonstration],
-    bases: int | None = 25,
-    *,
-    stiffness: ArrayLike | None = None,
-    damping: ArrayLike | None = None,
-    goals: Sequence[ArrayLike] | None = None,
-    form: Form = 'scaled',
+    demonstrations: Demonstrations, bases: int | None = 25, *,
+    stiffness: ArrayLike | None = None, damping: ArrayLike | None = None,
+    goals: Sequence[ArrayLike] | None = None, form: Form = 'scaled',
     options: FitOptions | None = None,
 ) -> DiscretePrimitive:
     """Learn a discrete primitive.
@@ -76,49 +123,41 @@ def learn_discrete(
         If an argument is out of range.
     """
     task = _task(demonstrations, stiffness, damping, goals, form, options)
-    check_bases(bases, task.demonstrations)
-    if bases is None:
-        bases = smallest_good({n: held_out_error(task, task.bases(n)) for n in BASIS_CANDIDATES})
-    made = task.bases(bases)
-    fit = fit_response if task.options.method == 'response' else fit_force
-    weights, start, velocity = fit(task, made)
+    made = task.chosen_bases(bases)
+    gaps = task.has_gaps(made)
+    if gaps and task.options.method != 'response':
+        raise DataError(f"method '{task.options.method}' knows no forces in gaps of the samples "
+                        "that several bases share; use the method 'response', or fewer bases")
+    rows = task.rows(made) if task.options.method == 'response' else []
+    weights = task.fit(made, rows)
+    start, velocity = task.initial(rows, weights)
     primitive = DiscretePrimitive(
-        weights,
-        made,
-        task.decay,
-        task.spring,
-        start,
-        np.mean(task.goals, axis=0),
-        task.duration,
-        velocity,
-        names=task.demonstrations[0].names,
-    )
+        weights=weights, bases=made, phase_decay=task.decay, transformation=task.spring,
+        start=start, goal=np.mean(task.goals, axis=0), duration=task.duration,
+        start_velocity=velocity, names=task.demonstrations[0].names)
     if task.options.method != 'response':
         errors = reproduction_errors(primitive, task.demonstrations, task.goals)
-        check_reproduction(errors, task.options)
+        learning.check_reproduction(errors, task.options)
+    if gaps:
+        learning.check_range(task.demonstrations,
+                    primitive.rollout(np.linspace(0.0, task.duration, 101)).positions)
     return primitive
 
 
-def held_out_errors(
-    demonstrations: Demonstration | Iterable[Demonstration],
-    candidates: Sequence[int] = BASIS_CANDIDATES,
-    *,
-    stiffness: ArrayLike | None = None,
-    damping: ArrayLike | None = None,
-    goals: Sequence[ArrayLike] | None = None,
-    form: Form = 'scaled',
-    options: FitOptions | None = None,
-) -> dict[int, float]:
+def held_out_errors(demonstrations: Demonstrations,
+                    candidates: Sequence[int] = BASIS_CANDIDATES, **how: Any) -> dict[int, float]:
     """Error on held-out samples for several numbers of bases.
 
     Whole demonstrations are held out in turn when there are at least two, else every fifth sample.
 
     Parameters
     ----------
-    demonstrations, stiffness, damping, goals, form, options
+    demonstrations
         As for :func:`learn_discrete`.
     candidates : sequence of int
         Numbers of bases.
+    **how
+        ``stiffness``, ``damping``, ``goals``, ``form``, ``options`` as for :func:`learn_discrete`.
 
     Returns
     -------
@@ -126,15 +165,11 @@ def held_out_errors(
         Number of bases → root mean square error of the reproduced position over the held-out
         samples, as a fraction of each degree of freedom's range.
     """
-    task = _task(demonstrations, stiffness, damping, goals, form, options)
-    return {count: held_out_error(task, task.bases(count)) for count in candidates}
+    return _task(demonstrations, **how).held_out_errors(candidates)
 
 
-def reproduction_errors(
-    primitive: DiscretePrimitive,
-    demonstrations: Demonstration | Iterable[Demonstration],
-    goals: Sequence[ArrayLike] | None = None,
-) -> Array:
+def reproduction_errors(primitive: DiscretePrimitive, demonstrations: Demonstrations,
+                        goals: Sequence[ArrayLike] | None = None) -> Array:
     """Largest distance of reproduced from demonstrated positions, as a fraction of the range.
 
     The primitive runs from each demonstration's start to its goal with τ to match its duration.
@@ -151,36 +186,23 @@ def reproduction_errors(
     ndarray (n,)
         Largest error per degree of freedom, divided by that degree's range.
     """
-    movements = as_demonstrations(demonstrations)
-    worst = np.zeros(primitive.dofs)
-    for movement, goal in zip(movements, _goals(movements, goals), strict=True):
+    movements, made = learning.as_demonstrations(demonstrations), []
+    ends = learning.targets_of(goals, [movement.positions[-1] for movement in movements], 'goal')
+    for movement, goal in zip(movements, ends, strict=True):
         tau = movement.duration / primitive.duration
         state = primitive.initial_state(movement.positions[0], None, goal, tau)
-        made = primitive.rollout(movement.times, DiscreteInput(goal, tau), state)
-        worst = np.maximum(worst, np.abs(made.positions - movement.positions).max(axis=0))
-    return worst / ranges(movements)
+        made.append(primitive.rollout(movement.times, DiscreteInput(goal, tau), state).positions)
+    return learning.largest_errors(movements, made)
 
 
 def _task(
-    demonstrations: Demonstration | Iterable[Demonstration],
-    stiffness: ArrayLike | None,
-    damping: ArrayLike | None,
-    goals: Sequence[ArrayLike] | None,
-    form: Form,
-    options: FitOptions | None,
+    demonstrations: Demonstrations, stiffness: ArrayLike | None = None,
+    damping: ArrayLike | None = None, goals: Sequence[ArrayLike] | None = None,
+    form: Form = 'scaled', options: FitOptions | None = None,
 ) -> DiscreteTask:
-    movements, options = as_demonstrations(demonstrations), options or FitOptions()
-    if options.method != 'response':
-        movements = [movement.with_derivatives() for movement in movements]
-    duration = float(np.mean([movement.duration for movement in movements]))
-    spring = chosen_gains(duration, stiffness, damping, movements[0].dofs, form)
-    return DiscreteTask(movements, _goals(movements, goals), spring, duration, options)
-
-
-def _goals(movements: list[Demonstration], goals: Sequence[ArrayLike] | None) -> list[Array]:
-    """The given goals, checked, or the last positions."""
-    if goals is None:
-        return [movement.positions[-1] for movement in movements]
-    if len(goals) != len(movements):
-        raise ParameterError(f'{len(goals)} goals do not match {len(movements)} demonstrations')
-    return [vector(goal, movements[0].dofs, 'goal') for goal in goals]
+    options = options or FitOptions()
+    movements = learning.prepared(demonstrations, options)
+    durations = [movement.duration for movement in movements]
+    spring = learning.chosen_gains(durations, stiffness, damping, movements[0].dofs, form)
+    ends = learning.targets_of(goals, [movement.positions[-1] for movement in movements], 'goal')
+    return DiscreteTask(movements, durations, ends, spring, options)

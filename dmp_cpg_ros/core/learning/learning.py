@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.primitives.demonstration import Demonstration, columns
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration, columns, vector
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, default_gains
 from dmp_cpg_ros.core.primitives.time_scaling import Form
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+Demonstrations = Demonstration | Iterable[Demonstration]
 Method = Literal['response', 'joint', 'local']
 
 METHODS: tuple[Method, ...] = ('response', 'joint', 'local')
@@ -36,8 +36,11 @@ METHODS: tuple[Method, ...] = ('response', 'joint', 'local')
 BASIS_CANDIDATES = (5, 7, 10, 14, 19, 25, 33, 43)
 """Numbers of bases that are tried when the number is to be chosen."""
 
-LARGEST_ERROR = 1.0
+LARGEST_ERROR = 0.7
 """Error of a reproduced position, as a fraction of the range, that is no reproduction."""
+
+WIDEST = 1.25
+"""Range of a movement, in ranges of its demonstrations, that shows what they never did."""
 
 _LOCAL_OVERLAP = 0.03
 
@@ -71,25 +74,14 @@ class FitOptions:
         """Validate."""
         if self.method not in METHODS:
             raise ParameterError(
-                f'method must be one of {", ".join(METHODS)}, not {self.method!r}'
-            )
+                f'method must be one of {", ".join(METHODS)}, not {self.method!r}')
         if not (np.isfinite(self.ridge) and self.ridge >= 0.0):
             raise ParameterError(f'ridge = {self.ridge!r} must be a finite number of at least 0')
         if self.overlap is not None and not 0.0 < self.overlap < 1.0:
             raise ParameterError(f'overlap = {self.overlap!r} must lie between 0 and 1')
 
     def overlap_or(self, usual: float) -> float:
-        """Overlap that is used, given what suits the kind of primitive.
-
-        Parameters
-        ----------
-        usual : float
-            Overlap for joint fits when none is asked for.
-
-        Returns
-        -------
-        float
-        """
+        """Overlap that is used, given what suits joint fits of the kind of primitive."""
         if self.overlap is not None:
             return self.overlap
         return _LOCAL_OVERLAP if self.method == 'local' else usual
@@ -122,9 +114,8 @@ def ridge_regression(regressors: Array, targets: Array, ridge: float) -> Array:
     return np.asarray(np.linalg.lstsq(regressors, targets, rcond=None)[0])
 
 
-def locally_weighted_regression(
-    activations: Array, inputs: Array, targets: Array, ridge: float
-) -> Array:
+def locally_weighted_regression(activations: Array, inputs: Array, targets: Array, ridge: float
+                                ) -> Array:
     """Minimise Σ_k ψ_i(k) |targets_k − w_iᵀ inputs_k|² for every basis i on its own.
 
     Parameters
@@ -150,9 +141,7 @@ def locally_weighted_regression(
     return np.linalg.solve(gram, np.swapaxes(weighted, 1, 2) @ targets)
 
 
-def as_demonstrations(
-    demonstrations: Demonstration | Iterable[Demonstration],
-) -> list[Demonstration]:
+def as_demonstrations(demonstrations: Demonstrations) -> list[Demonstration]:
     """List of demonstrations that agree in their degrees of freedom.
 
     Raises
@@ -160,9 +149,7 @@ def as_demonstrations(
     DataError
         If there is none or the numbers of degrees of freedom differ.
     """
-    result = (
-        [demonstrations] if isinstance(demonstrations, Demonstration) else list(demonstrations)
-    )
+    result = [demonstrations] if isinstance(demonstrations, Demonstration) else [*demonstrations]
     if not result:
         raise DataError('learning needs at least one demonstration')
     dofs = [demonstration.dofs for demonstration in result]
@@ -171,15 +158,29 @@ def as_demonstrations(
     return result
 
 
-def chosen_gains(
-    duration: float, stiffness: ArrayLike | None, damping: ArrayLike | None, dofs: int, form: Form
-) -> SpringDamper:
+def prepared(demonstrations: Demonstrations, options: FitOptions) -> list[Demonstration]:
+    """:func:`as_demonstrations`, with the derivatives that the method needs."""
+    result = as_demonstrations(demonstrations)
+    return result if options.method == 'response' else [d.with_derivatives() for d in result]
+
+
+def targets_of(given: Sequence[ArrayLike] | None, usual: list[Array], name: str) -> list[Array]:
+    """Goals or centres that are given, one (n,) for each demonstration, or the usual ones."""
+    if given is None:
+        return usual
+    if len(given) != len(usual):
+        raise ParameterError(f'{len(given)} {name}s do not match {len(usual)} demonstrations')
+    return [vector(target, len(usual[0]), name) for target in given]
+
+
+def chosen_gains(durations: Sequence[float], stiffness: ArrayLike | None,
+                 damping: ArrayLike | None, dofs: int, form: Form) -> SpringDamper:
     """Spring-damper with the given gains; what is missing is chosen for critical damping.
 
     Parameters
     ----------
-    duration : float
-        Duration or period, which sets the gains when none is given [s].
+    durations : sequence of float
+        Durations or periods, whose mean sets the gains when none is given [s].
     stiffness, damping : array_like (n,) or float, optional
         k [1/s²] and b [1/s].
     dofs : int
@@ -191,40 +192,14 @@ def chosen_gains(
     -------
     SpringDamper
     """
-    k: ArrayLike
-    b: ArrayLike
     if stiffness is None and damping is None:
-        k, b = default_gains(duration)
+        stiffness, damping = default_gains(float(np.mean(durations)))
     elif damping is None:
-        k = np.asarray(stiffness, dtype=float)
-        b = 2.0 * np.sqrt(np.maximum(k, 0.0))
-    else:
-        b = np.asarray(damping, dtype=float)
-        k = 0.25 * b**2 if stiffness is None else stiffness
+        damping = 2.0 * np.sqrt(np.maximum(np.asarray(stiffness, dtype=float), 0.0))
+    elif stiffness is None:
+        stiffness = 0.25 * np.asarray(damping, dtype=float) ** 2
+    k, b = np.asarray(stiffness, dtype=float), np.asarray(damping, dtype=float)
     return SpringDamper(columns(k, dofs, 'stiffness'), columns(b, dofs, 'damping'), form)
-
-
-def folds(demonstrations: Sequence[Demonstration], count: int = 5) -> list[list[Mask]]:
-    """Samples to hold out: whole demonstrations if there are several, else every count-th sample.
-
-    Parameters
-    ----------
-    demonstrations : sequence of Demonstration
-    count : int
-        Number of folds within a single demonstration.
-
-    Returns
-    -------
-    list of list of ndarray
-        For each fold, one boolean mask per demonstration, true where a sample is held out.
-    """
-    if len(demonstrations) > 1:
-        return [
-            [np.full(len(d.times), i == j) for j, d in enumerate(demonstrations)]
-            for i in range(len(demonstrations))
-        ]
-    index = np.arange(len(demonstrations[0].times))
-    return [[(index + count // 2) % count == fold] for fold in range(count)]
 
 
 def smallest_good(errors: dict[int, float], tolerance: float = 0.05, floor: float = 1e-3) -> int:
@@ -261,19 +236,31 @@ def ranges(demonstrations: Sequence[Demonstration]) -> Array:
     return np.where(span > 1e-9 * largest, span, largest)
 
 
-def check_bases(count: int | None, demonstrations: Sequence[Demonstration]) -> None:
-    """Raise DataError for more bases than samples; nothing would tell their weights apart."""
-    samples = sum(len(d.times) for d in demonstrations)
-    if count is not None and count > samples:
-        raise DataError(f'{count} bases cannot be learned from {samples} samples; valid are at '
-                        f'most as many bases as samples')
+def largest_errors(demonstrations: Sequence[Demonstration], made: Sequence[Array]) -> Array:
+    """Largest distance of positions that were made (m, n) from the demonstrated ones, (n,), as a
+    fraction of the range.
+    """
+    errors = [np.abs(positions - demonstration.positions).max(axis=0)
+              for demonstration, positions in zip(demonstrations, made, strict=True)]
+    return np.asarray(np.max(errors, axis=0) / ranges(demonstrations))
 
 
 def check_reproduction(errors: Array, options: FitOptions) -> None:
     """Raise DataError where a fit of forces, which needs derivatives, reproduces nothing."""
     worst = float(np.max(errors))
-    if options.method != 'response' and not worst < LARGEST_ERROR:
+    if not worst < LARGEST_ERROR:
         raise DataError(
             f"method '{options.method}' misses the demonstrations by {100.0 * worst:.0f} % of "
             "their range: noise or gaps spoil their derivatives; use the method 'response', "
             'or record velocities and accelerations')
+
+
+def check_range(demonstrations: Sequence[Demonstration], made: Array) -> None:
+    """Raise DataError where the positions (m, n) of a whole movement go much farther than those of
+    its demonstrations: between their samples nothing told the weights apart.
+    """
+    wide = float(np.max(np.ptp(made, axis=0) / ranges(demonstrations)))
+    if not wide < WIDEST:
+        raise DataError(
+            f'the movement takes {wide:.3g} times the range of its demonstrations, in gaps of '
+            'their samples; take fewer bases or a larger ridge, or record what is missing')

@@ -23,9 +23,8 @@ _HARMONICS = 8
 _COARSE_SAMPLES = 500
 
 
-def find_period(
-    demonstration: Demonstration, shortest: float | None = None, longest: float | None = None
-) -> float:
+def find_period(demonstration: Demonstration, shortest: float | None = None,
+                longest: float | None = None) -> float:
     """Period that explains all degrees of freedom best.
 
     Peaks of the summed Lomb-Scargle periodogram and their subharmonics are candidates. Each is
@@ -62,26 +61,23 @@ def find_period(
     high = 1.0 / (shortest or 4.0 * span / (len(times) - 1))
     if not 0.0 < low < high:
         raise DataError(
-            f'periods from {1.0 / high:g} s to {1.0 / low:g} s: there is none to look for'
-        )
+            f'periods from {1.0 / high:g} s to {1.0 / low:g} s: there is none to look for')
     whole = _Fit(times, values, 0.45 * (len(times) - 1) / span)
     some = _some(whole)
-    coarse = {
-        f: some.best_nearby(f, 0.6 / span, low, high)
-        for f in _candidates(times, values, low, high)
-    }
-    least = min(error for _, error in coarse.values())
-    plausible = [f for f, error in coarse.values() if error < 3.0 * least + 0.01]
-    refined = [whole.refined(f, 0.06 / span) for f in plausible]
+    coarse = [some.best_nearby(f, 0.6 / span, low, high)
+              for f in _candidates(times, values, low, high)]
+    least, reach = min(error for _, error in coarse), 0.06 / span
+    refined = [whole.refined(f, reach) for f, error in coarse if error < 3.0 * least + 0.01]
     least = min(error for _, error in refined)
     frequency = max(f for f, error in refined if error <= 1.1 * least + 1e-6)
-    if least > 0.5 or (least > WANDERING and whole.residual_correlation(frequency) > 0.5):
+    longer = frequency < low - 0.98 * reach  # no minimum: longer periods would fit even better
+    wanders = least > WANDERING and whole.residual_correlation(frequency) > 0.5
+    if longer or least > 0.5 or wanders:
         raise DataError(
             f'no period between {1.0 / high:g} s and {1.0 / low:g} s explains the movement; the '
             f'best, {1.0 / frequency:.4g} s, leaves {100.0 * least:.0f} % of the variance. Valid '
             'are at least 1.5 cycles of one frequency: take a steadier or longer part, or give '
-            'the period'
-        )
+            'the period')
     return float(1.0 / frequency)
 
 
@@ -266,9 +262,8 @@ class _Fit:
         rest = self.residual(frequency)
         return float(np.sum(rest[1:] * rest[:-1]) / np.sum(rest**2))
 
-    def best_nearby(
-        self, frequency: float, reach: float, low: float, high: float
-    ) -> tuple[float, float]:
+    def best_nearby(self, frequency: float, reach: float, low: float, high: float
+                    ) -> tuple[float, float]:
         """Best of a grid of frequencies, and what it leaves unexplained."""
         grid = np.linspace(max(low, frequency - reach), min(high, frequency + reach), 21)
         errors = [self.unexplained(float(f)) for f in grid]

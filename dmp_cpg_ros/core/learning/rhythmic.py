@@ -4,49 +4,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.learning.learning import (
-    BASIS_CANDIDATES,
-    FitOptions,
-    as_demonstrations,
-    check_bases,
-    check_reproduction,
-    chosen_gains,
-    ranges,
-    smallest_good,
-)
+from dmp_cpg_ros.core.learning import learning
+from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, Demonstrations, FitOptions
 from dmp_cpg_ros.core.learning.period import find_period, fourier_series, phase_lead
-from dmp_cpg_ros.core.learning.rhythmic_regression import (
-    RhythmicTask,
-    fit_weights,
-    held_out_error,
-)
+from dmp_cpg_ros.core.learning.regression import Task
+from dmp_cpg_ros.core.primitives.basis import VonMisesBases
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, columns, vector
+from dmp_cpg_ros.core.primitives.responses import Force, periodic_responses
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput, RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.time_scaling import Form
 
 Array = NDArray[np.float64]
 
+_OVERLAP = 0.2
 _SERIES = 12
 """Harmonics by which recordings are centred and aligned."""
 
 
+@dataclass(frozen=True, eq=False)
+class RhythmicTask(Task):
+    """Phases that turn, and movements that are periodic from the first sample on.
+
+    Attributes
+    ----------
+    leads : list of float
+        Phase of the first sample of each demonstration [rad].
+    """
+
+    leads: list[float]
+
+    @property
+    def omega(self) -> float:
+        """Angular frequency at τ = 1 [rad/s]."""
+        return 2.0 * np.pi / self.duration
+
+    def bases(self, count: int) -> VonMisesBases:
+        """Bases of the given number around the cycle."""
+        return VonMisesBases.evenly_around(count, self.options.overlap_or(_OVERLAP))
+
+    def phases(self, i: int) -> Array:
+        """Phases of the samples of demonstration i [rad]."""
+        times = self.demonstrations[i].times
+        return self.leads[i] + 2.0 * np.pi / self.durations[i] * (times - times[0])
+
+    def inputs(self, phases: Array) -> Array:
+        """States of the oscillator on the unit cycle, (m, 2)."""
+        return state_at(phases)
+
+    def responses(self, i: int, k: float, b: float, force: Force, count: int
+                  ) -> tuple[Array, Array]:
+        """Periodic movements; an initial state has long been forgotten."""
+        forced = periodic_responses(k, b, self.omega, force, self.phases(i), 4 * count + 32)
+        return forced, np.empty((*forced.shape[:2], 0))
+
+
 def learn_rhythmic(
-    demonstrations: Demonstration | Iterable[Demonstration],
-    bases: int | None = 25,
-    *,
-    period: float | Sequence[float] | None = None,
-    leads: Sequence[float] | None = None,
-    centres: Sequence[ArrayLike] | None = None,
-    stiffness: ArrayLike | None = None,
-    damping: ArrayLike | None = None,
-    rho: float | None = None,
-    form: Form = 'scaled',
+    demonstrations: Demonstrations, bases: int | None = 25, *,
+    period: float | Sequence[float] | None = None, leads: Sequence[float] | None = None,
+    centres: Sequence[ArrayLike] | None = None, stiffness: ArrayLike | None = None,
+    damping: ArrayLike | None = None, rho: float | None = None, form: Form = 'scaled',
     options: FitOptions | None = None,
 ) -> RhythmicPrimitive:
     """Learn a rhythmic primitive.
@@ -90,48 +115,33 @@ def learn_rhythmic(
         If an argument is out of range.
     """
     task = _task(demonstrations, period, leads, centres, stiffness, damping, form, options)
-    check_bases(bases, task.demonstrations)
-    if bases is None:
-        bases = smallest_good({n: held_out_error(task, task.bases(n)) for n in BASIS_CANDIDATES})
-    made, omega = task.bases(bases), 2.0 * np.pi / task.period
+    movements, made = task.demonstrations, task.chosen_bases(bases)
+    weights = task.fit(made, task.rows(made) if task.options.method == 'response' else [])
     primitive = RhythmicPrimitive(
-        fit_weights(task, made),
-        made,
-        omega,
-        omega if rho is None else rho,
-        task.spring,
-        np.mean(task.centres, axis=0),
-        names=task.demonstrations[0].names,
-    )
+        weights=np.ascontiguousarray(weights.reshape(made.count, 2, -1).transpose(0, 2, 1)),
+        bases=made, omega=task.omega, rho=task.omega if rho is None else rho,
+        transformation=task.spring, centre=np.mean(task.goals, axis=0), names=movements[0].names)
     if task.options.method != 'response':
-        errors = [
-            np.abs(primitive.on_cycle(task.phases(i), task.tau(i))[0] + task.centres[i]
-                   - movement.positions).max(axis=0)
-            for i, movement in enumerate(task.demonstrations)
-        ]
-        check_reproduction(np.max(errors, axis=0) / ranges(task.demonstrations), task.options)
+        cycles = [primitive.on_cycle(task.phases(i), task.taus[i])[0] + task.goals[i]
+                  for i in range(len(movements))]
+        learning.check_reproduction(learning.largest_errors(movements, cycles), task.options)
+    learning.check_range(movements, primitive.on_cycle(np.linspace(0.0, 2.0 * np.pi, 200))[0])
     return primitive
 
 
-def held_out_errors(
-    demonstrations: Demonstration | Iterable[Demonstration],
-    candidates: Sequence[int] = BASIS_CANDIDATES,
-    *,
-    period: float | Sequence[float] | None = None,
-    centres: Sequence[ArrayLike] | None = None,
-    stiffness: ArrayLike | None = None,
-    damping: ArrayLike | None = None,
-    form: Form = 'scaled',
-    options: FitOptions | None = None,
-) -> dict[int, float]:
+def held_out_errors(demonstrations: Demonstrations,
+                    candidates: Sequence[int] = BASIS_CANDIDATES, **how: Any) -> dict[int, float]:
     """Error on held-out samples for several numbers of bases.
 
     Parameters
     ----------
-    demonstrations, period, centres, stiffness, damping, form, options
+    demonstrations
         As for :func:`learn_rhythmic`.
     candidates : sequence of int
         Numbers of bases.
+    **how
+        ``period``, ``leads``, ``centres``, ``stiffness``, ``damping``, ``form``, ``options`` as
+        for :func:`learn_rhythmic`.
 
     Returns
     -------
@@ -139,13 +149,11 @@ def held_out_errors(
         Number of bases → root mean square error of the steady movement over the held-out samples,
         as a fraction of each degree of freedom's range.
     """
-    task = _task(demonstrations, period, None, centres, stiffness, damping, form, options)
-    return {count: held_out_error(task, task.bases(count)) for count in candidates}
+    return _task(demonstrations, **how).held_out_errors(candidates)
 
 
-def place(
-    primitive: RhythmicPrimitive, demonstration: Demonstration, period: float | None = None
-) -> tuple[float, RhythmicInput]:
+def place(primitive: RhythmicPrimitive, demonstration: Demonstration, period: float | None = None
+          ) -> tuple[float, RhythmicInput]:
     """Place a recording on the primitive's cycle: its first phase, and the input that makes it.
 
     Parameters
@@ -166,16 +174,12 @@ def place(
     tau = period / primitive.period
     grid = 2.0 * np.pi * np.arange(8 * _SERIES) / (8 * _SERIES)
     cycle = fourier_series(grid, primitive.on_cycle(grid, tau)[0], 1.0, _SERIES)
-    times = demonstration.times - demonstration.times[0]
-    series = fourier_series(times, demonstration.positions, 2.0 * np.pi / period, _SERIES)
+    series = _series(demonstration, period)
     return phase_lead(cycle, series), RhythmicInput(series[0].real, 1.0, tau)
 
 
-def reproduction_errors(
-    primitive: RhythmicPrimitive,
-    demonstrations: Demonstration | Iterable[Demonstration],
-    period: float | None = None,
-) -> Array:
+def reproduction_errors(primitive: RhythmicPrimitive, demonstrations: Demonstrations,
+                        period: float | None = None) -> Array:
     """Largest distance of reproduced from demonstrated positions, as a fraction of the range.
 
     The primitive starts on its limit cycle and runs freely for as long as the recording.
@@ -191,49 +195,39 @@ def reproduction_errors(
     -------
     ndarray (n,)
     """
-    movements = as_demonstrations(demonstrations)
-    worst = np.zeros(primitive.dofs)
+    movements, made = learning.as_demonstrations(demonstrations), []
     for movement in movements:
         phi, command = place(primitive, movement, period)
-        made = primitive.rollout(movement.times, command, primitive.initial_state(phi, command))
-        worst = np.maximum(worst, np.abs(made.positions - movement.positions).max(axis=0))
-    return worst / ranges(movements)
+        state = primitive.initial_state(phi, command)
+        made.append(primitive.rollout(movement.times, command, state).positions)
+    return learning.largest_errors(movements, made)
+
+
+def _series(demonstration: Demonstration, period: float) -> Array:
+    """Fourier series over the time since the first sample."""
+    times = demonstration.times - demonstration.times[0]
+    return fourier_series(times, demonstration.positions, 2.0 * np.pi / period, _SERIES)
 
 
 def _task(
-    demonstrations: Demonstration | Iterable[Demonstration],
-    period: float | Sequence[float] | None,
-    leads: Sequence[float] | None,
-    centres: Sequence[ArrayLike] | None,
-    stiffness: ArrayLike | None,
-    damping: ArrayLike | None,
-    form: Form,
-    options: FitOptions | None,
+    demonstrations: Demonstrations, period: float | Sequence[float] | None = None,
+    leads: Sequence[float] | None = None, centres: Sequence[ArrayLike] | None = None,
+    stiffness: ArrayLike | None = None, damping: ArrayLike | None = None, form: Form = 'scaled',
+    options: FitOptions | None = None,
 ) -> RhythmicTask:
-    movements, options = as_demonstrations(demonstrations), options or FitOptions()
-    if options.method != 'response':
-        movements = [movement.with_derivatives() for movement in movements]
+    options = options or FitOptions()
+    movements = learning.prepared(demonstrations, options)
     if period is None:
         periods = [find_period(movement) for movement in movements]
     else:
         periods = columns(period, len(movements), 'period').tolist()
         if min(periods) <= 0.0:
             raise ParameterError(f'period = {period!r} s must be positive')
-    series = [
-        fourier_series(m.times - m.times[0], m.positions, 2.0 * np.pi / p, _SERIES)
-        for m, p in zip(movements, periods, strict=True)
-    ]
-    scale = ranges(movements)
+    series = [_series(m, p) for m, p in zip(movements, periods, strict=True)]
     if leads is None:
-        leads = [0.0] + [phase_lead(series[0] / scale, other / scale) for other in series[1:]]
-    spring = chosen_gains(float(np.mean(periods)), stiffness, damping, movements[0].dofs, form)
-    if centres is None:
-        middles = [coefficients[0].real for coefficients in series]
-    elif len(centres) == len(movements):
-        middles = [vector(centre, movements[0].dofs, 'centre') for centre in centres]
-    else:
-        raise ParameterError(
-            f'{len(centres)} centres do not match {len(movements)} demonstrations'
-        )
+        first, *others = (coefficients / learning.ranges(movements) for coefficients in series)
+        leads = [0.0, *(phase_lead(first, other) for other in others)]
+    spring = learning.chosen_gains(periods, stiffness, damping, movements[0].dofs, form)
+    middles = learning.targets_of(centres, [c[0].real for c in series], 'centre')
     phases = vector(leads, len(movements), 'leads').tolist()
-    return RhythmicTask(movements, periods, phases, middles, spring, options)
+    return RhythmicTask(movements, periods, middles, spring, options, phases)

@@ -59,10 +59,8 @@ class BodyControl:
         The robot's legs, where others ask them too.
     """
 
-    def __init__(
-        self, description: RobotDescription, posture: PostureParameters,
-        parameters: ModeParameters, legs: RobotLegs | None = None,
-    ) -> None:
+    def __init__(self, description: RobotDescription, posture: PostureParameters,
+                 parameters: ModeParameters, legs: RobotLegs | None = None) -> None:
         """Build the parts."""
         self.posture = PostureController(description, posture, legs)
         self.modes = ModeManager(description, parameters, legs)
@@ -70,8 +68,7 @@ class BodyControl:
     def with_posture(self, parameters: PostureParameters) -> BodyControl:
         """Return the block with other gains of the balance; from the next step on they act."""
         other = copy(self)
-        other.posture = PostureController(
-            self.posture.description, parameters, self.posture.legs)
+        other.posture = PostureController(self.posture.description, parameters, self.posture.legs)
         return other
 
     def initial_state(self) -> BodyState:
@@ -83,10 +80,8 @@ class BodyControl:
         mode, answer = request(self.modes, state.mode, what)
         return BodyState(mode, state.balance), answer
 
-    def step(
-        self, state: BodyState, measured: RobotState, gait: GaitInForce, x: Array, x_dot: Array,
-        r: Array, dt: float,
-    ) -> tuple[BodyState, PostureFeedback]:
+    def step(self, state: BodyState, measured: RobotState, gait: GaitInForce, x: Array,
+             x_dot: Array, r: Array, dt: float) -> tuple[BodyState, PostureFeedback]:
         """Advance mode and balance to the tick of a measured state.
 
         Parameters

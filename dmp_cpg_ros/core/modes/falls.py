@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import upward
+from dmp_cpg_ros.core.maths.vec3 import dot, triple, upward
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
@@ -70,15 +70,14 @@ class BodySense:
 
     def condition(self, state: RobotState) -> BodyCondition:
         """Condition in a measured state."""
-        down_x, down_y, down_z = (-part for part in upward(state.base_quaternion.tolist()))
-        legs, height = self._legs.at(state.joint_position.tolist()), -inf
-        for ((foot_x, foot_y, foot_z), _), radius in zip(legs, self._radius, strict=True):
-            height = max(height, down_x * foot_x + down_y * foot_y + down_z * foot_z + radius)
-        down = np.array((down_x, down_y, down_z))
+        towards = triple([-part for part in upward(state.base_quaternion.tolist())])
+        legs, down = self._legs.at(state.joint_position.tolist()), np.array(towards)
+        height = max([-inf, *(dot(towards, foot) + radius
+                              for (foot, _), radius in zip(legs, self._radius, strict=True))])
         support = sum(state.foot_force.tolist()) / self._weight
         if support < CERTAIN_SUPPORT:
             support = max(support, self._pressed(state, down))
-        return BodyCondition(down, acos(min(max(-down_z, -1.0), 1.0)), height, support)
+        return BodyCondition(down, acos(min(max(-towards[2], -1.0), 1.0)), height, support)
 
     def _pressed(self, state: RobotState, down: Array) -> float:
         """Share of the weight that the joint torques press onto the ground.
@@ -119,31 +118,19 @@ class FallParameters(Parameters):
     """Limits beyond which the robot counts as fallen."""
 
     fall_tilt: float = parameter(
-        0.9, 'tilt beyond which the robot has fallen', unit='rad', minimum=0.1, maximum=3.2
-    )
+        0.9, 'tilt beyond which the robot has fallen', unit='rad', minimum=0.1, maximum=3.2)
     fall_height: float = parameter(
-        0.5,
-        'height over its feet below which a robot that should stand has fallen, as a fraction of '
-        'the standing height',
-        minimum=0.0,
-        maximum=0.95,
-    )
+        0.5, 'height over its feet below which a robot that should stand has fallen, as a '
+        'fraction of the standing height', minimum=0.0, maximum=0.95)
     fall_delay: float = parameter(
         0.1, 'time with a large tilt or a low body after which a robot has fallen', unit='s',
-        minimum=0.0,
-        maximum=5.0,
-    )
+        minimum=0.0, maximum=5.0)
     fall_support: float = parameter(
-        0.08,
-        'load on the legs below which a robot that should stand has lost ground contact, as a '
-        'fraction of the weight; 0: never',
-        minimum=0.0,
-        maximum=0.9,
-    )
+        0.08, 'load on the legs below which a robot that should stand has lost ground contact, as '
+        'a fraction of the weight; 0: never', minimum=0.0, maximum=0.9)
     fall_support_delay: float = parameter(
         0.6, 'time without ground contact after which a robot has fallen', unit='s',
-        minimum=0.05, maximum=10.0,
-    )
+        minimum=0.05, maximum=10.0)
 
 
 @dataclass(frozen=True)
@@ -168,27 +155,21 @@ class FallDetector:
         """Keep the limits."""
         self.parameters, self._stance_height = parameters, stance_height
 
-    def step(
-        self, state: FallState, condition: BodyCondition, time_ns: int, standing: bool
-    ) -> tuple[FallState, str]:
+    def step(self, state: FallState, condition: BodyCondition, time_ns: int, standing: bool
+             ) -> tuple[FallState, str]:
         """Advance to the condition at a stamp; returns what says that the robot has fallen, empty
         while it has not. Unless it should stand on its feet, only its tilt is watched.
         """
         p, height = self.parameters, condition.height / self._stance_height
-        signs = (
-            condition.tilt > p.fall_tilt,
-            standing and height < p.fall_height,
-            standing and condition.support < p.fall_support,
-        )
-        since = [
-            (before if before >= 0 else time_ns) if present else -1
-            for before, present in zip(state.since_ns, signs, strict=True)
-        ]
+        signs = (condition.tilt > p.fall_tilt, standing and height < p.fall_height,
+                 standing and condition.support < p.fall_support)
+        since = tuple((before if before >= 0 else time_ns) if present else -1
+                      for before, present in zip(state.since_ns, signs, strict=True))
         delays = (p.fall_delay, p.fall_delay, p.fall_support_delay)
         for i, (begun, delay) in enumerate(zip(since, delays, strict=True)):
             if begun >= 0 and (time_ns - begun) * 1e-9 >= delay:
-                return FallState(tuple(since)), self._sign(i, condition)
-        return FallState(tuple(since)), ''
+                return FallState(since), self._sign(i, condition)
+        return FallState(since), ''
 
     def _sign(self, i: int, condition: BodyCondition) -> str:
         """What says that the robot has fallen, in words."""
@@ -197,5 +178,4 @@ class FallDetector:
             f'tilted by {condition.tilt:.2f} rad, more than {p.fall_tilt:g} rad',
             f'{condition.height:.3f} m over its feet, less than {p.fall_height:g} of '
             f'{self._stance_height:.3f} m',
-            f'no ground under its feet for {p.fall_support_delay:g} s',
-        )[i]
+            f'no ground under its feet for {p.fall_support_delay:g} s')[i]

@@ -1,10 +1,21 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Leg block: the gait's rhythmic primitive or a movement's discrete one, as the mode says."""
+"""Leg block: the gait's rhythmic primitive or a movement's discrete one, as the mode says.
+
+Discrete primitives bring a leg from wherever its joints are to a configuration.
+The joints are the state of the discrete transformation system (eqs. p2p_trans, p2p_phase), which
+begins with the angles and velocities at which another primitive left them; so nothing jumps.
+The canonical phase x is common to the four legs and comes with the command.
+
+One unit movement 0 → 1 of least jerk is learned once, and so is the path of each movement that has
+one. The weights of a movement from θ_0 to θ_g follow by linearity: those of the path from p_0 less
+(θ_0 − p_0) times those of the unit movement (for a straight movement p_0 = θ_g; the scaling of
+Ijspeert et al. 2013).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +23,129 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.gait.transition import GaitInForce
-from dmp_cpg_ros.core.modes.motion import LegMotion, MotionState
-from dmp_cpg_ros.core.modes.motion_library import Movements
-from dmp_cpg_ros.core.primitives.spring_damper import SpringState
+from dmp_cpg_ros.core.modes.motion_library import BASES, Movements, learned, unit_movement
+from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive, DiscreteState
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, JointTargets
 from dmp_cpg_ros.core.transformation.foot_motion import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MotionState:
+    """A movement of one leg under way.
+
+    Attributes
+    ----------
+    movement : str
+        Its name.
+    primitive : DiscretePrimitive
+        With the weights of this movement.
+    duration : float
+        τ [s].
+    state : DiscreteState
+        Of the primitive.
+    """
+
+    movement: str
+    primitive: DiscretePrimitive
+    duration: float
+    state: DiscreteState
+
+
+class LegMotion:
+    """Discrete primitives of one leg; state in, state out.
+
+    Parameters
+    ----------
+    joints : slice
+        Which of the twelve joints are the leg's.
+    movements : Movements
+        The robot's movements.
+    transformation : SpringDamper
+        The leg's; it brings the joints to rest after a movement.
+    """
+
+    def __init__(self, joints: slice, movements: Movements, transformation: SpringDamper) -> None:
+        """Keep; a path is learned when it is first needed."""
+        self._joints, self._movements, self._transformation = joints, movements, transformation
+        self._paths: dict[str, DiscretePrimitive] = {}
+
+    def step(self, motion: MotionState | None, leg: LegState, command: BodyCommand,
+             measured: Array, dt: float) -> tuple[MotionState | None, LegState, Array, Array]:
+        """Advance the leg in a mode in which the gait's primitive does not move it.
+
+        Parameters
+        ----------
+        motion : MotionState or None
+            Movement under way at the tick before.
+        leg : LegState
+            State of the leg at the tick before.
+        command : BodyCommand
+            Mode of this tick.
+        measured : ndarray (3,)
+            Measured joint angles [rad].
+        dt : float
+            Time since the last tick [s]; 0 at the leg's first, which begins where its joints are.
+
+        Returns
+        -------
+        motion : MotionState or None
+        leg : LegState
+        goal, goal_velocity : ndarray (3,)
+            [rad], [rad/s]
+
+        Raises
+        ------
+        DataError
+            If there is no such movement.
+        """
+        joints = leg.joints
+        if command.mode == 'damped' or dt <= 0.0:
+            joints = SpringState(measured.copy(), np.zeros(len(measured)))
+        goal, goal_velocity = joints.position, np.zeros(len(measured))
+        if command.movement:
+            motion = self._moved(motion, joints, command, dt)
+            goal, goal_velocity = motion.state.position, motion.state.velocity
+            joints = SpringState(goal, goal_velocity)
+        else:
+            motion = None
+            if command.mode != 'damped' and dt > 0.0:
+                joints = self._transformation.follow(joints, goal, goal_velocity, dt)
+        return motion, LegState(joints, 0.0, np.zeros(3)), goal, goal_velocity
+
+    def _moved(self, motion: MotionState | None, joints: SpringState, command: BodyCommand,
+               dt: float) -> MotionState:
+        """Begin the command's movement, or advance it to the command's phase."""
+        if (motion is None or motion.movement != command.movement
+                or command.x > motion.state.x):
+            motion = self._begun(joints, command)
+        if dt <= 0.0:
+            return motion
+        held = DiscreteInput(motion.state.goal, motion.duration)
+        state = motion.primitive.step(motion.state, held, dt)
+        return replace(motion, state=replace(state, x=command.x))
+
+    def _begun(self, joints: SpringState, command: BodyCommand) -> MotionState:
+        movement, unit = self._movements.named(command.movement), unit_movement()
+        goal, spring = movement.goal[self._joints], unit.transformation
+        weights, begin = np.zeros((BASES, len(goal))), goal
+        if movement.path is not None:
+            path = movement.path[:, self._joints]
+            if movement.name not in self._paths:
+                self._paths[movement.name] = learned(path)
+            weights, begin = self._paths[movement.name].weights, path[0]
+        primitive = replace(
+            unit, weights=weights - unit.weights * (joints.position - begin),
+            transformation=replace(
+                spring, stiffness=spring.stiffness[0], damping=spring.damping[0]),
+            start=joints.position, goal=goal, start_velocity=0.0)
+        state = primitive.initial_state(velocity=joints.velocity, tau=movement.duration)
+        return MotionState(
+            command.movement, primitive, movement.duration, replace(state, x=command.x))
 
 
 @dataclass(frozen=True)

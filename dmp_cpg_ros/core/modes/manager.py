@@ -21,15 +21,8 @@ from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase_rate
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE, REST_SPEED
 from dmp_cpg_ros.core.maths.updated import updated
-from dmp_cpg_ros.core.modes.falls import (
-    BodyCondition,
-    BodySense,
-    FallDetector,
-    FallParameters,
-    FallState,
-)
-from dmp_cpg_ros.core.modes.motion import phase_at, unit_movement
-from dmp_cpg_ros.core.modes.motion_library import SIDES, Movements
+from dmp_cpg_ros.core.modes import falls
+from dmp_cpg_ros.core.modes.motion_library import SIDES, Movements, phase_at, unit_movement
 from dmp_cpg_ros.core.parameters import parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
@@ -55,15 +48,13 @@ STOPPING_PATIENCE_S = 15.0
 
 
 @dataclass(frozen=True)
-class ModeParameters(FallParameters):
+class ModeParameters(falls.FallParameters):
     """How the robot begins, when it has fallen, how often it tries to get up."""
 
     start_mode: str = parameter(
-        'standing', 'mode of the body at the start', choices=('standing', 'lying', 'damped')
-    )
+        'standing', 'mode of the body at the start', choices=('standing', 'lying', 'damped'))
     recovery_tries: int = parameter(
-        5, 'number of attempts to roll onto the belly', minimum=1, maximum=100
-    )
+        5, 'number of attempts to roll onto the belly', minimum=1, maximum=100)
 
 
 @dataclass(frozen=True)
@@ -96,8 +87,8 @@ class ModeState:
     begun_ns: int = 0
     tries: int = 0
     reason: str = ''
-    condition: BodyCondition | None = None
-    fall: FallState = field(default_factory=FallState)
+    condition: falls.BodyCondition | None = None
+    fall: falls.FallState = field(default_factory=falls.FallState)
 
 
 class ModeManager:
@@ -113,15 +104,13 @@ class ModeManager:
         The robot's legs, where others ask them too.
     """
 
-    def __init__(
-        self, description: RobotDescription, parameters: ModeParameters,
-        legs: RobotLegs | None = None,
-    ) -> None:
+    def __init__(self, description: RobotDescription, parameters: ModeParameters,
+                 legs: RobotLegs | None = None) -> None:
         """Derive the movements and their durations."""
-        self._sense, self._scale = BodySense(description, legs), body_scale(description)
+        self._sense, self._scale = falls.BodySense(description, legs), body_scale(description)
         self.movements = Movements(description)
         self._stance_height = description.stance_height
-        self._detector = FallDetector(parameters, description.stance_height)
+        self._detector = falls.FallDetector(parameters, description.stance_height)
         self.parameters = parameters
 
     def initial_state(self) -> ModeState:
@@ -139,10 +128,8 @@ class ModeManager:
     def feedback(self, mode: ModeState, state: RobotState) -> PostureFeedback:
         """What the legs get while the balance controller does not act."""
         torque = self._sense.carrying_torque(state, self._carried(mode))
-        return PostureFeedback(
-            torque, np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3), self.command(mode),
-            state.joint_position.copy(),
-        )
+        return PostureFeedback(torque, np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3),
+                               self.command(mode), state.joint_position.copy())
 
     def _carried(self, state: ModeState) -> float:
         """Share of the weight that the legs are to carry by feed-forward in a movement."""
@@ -153,10 +140,8 @@ class ModeManager:
         rest = (1.0 - share) if begin > end else share
         return max(begin, end) * min(rest / 0.3, 1.0)
 
-    def step(
-        self, mode: ModeState, state: RobotState, x: Array, x_dot: Array, r: Array,
-        activity: Array,
-    ) -> ModeState:
+    def step(self, mode: ModeState, state: RobotState, x: Array, x_dot: Array, r: Array,
+             activity: Array) -> ModeState:
         """Advance the mode to the tick of a measured state.
 
         Parameters
@@ -176,13 +161,11 @@ class ModeManager:
             mode.mode == 'stopping'
             and self._scale.foot_speed(float(r[0]), float(r[1]), float(r[2])) <= REST_SPEED
             and float(np.abs(phase_rate(x, x_dot)).max()) <= REST_PHASE_RATE
-            and float(activity.max()) <= REST_ACTIVITY
-        )
+            and float(activity.max()) <= REST_ACTIVITY)
         return self.advance(mode, self._sense.condition(state), state.time_ns, at_rest)
 
-    def advance(
-        self, state: ModeState, condition: BodyCondition, time_ns: int, at_rest: bool
-    ) -> ModeState:
+    def advance(self, state: ModeState, condition: falls.BodyCondition, time_ns: int, at_rest: bool
+                ) -> ModeState:
         """Advance by one tick to the body's condition at a stamp; `at_rest` says whether phases,
         reference and swings of the gait rest.
         """
@@ -192,58 +175,52 @@ class ModeManager:
             fall, sign = self._detector.step(fall, condition, time_ns, state.mode in BALANCED)
         state = updated(state, time_ns=time_ns, condition=condition, begun_ns=begun, fall=fall)
         if sign:
-            return self._fallen(state, f'fell at {time_ns * 1e-9:.3f} s: {sign}')
+            return _enter_now(state, 'damped', f'fell at {time_ns * 1e-9:.3f} s: {sign}')
         if state.mode == 'stopping':
             return self._stopped(state, at_rest)
         if state.movements and self._elapsed(state) >= self._time_of(state.movements[0]):
-            return self._moved(state)
+            return self._moved(state, condition)
         return state
 
     def _stopped(self, state: ModeState, at_rest: bool) -> ModeState:
         if at_rest:
-            return _enter_now(state, 'lowering', ('lower',), state.reason)
+            return _enter_now(state, 'lowering', state.reason, ('lower',))
         if self._elapsed(state) > STOPPING_PATIENCE_S:
-            return _enter_now(
-                state, 'standing', (),
-                f'lying down was given up: the gait did not rest within {STOPPING_PATIENCE_S:g} s',
-            )
+            return _enter_now(state, 'standing', 'lying down was given up: the gait did not rest '
+                              f'within {STOPPING_PATIENCE_S:g} s')
         return state
 
-    def _moved(self, state: ModeState) -> ModeState:
+    def _moved(self, state: ModeState, condition: falls.BodyCondition) -> ModeState:
         """Go on after a movement."""
-        assert state.condition is not None
-        following = state.movements[1:]
-        if following:
-            return _enter_now(state, state.mode, following, state.reason)
+        if following := state.movements[1:]:
+            return _enter_now(state, state.mode, state.reason, following)
         if state.mode == 'lowering':
-            return _enter_now(state, 'lying', (), state.reason)
+            return _enter_now(state, 'lying', state.reason)
         if state.mode == 'recovering':
-            return self._rolled(state, state.condition)
-        if state.condition.height >= RISEN_HEIGHT * self._stance_height:
-            return _enter_now(state, 'standing', (), 'risen')
+            return self._rolled(state, condition)
+        if condition.height >= RISEN_HEIGHT * self._stance_height:
+            return _enter_now(state, 'standing', 'risen')
         patience = RISING_PATIENCE * self.movements.time_unit
         if self._elapsed(state) < self._time_of('rise') + patience:
             return state
-        return self._fallen(
-            state, f'did not rise by {state.time_ns * 1e-9:.3f} s: {state.condition.height:.3f} m '
-            f'over its feet, less than {RISEN_HEIGHT:g} of {self._stance_height:.3f} m'
-        )
+        return _enter_now(
+            state, 'damped', f'did not rise by {state.time_ns * 1e-9:.3f} s: '
+            f'{condition.height:.3f} m over its feet, less than {RISEN_HEIGHT:g} of '
+            f'{self._stance_height:.3f} m')
 
-    def _rolled(self, state: ModeState, condition: BodyCondition) -> ModeState:
+    def _rolled(self, state: ModeState, condition: falls.BodyCondition) -> ModeState:
         """Rise when the belly is down; else roll, or give up."""
-        if condition.tilt <= UPRIGHT_TILT:
-            return _enter_now(state, 'rising', ('fold', 'rise'), state.reason)
+        rolls = self.rolls(condition)
+        if not rolls:
+            return _enter_now(state, 'rising', state.reason, ('fold', 'rise'))
         if state.tries >= self.parameters.recovery_tries:
-            return self._fallen(
-                state, f'still tilted by {condition.tilt:.2f} rad after {state.tries} tries'
-            )
-        rolls = (*self.rolls(condition), 'tuck')
-        return replace(
-            _enter_now(state, 'recovering', rolls, state.reason), tries=state.tries + 1
-        )
+            return _enter_now(state, 'damped', f'still tilted by {condition.tilt:.2f} rad after '
+                              f'{state.tries} tries')
+        rolling = _enter_now(state, 'recovering', state.reason, (*rolls, 'tuck'))
+        return replace(rolling, tries=state.tries + 1)
 
     @staticmethod
-    def rolls(condition: BodyCondition) -> tuple[str, ...]:
+    def rolls(condition: falls.BodyCondition) -> tuple[str, ...]:
         """Movements that bring the belly down from how it lies."""
         if condition.tilt <= UPRIGHT_TILT:
             return ()
@@ -251,9 +228,6 @@ class ModeManager:
         on_its_back = condition.down_in_base[2] > ON_ITS_BACK
         names = ('turn', 'tip', 'over') if on_its_back else ('push', 'over')
         return tuple(f'{name}_{side}' for name in names)
-
-    def _fallen(self, state: ModeState, reason: str) -> ModeState:
-        return _enter_now(state, 'damped', (), reason)
 
     def _elapsed(self, state: ModeState) -> float:
         return max(state.time_ns - state.begun_ns, 0) * 1e-9 if state.begun_ns >= 0 else 0.0
@@ -268,13 +242,10 @@ class ModeManager:
 
 def enter(state: ModeState, mode: str, movements: tuple[str, ...], reason: str) -> ModeState:
     """Enter a mode at the next tick, whose stamp is not known yet."""
-    return replace(
-        state, mode=mode, movements=movements, reason=reason, begun_ns=-1,
-        fall=FallState(),
-    )
+    return replace(state, mode=mode, movements=movements, reason=reason, begun_ns=-1,
+                   fall=falls.FallState())
 
 
-def _enter_now(
-    state: ModeState, mode: str, movements: tuple[str, ...], reason: str
-) -> ModeState:
+def _enter_now(state: ModeState, mode: str, reason: str, movements: tuple[str, ...] = ()
+               ) -> ModeState:
     return replace(enter(state, mode, movements, reason), begun_ns=state.time_ns)

@@ -25,14 +25,17 @@ table serves robots of any size.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from math import asin, atan2, cos, hypot, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration, minimum_jerk
+from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.transformation.leg import body_scale, nominal_foothold
@@ -80,6 +83,25 @@ PAUSE = 1.5
 
 PATH_SAMPLES = 101
 
+BASES = 15
+"""Number of basis functions; the unit movement is met within 2e-4 of its length."""
+
+
+@cache
+def unit_movement() -> DiscretePrimitive:
+    """Movement 0 → 1 in a unit of time with least jerk."""
+    return learned(minimum_jerk(np.linspace(0.0, 1.0, PATH_SAMPLES))[:, None])
+
+
+def phase_at(share: float) -> float:
+    """Phase x of the canonical system when a share of a movement's duration has passed."""
+    return float(np.exp(-unit_movement().phase_decay * share))
+
+
+def learned(path: Array) -> DiscretePrimitive:
+    """Primitive of a path (m, n) that takes a unit of time."""
+    return learn_discrete(Demonstration(np.linspace(0.0, 1.0, len(path)), path), BASES)
+
 
 @dataclass(frozen=True, eq=False)
 class Movement:
@@ -117,58 +139,46 @@ class Movements:
 
     def __init__(self, description: RobotDescription) -> None:
         """Derive the postures."""
-        self.time_unit = sqrt(body_scale(description).leg_length / GRAVITY)
-        self.pause = PAUSE * self.time_unit
+        self.time_unit = unit = sqrt(body_scale(description).leg_length / GRAVITY)
+        self.pause = PAUSE * unit
         shares = minimum_jerk(np.linspace(0.0, 1.0, PATH_SAMPLES))
         rise = np.array([raised_posture(description, share) for share in shares])
         tucked = _posture(description, 'left', TUCKED, TUCKED)
         lying, standing = lying_posture(description), standing_posture(description)
-        unit = self.time_unit
         movements = [
             Movement('rise', standing, RISE * unit, rise, (0.0, 1.0)),
             Movement('lower', lying, RISE * unit, rise[::-1].copy(), (1.0, 0.0)),
-            Movement('fold', lying, FOLD * unit),
-            Movement('tuck', tucked, TUCK * unit),
-        ]
-        for name, (upper, lower, duration) in ROLLING.items():
-            for side in SIDES:
-                goal = _posture(description, side, upper, lower)
-                movements.append(Movement(f'{name}_{side}', goal, duration * unit))
+            Movement('fold', lying, FOLD * unit), Movement('tuck', tucked, TUCK * unit)]
+        movements += [
+            Movement(f'{name}_{side}', _posture(description, side, upper, lower), duration * unit)
+            for name, (upper, lower, duration) in ROLLING.items() for side in SIDES]
         self._by_name = {movement.name: movement for movement in movements}
 
     def named(self, name: str) -> Movement:
         """Movement of a name; raises DataError that lists the valid names."""
-        try:
-            return self._by_name[name]
-        except KeyError:
+        if name not in self._by_name:
             raise DataError(
-                f"there is no movement '{name}'; valid are {', '.join(self._by_name)}"
-            ) from None
+                f"there is no movement '{name}'; valid are {', '.join(self._by_name)}")
+        return self._by_name[name]
 
     def duration(self, names: tuple[str, ...]) -> float:
         """Time that movements take one after the other, pauses included [s]."""
         return sum(self.named(name).duration + self.pause for name in names)
 
 
-def _posture(
-    description: RobotDescription, lower_side: str, upper: LegPosture, lower: LegPosture
-) -> Array:
+def _posture(description: RobotDescription, lower_side: str, upper: LegPosture, lower: LegPosture
+             ) -> Array:
     """Posture (12,) with one leg posture on the lower side and another on the upper."""
-    angles = []
-    for leg in description.legs:
-        on_lower = (leg.name[1] == 'l') == (lower_side == 'left')
-        angles.append(leg_angles(leg, *(lower if on_lower else upper)))
-    return np.concatenate(angles)
+    return np.concatenate([
+        leg_angles(leg, *(lower if leg.name[1] == lower_side[0] else upper))
+        for leg in description.legs])
 
 
 def standing_posture(description: RobotDescription) -> Array:
     """Joint angles (12,) of the gait's stance: every foot at its nominal foothold [rad]."""
-    return np.concatenate(
-        [
-            within_limits(leg, LegKinematics(leg).inverse(nominal_foothold(description, leg.name)))
-            for leg in description.legs
-        ]
-    )
+    return np.concatenate([
+        within_limits(leg, LegKinematics(leg).inverse(nominal_foothold(description, leg.name)))
+        for leg in description.legs])
 
 
 def lying_posture(description: RobotDescription) -> Array:
@@ -207,9 +217,7 @@ def raised_posture(description: RobotDescription, share: float) -> Array:
 
 def within_limits(leg: LegGeometry, angles: Array) -> Array:
     """Clip a leg's angles (3,) to its joint limits less ``LIMIT_MARGIN`` [rad]."""
-    return np.clip(
-        angles, leg.position_lower + LIMIT_MARGIN, leg.position_upper - LIMIT_MARGIN
-    )
+    return np.clip(angles, leg.position_lower + LIMIT_MARGIN, leg.position_upper - LIMIT_MARGIN)
 
 
 def folded_length(leg: LegGeometry) -> float:

@@ -4,17 +4,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.modes.manager import UPRIGHT_TILT, ModeManager, ModeState, enter
 
-REQUESTS = ('stand_up', 'lie_down', 'recover')
+_DONE_IN = {'stand_up': ('standing', 'rising'), 'lie_down': ('lying', 'lowering', 'stopping'),
+            'recover': ('recovering',)}
+"""Modes in which there is nothing left to do for a request."""
+
+REQUESTS = tuple(_DONE_IN)
 """What may be asked for; the services bear these names."""
 
 
-@dataclass(frozen=True)
-class ModeAnswer:
+class ModeAnswer(NamedTuple):
     """Answer to a request.
 
     Attributes
@@ -51,80 +55,46 @@ def request(modes: ModeManager, state: ModeState, what: str) -> tuple[ModeState,
     """
     if what not in REQUESTS:
         raise ParameterError(f"request '{what}' must be one of {', '.join(REQUESTS)}")
-    if state.condition is None:
+    mode, condition, duration = state.mode, state.condition, modes.movements.duration
+    if condition is None:
         return state, ModeAnswer(False, 'no state of the robot yet; is mujoco_robot running?')
+    if mode in _DONE_IN[what]:
+        tries = f', try {state.tries}' if mode == 'recovering' else ''
+        return state, ModeAnswer(True, f'already {mode}{tries}')
     if what == 'recover':
         return _recover(modes, state)
-    return _stand_up(modes, state) if what == 'stand_up' else _lie_down(modes, state)
-
-
-def _stand_up(modes: ModeManager, state: ModeState) -> tuple[ModeState, ModeAnswer]:
-    if state.mode in ('standing', 'rising'):
-        return state, ModeAnswer(True, f'already {state.mode}')
-    if state.mode == 'stopping':
+    if mode == 'stopping':
         return enter(state, 'standing', (), 'lying down was called off'), ModeAnswer(
-            True, 'stays standing, the gait inhibited; resume it with the service inhibit'
-        )
-    refusal = _not_from_here(state, 'stand up')
-    if refusal:
-        return state, refusal
-    folded = state.mode in ('lying', 'lowering') and state.movements[:1] != ('fold',)
-    return _begin(modes, state, 'rising', ('rise',) if folded else ('fold', 'rise'), 'standing')
-
-
-def _lie_down(modes: ModeManager, state: ModeState) -> tuple[ModeState, ModeAnswer]:
-    if state.mode in ('lying', 'lowering', 'stopping'):
-        return state, ModeAnswer(True, f'already {state.mode}')
-    if state.mode == 'standing':
-        takes = modes.movements.duration(('lower',))
+            True, 'stays standing, the gait inhibited; resume it with the service inhibit')
+    if mode == 'standing':
         return enter(state, 'stopping', (), 'asked to lie down'), ModeAnswer(
-            True, f'lying {takes:.2f} s after the gait has come to rest; it is inhibited now'
-        )
-    refusal = _not_from_here(state, 'lie down')
-    if refusal:
-        return state, refusal
-    raised = state.mode == 'rising' and state.movements[0] == 'rise'
-    return _begin(modes, state, 'lowering', ('lower',) if raised else ('fold',), 'lying')
+            True, f'lying {duration(("lower",)):.2f} s after the gait has come to rest; it is '
+            'inhibited now')
+    refused = f'cannot {what.replace("_", " ")} while'
+    if mode == 'recovering':
+        return state, ModeAnswer(False, f'{refused} recovering; it will stand up by itself')
+    if condition.tilt > UPRIGHT_TILT:
+        return state, ModeAnswer(False, f'{refused} tilted by {condition.tilt:.2f} rad, more than '
+                                 f'{UPRIGHT_TILT} rad; use recover')
+    movements: tuple[str, ...]
+    if what == 'stand_up':
+        folded = mode in ('lying', 'lowering') and state.movements[:1] != ('fold',)
+        new, end, movements = 'rising', 'standing', ('rise',) if folded else ('fold', 'rise')
+    else:
+        raised = mode == 'rising' and state.movements[0] == 'rise'
+        new, end, movements = 'lowering', 'lying', ('lower',) if raised else ('fold',)
+    return enter(state, new, movements, f'asked for {end}'), ModeAnswer(
+        True, f'{new}, {end} in {duration(movements):.2f} s')
 
 
 def _recover(modes: ModeManager, state: ModeState) -> tuple[ModeState, ModeAnswer]:
-    if state.mode == 'recovering':
-        return state, ModeAnswer(True, f'already recovering, try {state.tries}')
     if state.mode != 'damped':
         return state, ModeAnswer(
-            False, f'the robot is {state.mode} and has not fallen; use stand_up or lie_down'
-        )
+            False, f'the robot is {state.mode} and has not fallen; use stand_up or lie_down')
     assert state.condition is not None
-    duration = modes.movements.duration
-    once = duration(('tuck', *modes.rolls(state.condition)))
-    rise = duration(('fold', 'rise'))
-    upright = state.condition.tilt <= UPRIGHT_TILT
+    rolls, duration = modes.rolls(state.condition), modes.movements.duration
+    once, then = duration(('tuck', *rolls)), duration(('tuck',)) + duration(('fold', 'rise'))
+    after = f'{once:.2f} s for every try to roll over, then ' if rolls else ''
     new = replace(enter(state, 'recovering', ('tuck',), 'asked to recover'), tries=0)
-    after = '' if upright else f'{once:.2f} s for every try to roll over, then '
-    return new, ModeAnswer(
-        True,
-        f'standing after {after}{duration(("tuck",)) + rise:.2f} s; '
-        f'at most {modes.parameters.recovery_tries} tries',
-    )
-
-
-def _not_from_here(state: ModeState, what: str) -> ModeAnswer | None:
-    """Refuse what would need the robot to be the right way up."""
-    assert state.condition is not None
-    if state.mode == 'recovering':
-        return ModeAnswer(False, f'cannot {what} while recovering; it will stand up by itself')
-    if state.condition.tilt > UPRIGHT_TILT:
-        return ModeAnswer(
-            False,
-            f'cannot {what} while tilted by {state.condition.tilt:.2f} rad, more than '
-            f'{UPRIGHT_TILT} rad; use recover',
-        )
-    return None
-
-
-def _begin(
-    modes: ModeManager, state: ModeState, mode: str, movements: tuple[str, ...], end: str
-) -> tuple[ModeState, ModeAnswer]:
-    takes = modes.movements.duration(movements)
-    new = enter(state, mode, movements, f'asked for {end}')
-    return new, ModeAnswer(True, f'{mode}, {end} in {takes:.2f} s')
+    return new, ModeAnswer(True, f'standing after {after}{then:.2f} s; '
+                           f'at most {modes.parameters.recovery_tries} tries')

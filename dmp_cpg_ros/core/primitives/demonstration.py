@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,28 +64,20 @@ class Demonstration:
         times = _numbers(self.times, 'times')
         if times.ndim != 1 or len(times) < 8:
             raise DataError(
-                f'a demonstration needs one list of at least 8 times, not shape {times.shape}'
-            )
+                f'a demonstration needs one list of at least 8 times, not shape {times.shape}')
         if not np.all(np.isfinite(times)):
             raise DataError('times of a demonstration must be finite')
-        steps = np.diff(times)
-        if not np.all(steps > 0.0):
-            bad = int(np.argmax(steps <= 0.0))
-            raise DataError(
-                f'times of a demonstration must increase; sample {bad + 1} at {times[bad + 1]} s '
-                f'follows {times[bad]} s'
-            )
+        for i in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
+            raise DataError(f'times of a demonstration must increase; sample {i + 1} at '
+                            f'{times[i + 1]} s follows {times[i]} s')
         object.__setattr__(self, 'times', times)
         for name in ('positions', 'velocities', 'accelerations'):
-            values = getattr(self, name)
-            if values is not None:
-                object.__setattr__(self, name, _samples(values, len(times), name))
-        for name in ('velocities', 'accelerations'):
-            values = getattr(self, name)
-            if values is not None and values.shape != self.positions.shape:
-                raise DataError(
-                    f'{name} have shape {values.shape}, positions {self.positions.shape}'
-                )
+            if getattr(self, name) is not None:
+                values = _samples(getattr(self, name), len(times), name)
+                object.__setattr__(self, name, values)
+                if values.shape != self.positions.shape:
+                    raise DataError(
+                        f'{name} have shape {values.shape}, positions {self.positions.shape}')
         if self.names and len(self.names) != self.dofs:
             raise DataError(f'{len(self.names)} names do not match {self.dofs} degrees of freedom')
 
@@ -99,35 +91,19 @@ class Demonstration:
         """Time from the first to the last sample [s]."""
         return float(self.times[-1] - self.times[0])
 
-    def all_derivatives(self) -> tuple[Array, Array, Array]:
-        """Positions, velocities and accelerations, by :func:`derivatives` where not recorded.
-
-        Returns
-        -------
-        positions, velocities, accelerations : ndarray (m, n)
-        """
+    def with_derivatives(self) -> Demonstration:
+        """Fill in missing velocities and accelerations, by :func:`derivatives`."""
         velocities, accelerations = self.velocities, self.accelerations
         if velocities is None:
             velocities, second = derivatives(self.times, self.positions)
             accelerations = second if accelerations is None else accelerations
         elif accelerations is None:
             accelerations = derivatives(self.times, velocities)[0]
-        return self.positions, velocities, accelerations
-
-    def with_derivatives(self) -> Demonstration:
-        """Fill in missing velocities and accelerations.
-
-        Returns
-        -------
-        Demonstration
-            With all three.
-        """
-        return Demonstration(self.times, *self.all_derivatives(), self.names)
+        return replace(self, velocities=velocities, accelerations=accelerations)
 
 
-def derivatives(
-    times: ArrayLike, values: ArrayLike, half_window: int = 3, degree: int = 4
-) -> tuple[Array, Array]:
+def derivatives(times: ArrayLike, values: ArrayLike, half_window: int = 3, degree: int = 4
+                ) -> tuple[Array, Array]:
     """First and second derivative of sampled data by local polynomials (Savitzky & Golay 1964).
 
     Works for uneven spacing; at the ends the window is one-sided. On smooth data the errors fall
@@ -157,17 +133,14 @@ def derivatives(
     times, values = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
     width = 2 * half_window + 1
     if not 2 <= degree < width or width > len(times):
-        raise ParameterError(
-            f'derivatives need 2 <= degree < window <= samples; they are {degree}, {width} and '
-            f'{len(times)}'
-        )
+        raise ParameterError('derivatives need 2 <= degree < window <= samples; they are '
+                             f'{degree}, {width} and {len(times)}')
     starts = np.clip(np.arange(len(times)) - half_window, 0, len(times) - width)
     window = starts[:, None] + np.arange(width)  # (m, width)
     offsets = times[window] - times[:, None]
     scale = np.abs(offsets).max(axis=1)
     unit = (offsets / scale[:, None])[..., None]
-    powers = unit ** np.arange(degree + 1)  # (m, width, degree + 1)
-    fitted = np.linalg.pinv(powers) @ values[window]
+    fitted = np.linalg.pinv(unit ** np.arange(degree + 1)) @ values[window]
     return fitted[:, 1] / scale[:, None], 2.0 * fitted[:, 2] / scale[:, None] ** 2
 
 
@@ -193,8 +166,7 @@ def vector(values: ArrayLike, length: int, name: str) -> Array:
     result = np.atleast_1d(np.array(values, dtype=float))
     if result.shape != (length,) or not np.all(np.isfinite(result)):
         raise ParameterError(
-            f'{name} must be {length} finite number(s), not {np.asarray(values).tolist()}'
-        )
+            f'{name} must be {length} finite number(s), not {np.asarray(values).tolist()}')
     return result
 
 

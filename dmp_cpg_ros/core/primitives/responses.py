@@ -12,15 +12,11 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.primitives.spring_damper import quadratic_drive_step, spring_exponential
 
 Array = NDArray[np.float64]
+Force = Callable[[Array], Array]
 
 
-def transient_responses(
-    stiffness: float,
-    damping: float,
-    times: Array,
-    force: Callable[[Array], Array],
-    longest_step: float,
-) -> tuple[Array, Array]:
+def transient_responses(stiffness: float, damping: float, times: Array, force: Force,
+                        longest_step: float) -> tuple[Array, Array]:
     """Responses y'' = u_i(s) − k y − b y' from rest, and the two free movements.
 
     Parameters
@@ -42,48 +38,32 @@ def transient_responses(
         The same of the free movements from (y, y') = (1, 0) and (0, 1).
     """
     parts = np.ceil(np.diff(times) / longest_step - 1e-9).astype(int).clip(1)  # steps per interval
-    lengths = np.repeat(np.diff(times) / parts, parts)
     ends = np.cumsum(parts)
+    lengths = np.repeat(np.diff(times) / parts, parts)
     begins = np.repeat(times[:-1], parts) + lengths * (
-        np.arange(len(lengths)) - np.repeat(ends - parts, parts)
-    )
+        np.arange(len(lengths)) - np.repeat(ends - parts, parts))
     first = force(begins)
     last = np.concatenate([first[1:], force(times[-1:])])
     drives = np.stack([first, force(begins + 0.5 * lengths), last])  # (3, q, p)
-    E = spring_exponential(stiffness, damping, lengths)  # (2, 2, q)
-    rest = np.zeros(1)
-    pushes = np.stack(
-        quadratic_drive_step(
-            stiffness, damping, E[..., None], rest, rest, drives, lengths[:, None]
-        ),
-        axis=1,
-    )  # (q, 2, p)
-    states = np.empty((len(times), 2, pushes.shape[2] + 2))
+    E, rest = spring_exponential(stiffness, damping, lengths), np.zeros(1)  # (2, 2, q)
+    pushes = np.stack(quadratic_drive_step(
+        stiffness, damping, E[..., None], rest, rest, drives, lengths[:, None]), axis=1)
     state = np.hstack([np.zeros((2, pushes.shape[2])), np.eye(2)])
-    states[0] = state
-    steps, sample = np.ascontiguousarray(np.moveaxis(E, 2, 0)), 0
-    stops = set((ends - 1).tolist())
-    for q, step in enumerate(steps):
+    states, stops = [state], set((ends - 1).tolist())
+    for q, step in enumerate(np.ascontiguousarray(np.moveaxis(E, 2, 0))):
         state = step @ state
         state[:, :-2] += pushes[q]
         if q in stops:
-            sample += 1
-            states[sample] = state
-    position, velocity = states[:, 0], states[:, 1]
+            states.append(state)
+    position, velocity = np.stack(states, axis=1)
     acceleration = -stiffness * position - damping * velocity
     acceleration[:, :-2] += force(times)
     everything = np.stack([position, velocity, acceleration])
     return everything[..., :-2], everything[..., -2:]
 
 
-def periodic_responses(
-    stiffness: float,
-    damping: float,
-    omega: float,
-    force: Callable[[Array], Array],
-    phases: Array,
-    harmonics: int,
-) -> Array:
+def periodic_responses(stiffness: float, damping: float, omega: float, force: Force,
+                       phases: Array, harmonics: int) -> Array:
     """Steady responses to forces that are periodic functions of the phase φ = ωs.
 
     Each Fourier coefficient is divided by k − (mω)² + i b mω, so the result is exact up to the
@@ -106,9 +86,8 @@ def periodic_responses(
         Position, velocity and acceleration (derivatives by s).
     """
     count = 4 * harmonics
-    coefficients = (
-        np.fft.rfft(force(2.0 * np.pi * np.arange(count) / count), axis=0)[: harmonics + 1] / count
-    )
+    cycle = force(2.0 * np.pi * np.arange(count) / count)
+    coefficients = np.fft.rfft(cycle, axis=0)[: harmonics + 1] / count
     coefficients[1:] *= 2.0
     rate = 1j * omega * np.arange(harmonics + 1)[:, None]
     coefficients = coefficients / (stiffness + damping * rate + rate**2)

@@ -11,121 +11,108 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
-from dmp_cpg_ros.core.canonical.phase import phase, state_at
-from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
-from dmp_cpg_ros.core.primitives.basis import VonMisesBases
-from dmp_cpg_ros.core.primitives.demonstration import Trajectory, vector
-from dmp_cpg_ros.core.primitives.hopf_flow import hopf_flow
+from dmp_cpg_ros.core.primitives.demonstration import vector
+from dmp_cpg_ros.core.primitives.primitive import Primitive, check_positive
 from dmp_cpg_ros.core.primitives.responses import periodic_responses
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
-from dmp_cpg_ros.core.primitives.states import RhythmicInput, RhythmicState
-from dmp_cpg_ros.core.primitives.time_scaling import Form, StepGrid, TimeScaling
+from dmp_cpg_ros.core.primitives.time_scaling import StepGrid
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class RhythmicPrimitive:
+class RhythmicInput:
+    """What may change while the movement runs; held during a step.
+
+    Attributes
+    ----------
+    centre : ndarray (n,)
+        External centre of the oscillation g_ext.
+    amplitude : float
+        External amplitude r_ext > 0; 1 is the demonstration's.
+    tau : float
+        Commanded τ_ext > 0; 2 makes the movement twice as slow.
+    """
+
+    centre: Array
+    amplitude: float = 1.0
+    tau: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class RhythmicState:
+    """State of reference, canonical and transformation system.
+
+    Attributes
+    ----------
+    position, velocity : ndarray (n,)
+        y and ẏ.
+    x : ndarray (2,)
+        State of the oscillator.
+    centre : ndarray (n,)
+        Filtered centre g.
+    amplitude, tau : float
+        Filtered r and τ.
+    """
+
+    position: Array
+    velocity: Array
+    x: Array
+    centre: Array
+    amplitude: float
+    tau: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RhythmicPrimitive(Primitive):
     """f(x) = Σ Φ_i(φ(x)) w_iᵀ x / Σ Φ_i(φ(x)) on an Andronov-Hopf oscillator of radius r.
 
     Since f is of degree one in x, the amplitude of the movement is proportional to r.
 
     Attributes
     ----------
-    weights : ndarray (m, n, 2)
-        w_i for m bases and n degrees of freedom.
-    bases : VonMisesBases
-        The m basis functions.
     omega : float
         ω > 0 at τ = 1 [rad/s].
     rho : float
         Attraction to the limit cycle ρ > 0 [1/s at radius 1].
-    transformation : SpringDamper
-        k, b and the reading of τ.
     centre : ndarray (n,)
         Centre of the demonstration.
-    centre_rate, amplitude_rate, tau_rate : float
-        Rates of the filters on g, r and τ [1/s].
-    names : tuple of str
-        Names of the degrees of freedom; empty when they have none.
-
-    Raises
-    ------
-    ParameterError
-        If shapes do not match or a number is out of range.
+    centre_rate, amplitude_rate : float
+        Rates of the filters on g and r [1/s].
     """
 
-    weights: Array
-    bases: VonMisesBases
+    WEIGHT, TARGET, LENGTH, VECTORS = (2,), 'centre', 'period', ('centre',)
+    SCALARS = ('omega', 'rho', 'centre_rate', 'amplitude_rate', 'tau_rate')
+
     omega: float
     rho: float
-    transformation: SpringDamper
     centre: Array
     centre_rate: float = 10.0
     amplitude_rate: float = 10.0
-    tau_rate: float = 10.0
-    names: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Validate; scalars of the transformation are spread over the degrees of freedom."""
-        weights = np.array(self.weights, dtype=float)
-        if weights.ndim != 3 or len(weights) != self.bases.count or weights.shape[2] != 2:
-            raise ParameterError(
-                f'weights must have shape ({self.bases.count}, n, 2), not {weights.shape}'
-            )
-        if not np.all(np.isfinite(weights)):
-            raise ParameterError('weights must be finite')
-        dofs = weights.shape[1]
-        object.__setattr__(self, 'weights', weights)
-        object.__setattr__(self, 'centre', vector(self.centre, dofs, 'centre'))
-        object.__setattr__(self, 'transformation', self.transformation.spread(dofs))
-        if not (np.isfinite(self.omega) and self.omega > 0.0):
-            raise ParameterError(f'omega = {self.omega!r} rad/s must be a positive finite number')
-        if self.names and len(self.names) != dofs:
-            raise ParameterError(f'{len(self.names)} names do not match {dofs} degrees of freedom')
-        AndronovHopf(self.rho)
-        self._filters  # noqa: B018  (checks the rates)
 
     def part(self, dofs: slice) -> RhythmicPrimitive:
         """Return the primitive of some of the degrees of freedom."""
         spring = self.transformation
         return replace(
             self, weights=self.weights[:, dofs], centre=self.centre[dofs], names=self.names[dofs],
-            transformation=replace(
-                spring, stiffness=spring.stiffness[dofs], damping=spring.damping[dofs]))
+            transformation=SpringDamper(spring.stiffness[dofs], spring.damping[dofs], self.form))
 
     @classmethod
-    def joined(
-        cls, parts: Sequence[RhythmicPrimitive], names: tuple[str, ...] = ()
-    ) -> RhythmicPrimitive:
+    def joined(cls, parts: Sequence[RhythmicPrimitive], names: tuple[str, ...] = ()
+               ) -> RhythmicPrimitive:
         """Primitive of the degrees of freedom of several that share bases and oscillator."""
-        springs = [part.transformation for part in parts]
+        k, b = (np.concatenate([getattr(part.transformation, name) for part in parts])
+                for name in ('stiffness', 'damping'))
         return replace(
             parts[0], weights=np.concatenate([part.weights for part in parts], axis=1),
             centre=np.concatenate([part.centre for part in parts]), names=names,
-            transformation=replace(
-                springs[0], stiffness=np.concatenate([spring.stiffness for spring in springs]),
-                damping=np.concatenate([spring.damping for spring in springs])))
+            transformation=SpringDamper(k, b, parts[0].form))
 
     @cached_property
-    def _filters(self) -> tuple[FirstOrderFilter, FirstOrderFilter, TimeScaling]:
-        return (
-            FirstOrderFilter(self.centre_rate),
-            FirstOrderFilter(self.amplitude_rate),
-            TimeScaling(self.tau_rate),
-        )
-
-    @property
-    def dofs(self) -> int:
-        """Number of degrees of freedom."""
-        return int(self.weights.shape[1])
-
-    @property
-    def form(self) -> Form:
-        """Reading of τ."""
-        return self.transformation.form
+    def _amplitude_filter(self) -> FirstOrderFilter:
+        return FirstOrderFilter(self.amplitude_rate)
 
     @property
     def period(self) -> float:
@@ -133,17 +120,7 @@ class RhythmicPrimitive:
         return 2.0 * np.pi / self.omega
 
     def forcing(self, x: ArrayLike) -> Array:
-        """Forcing function f(x).
-
-        Parameters
-        ----------
-        x : array_like (..., 2)
-            States of the oscillator.
-
-        Returns
-        -------
-        ndarray (..., n)
-        """
+        """Forcing function f(x) (..., n) at states x (..., 2) of the oscillator."""
         x = np.asarray(x, dtype=float)
         # No matrix product: its bits depend on the number of threads.
         activations = self.bases.activations(phase(x))
@@ -169,21 +146,17 @@ class RhythmicPrimitive:
         """
         phi = np.atleast_1d(np.asarray(phi, dtype=float))
         stretch = tau if self.form == 'printed' else 1.0
-        positions, velocities = np.empty((len(phi), self.dofs)), np.empty((len(phi), self.dofs))
+        cycle = np.empty((2, len(phi), self.dofs))
         for k, b, members in self.transformation.groups():
-
             def force(angle: Array, members: NDArray[np.int_] = members) -> Array:
                 return stretch * self.forcing(state_at(angle))[:, members]
 
-            part = periodic_responses(
-                stretch * k, b, self.omega, force, phi, 4 * self.bases.count + 32
-            )
-            positions[:, members], velocities[:, members] = part[0], part[1] / tau
-        return positions, velocities
+            cycle[:, :, members] = periodic_responses(
+                stretch * k, b, self.omega, force, phi, 4 * self.bases.count + 32)[:2]
+        return cycle[0], cycle[1] / tau
 
-    def initial_state(
-        self, phi: float = 0.0, command: RhythmicInput | None = None
-    ) -> RhythmicState:
+    def initial_state(self, phi: float = 0.0, command: RhythmicInput | None = None
+                      ) -> RhythmicState:
         """State on the limit cycle, with filters at rest.
 
         Parameters
@@ -203,17 +176,14 @@ class RhythmicPrimitive:
             If the amplitude or τ is not positive or the centre does not fit.
         """
         command = command or self.default_input()
-        self._check(command)
+        check_positive(amplitude=command.amplitude, tau=command.tau)
         positions, velocities = self.on_cycle(phi, command.tau)
-        centre = vector(command.centre, self.dofs, 'centre')
-        return RhythmicState(
-            centre + command.amplitude * positions[0],
-            command.amplitude * velocities[0],
-            state_at(phi, command.amplitude),
-            centre,
-            float(command.amplitude),
-            float(command.tau),
-        )
+        centre, r = vector(command.centre, self.dofs, 'centre'), float(command.amplitude)
+        return RhythmicState(centre + r * positions[0], r * velocities[0], state_at(phi, r),
+                             centre, r, float(command.tau))
+
+    def _start(self, command: RhythmicInput) -> RhythmicState:
+        return self.initial_state(0.0, command)
 
     def step(self, state: RhythmicState, command: RhythmicInput, dt: float) -> RhythmicState:
         """Advance by one step with the input held.
@@ -239,15 +209,14 @@ class RhythmicPrimitive:
         ParameterError
             If amplitude, τ or dt is not positive or the centre does not fit.
         """
-        self._check(command)
-        grid = self._filters[2].grid(state.tau, command.tau, dt, 5, self.form)
-        radii = self._filters[1].at(state.amplitude, command.amplitude, grid.elapsed)
-        x = hopf_flow(state.x, self.omega, self.rho, radii, grid.scaled, grid.density, grid.length)
-        return self._transform(state, command, x, float(radii[-1]), grid)
+        check_positive(amplitude=command.amplitude, tau=command.tau)
+        grid = self._scaling.grid(state.tau, command.tau, dt, 5, self.form)
+        radii = self._amplitude_filter.at(state.amplitude, command.amplitude, grid.elapsed)
+        x = hopf_flow(state.x, self.omega, self.rho, radii, grid)
+        return self._moved(state, command, x, float(radii[-1]), grid)
 
-    def follow(
-        self, state: RhythmicState, x: Array, command: RhythmicInput, dt: float
-    ) -> RhythmicState:
+    def follow(self, state: RhythmicState, x: Array, command: RhythmicInput, dt: float
+               ) -> RhythmicState:
         """Advance by one step on an outer oscillator, such as one node of a network.
 
         Parameters
@@ -265,85 +234,68 @@ class RhythmicPrimitive:
         -------
         RhythmicState
         """
-        grid = self._filters[2].grid(state.tau, command.tau, dt, 5, self.form)
-        return self._transform(state, command, x, float(np.hypot(*x[-1])), grid)
+        grid = self._scaling.grid(state.tau, command.tau, dt, 5, self.form)
+        return self._moved(state, command, x, float(np.hypot(*x[-1])), grid)
 
-    def _transform(
-        self,
-        state: RhythmicState,
-        command: RhythmicInput,
-        x: Array,
-        amplitude: float,
-        grid: StepGrid,
-    ) -> RhythmicState:
-        nodes = StepGrid(
-            grid.elapsed[::2], grid.scaled[::2], grid.tau[::2], grid.length, grid.density[::2]
-        )
-        centre = vector(command.centre, self.dofs, 'centre')
-        centres = self._filters[0].at(state.centre, centre, nodes.elapsed)
-        position, velocity = self.transformation.step(
-            state.position, state.velocity, centres, self.forcing(x), nodes
-        )
-        return RhythmicState(
-            position, velocity, x[-1], centres[-1], amplitude, float(nodes.tau[-1])
-        )
+    def _moved(self, state: RhythmicState, command: RhythmicInput, x: Array, amplitude: float,
+               grid: StepGrid) -> RhythmicState:
+        position, velocity, centre = self._transformed(state, command, x, grid.halved())
+        return RhythmicState(position, velocity, x[-1], centre, amplitude, float(grid.tau[-1]))
 
-    def acceleration(self, state: RhythmicState, command: RhythmicInput) -> Array:
-        """Acceleration ÿ in a state.
 
-        Parameters
-        ----------
-        state : RhythmicState
-        command : RhythmicInput
-            Its τ_ext gives τ̇.
+def hopf_flow(x: Array, omega: float, rho: float, radii: Array, grid: StepGrid) -> Array:
+    """States at the start, middle and end of a step of an Andronov-Hopf oscillator whose radius
+    follows a reference.
 
-        Returns
-        -------
-        ndarray (n,)
-        """
-        return self.transformation.acceleration(
-            state.position,
-            state.velocity,
-            state.centre,
-            self.forcing(state.x),
-            state.tau,
-            self.tau_rate * (command.tau - state.tau),
-        )
+    In polar coordinates the angle turns at ω and the squared radius obeys a logistic equation
+    (Bernoulli), which is linear in 1/R². So the flow of
+    :class:`~dmp_cpg_ros.core.canonical.hopf.AndronovHopf` has no stability limit, however large
+    ρr² is. Exact in the angle; exact in the radius for constant r, else of fourth order in the
+    length of the step.
 
-    def rollout(
-        self,
-        times: ArrayLike,
-        command: RhythmicInput | None = None,
-        state: RhythmicState | None = None,
-    ) -> Trajectory:
-        """Run the primitive with a constant input.
+    Parameters
+    ----------
+    x : ndarray (2,)
+        State at the start.
+    omega, rho : float
+        ω [rad/s] and ρ [1/s].
+    radii : ndarray (5,)
+        r at the nodes.
+    grid : StepGrid
+        With five nodes.
 
-        Parameters
-        ----------
-        times : array_like (m,)
-            Increasing times; the state holds at the first [s].
-        command : RhythmicInput, optional
-            The demonstration's centre, amplitude and speed without.
-        state : RhythmicState, optional
-            Initial state; on the limit cycle of the command at phase 0 without.
+    Returns
+    -------
+    ndarray (3, 2)
+    """
+    squared = float(x @ x)
+    growth = np.ones(3)
+    if squared > 0.0:
+        density, half = grid.density, 0.5 * grid.length
+        middle = _squared_radius(squared, rho, radii[:3], density[:3], half)
+        end = _squared_radius(middle, rho, radii[2:], density[2:], half)
+        growth[1:] = np.sqrt(np.array([middle, end]) / squared)
+    angle = omega * grid.scaled[::2]
+    turned = x @ phase_generator().T
+    return growth[:, None] * (np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * turned)
 
-        Returns
-        -------
-        Trajectory
-        """
-        command = command or self.default_input()
-        states = [state or self.initial_state(0.0, command)]
-        times = np.asarray(times, dtype=float)
-        for dt in np.diff(times):
-            states.append(self.step(states[-1], command, float(dt)))
-        return Trajectory(
-            times,
-            np.array([s.position for s in states]),
-            np.array([s.velocity for s in states]),
-            np.array([self.acceleration(s, command) for s in states]),
-        )
 
-    def _check(self, command: RhythmicInput) -> None:
-        for name, value in (('amplitude', command.amplitude), ('tau', command.tau)):
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f'{name} = {value!r} must be a positive finite number')
+def _squared_radius(squared: float, rho: float, radii: Array, density: Array, length: float
+                    ) -> float:
+    """Squared radius after a step: 1/R² = e^{−P}/R₀² + ∫ e^{p − P}/r² dp, p = 2ρ ∫ r² ds.
+
+    P is p at the end. 1/r² is replaced by the quadratic in p through three nodes, and the integral
+    is then taken exactly.
+    """
+    rate = 2.0 * rho * radii**2 * density  # dp/du at the nodes
+    p_middle = length * float(rate @ (5.0, 8.0, -1.0)) / 24.0
+    p_end = length * float(rate @ (1.0, 4.0, 1.0)) / 6.0
+    values = 1.0 / radii**2
+    # Newton's divided differences
+    slope = (values[1] - values[0]) / p_middle
+    bend = ((values[2] - values[1]) / (p_end - p_middle) - slope) / p_end
+    one = -np.expm1(-p_end)  # ∫ e^{p − P} dp
+    first = p_end - one  # ∫ e^{p − P} p dp
+    second = p_end**2 - 2.0 * first  # ∫ e^{p − P} p² dp
+    integral = values[0] * one + slope * first + bend * (second - p_middle * first)
+    return float(1.0 / (np.exp(-p_end) / squared + integral))

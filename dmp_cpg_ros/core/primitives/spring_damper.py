@@ -69,13 +69,11 @@ class SpringDamper:
             values = np.atleast_1d(np.array(getattr(self, name), dtype=float))
             if values.ndim != 1 or not np.all(np.isfinite(values)) or not np.all(values > 0.0):
                 raise ParameterError(
-                    f'{name} must be positive finite numbers, not {values.tolist()}'
-                )
+                    f'{name} must be positive finite numbers, not {values.tolist()}')
             object.__setattr__(self, name, values)
         if self.stiffness.shape != self.damping.shape:
             raise ParameterError(
-                f'{len(self.stiffness)} stiffnesses do not match {len(self.damping)} dampings'
-            )
+                f'{len(self.stiffness)} stiffnesses do not match {len(self.damping)} dampings')
         if self.form not in FORMS:
             raise ParameterError(f'form must be one of {", ".join(FORMS)}, not {self.form!r}')
 
@@ -83,29 +81,17 @@ class SpringDamper:
         """The same with one entry per degree of freedom; one number serves for all. Raises
         ParameterError if there is neither one entry nor one per degree of freedom.
         """
-        return SpringDamper(
-            columns(self.stiffness, dofs, 'stiffness'),
-            columns(self.damping, dofs, 'damping'),
-            self.form,
-        )
+        return SpringDamper(columns(self.stiffness, dofs, 'stiffness'),
+                            columns(self.damping, dofs, 'damping'), self.form)
 
     def groups(self) -> list[tuple[float, float, NDArray[np.int_]]]:
         """Degrees of freedom that share their gains: k, b and their indices."""
         pairs = np.stack([self.stiffness, self.damping], axis=1)
-        return [
-            (float(k), float(b), np.flatnonzero(np.all(pairs == (k, b), axis=1)))
-            for k, b in np.unique(pairs, axis=0)
-        ]
+        return [(float(k), float(b), np.flatnonzero(np.all(pairs == (k, b), axis=1)))
+                for k, b in np.unique(pairs, axis=0)]
 
-    def acceleration(
-        self,
-        position: Array,
-        velocity: Array,
-        goal: Array,
-        force: Array,
-        tau: ArrayLike = 1.0,
-        tau_rate: ArrayLike = 0.0,
-    ) -> Array:
+    def acceleration(self, position: Array, velocity: Array, goal: Array, force: Array,
+                     tau: ArrayLike = 1.0, tau_rate: ArrayLike = 0.0) -> Array:
         """Acceleration ÿ of the continuous system.
 
         Parameters
@@ -119,23 +105,14 @@ class SpringDamper:
         -------
         ndarray (..., n)
         """
-        tau, tau_rate = (
-            np.asarray(tau, dtype=float)[..., None],
-            np.asarray(tau_rate, dtype=float)[..., None],
-        )
+        tau, tau_rate = (np.asarray(v, dtype=float)[..., None] for v in (tau, tau_rate))
         spring = self.stiffness * (goal - position) + force
         if self.form == 'printed':
             return (spring - self.damping * velocity) / tau
         return spring / tau**2 - (self.damping + tau_rate) * velocity / tau
 
-    def required_force(
-        self,
-        position: Array,
-        velocity: Array,
-        acceleration: Array,
-        goal: Array,
-        tau: ArrayLike = 1.0,
-    ) -> Array:
+    def required_force(self, position: Array, velocity: Array, acceleration: Array, goal: Array,
+                       tau: ArrayLike = 1.0) -> Array:
         """Force f that makes the system follow a movement at constant τ.
 
         Parameters
@@ -155,9 +132,8 @@ class SpringDamper:
             return tau * acceleration + self.damping * velocity - spring
         return tau**2 * acceleration + tau * self.damping * velocity - spring
 
-    def step(
-        self, position: Array, velocity: Array, goals: Array, forces: Array, grid: StepGrid
-    ) -> tuple[Array, Array]:
+    def step(self, position: Array, velocity: Array, goals: Array, forces: Array, grid: StepGrid
+             ) -> tuple[Array, Array]:
         """Advance by one step; fourth order in both forms.
 
         The scaled form is solved exactly for the quadratic through the drive k g + f at the nodes,
@@ -182,29 +158,10 @@ class SpringDamper:
         drives = self.stiffness * goals + forces
         if self.form == 'printed':
             return self._runge_kutta(position, velocity, drives, grid)
-        y, z = self.advance_scaled(position, grid.tau[0] * velocity, drives, grid.length)
+        y, z = quadratic_drive_step(
+            self.stiffness, self.damping, self.propagator(grid.length), position,
+            grid.tau[0] * velocity, drives, grid.length)
         return y, z / grid.tau[-1]
-
-    def advance_scaled(
-        self, y: Array, z: Array, drives: Array, length: float
-    ) -> tuple[Array, Array]:
-        """Solve y' = z, z' = u(s) − k y − b z for the quadratic u through three even nodes.
-
-        Parameters
-        ----------
-        y, z : ndarray (n,)
-            State at s = 0.
-        drives : ndarray (3, n)
-            u at 0, length/2 and length.
-        length : float
-            Length of the step in s [s].
-
-        Returns
-        -------
-        y, z : ndarray (n,)
-        """
-        k, b = self.stiffness, self.damping
-        return quadratic_drive_step(k, b, self.propagator(length), y, z, drives, length)
 
     def follow(self, state: SpringState, goal: Array, goal_velocity: Array, dt: float
                ) -> SpringState:
@@ -228,9 +185,8 @@ class SpringDamper:
         (all_a, all_b), (all_c, all_d) = self.propagator(dt).tolist()
         position, velocity = [], []
         for y, y_dot, at, rate, a, b, c, d in zip(
-            state.position.tolist(), state.velocity.tolist(), goal.tolist(),
-            goal_velocity.tolist(), all_a, all_b, all_c, all_d, strict=True,
-        ):  # fmt: skip
+                state.position.tolist(), state.velocity.tolist(), goal.tolist(),
+                goal_velocity.tolist(), all_a, all_b, all_c, all_d, strict=True):
             error, error_rate = y - (at - rate * dt), y_dot - rate
             position.append(at + a * error + b * error_rate)
             velocity.append(rate + c * error + d * error_rate)
@@ -253,39 +209,28 @@ class SpringDamper:
         if E is None:
             if len(self._propagators) > 256:
                 self._propagators.clear()
-            E = self._propagators[length] = spring_exponential(
-                self.stiffness, self.damping, length
-            )
+            E = spring_exponential(self.stiffness, self.damping, length)
+            self._propagators[length] = E
         return E
 
-    def _runge_kutta(
-        self, y: Array, v: Array, drives: Array, grid: StepGrid
-    ) -> tuple[Array, Array]:
+    def _runge_kutta(self, y: Array, v: Array, drives: Array, grid: StepGrid
+                     ) -> tuple[Array, Array]:
         """One step of the classical fourth-order method on the printed form."""
-        k, b, h = self.stiffness, self.damping, grid.length
-        first, middle, last = drives
-        tau_0, tau_m, tau_1 = grid.tau
-        a_1 = (first - k * y - b * v) / tau_0
-        v_2 = v + 0.5 * h * a_1
-        a_2 = (middle - k * (y + 0.5 * h * v) - b * v_2) / tau_m
-        v_3 = v + 0.5 * h * a_2
-        a_3 = (middle - k * (y + 0.5 * h * v_2) - b * v_3) / tau_m
-        v_4 = v + h * a_3
-        a_4 = (last - k * (y + h * v_3) - b * v_4) / tau_1
-        return y + h / 6.0 * (v + 2.0 * v_2 + 2.0 * v_3 + v_4), v + h / 6.0 * (
-            a_1 + 2.0 * a_2 + 2.0 * a_3 + a_4
-        )
+        def slope(state: Array, drive: Array, tau: float) -> Array:
+            spring = drive - self.stiffness * state[0] - self.damping * state[1]
+            return np.stack([state[1], spring / tau])
+
+        s, h = np.stack([y, v]), grid.length
+        k_1 = slope(s, drives[0], grid.tau[0])
+        k_2 = slope(s + 0.5 * h * k_1, drives[1], grid.tau[1])
+        k_3 = slope(s + 0.5 * h * k_2, drives[1], grid.tau[1])
+        k_4 = slope(s + h * k_3, drives[2], grid.tau[2])
+        position, velocity = s + h / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
+        return position, velocity
 
 
-def quadratic_drive_step(
-    k: float | Array,
-    b: float | Array,
-    propagator: Array,
-    y: Array,
-    z: Array,
-    drives: Array,
-    length: float | Array,
-) -> tuple[Array, Array]:
+def quadratic_drive_step(k: float | Array, b: float | Array, propagator: Array, y: Array, z: Array,
+                         drives: Array, length: float | Array) -> tuple[Array, Array]:
     """Exact solution of y' = z, z' = u(s) − k y − b z for a quadratic u; all arguments broadcast.
 
     Parameters
@@ -312,10 +257,9 @@ def quadratic_drive_step(
     a1 = (u1 - 2.0 * b * a2) / k
     a0 = (first - b * a1 - 2.0 * a2) / k
     y, z = y - a0, z - a1
-    return (
-        propagator[0, 0] * y + propagator[0, 1] * z + a0 + length * (a1 + length * a2),
-        propagator[1, 0] * y + propagator[1, 1] * z + a1 + 2.0 * length * a2,
-    )
+    (a, b), (c, d) = propagator
+    return (a * y + b * z + a0 + length * (a1 + length * a2),
+            c * y + d * z + a1 + 2.0 * length * a2)
 
 
 def spring_exponential(k: ArrayLike, b: ArrayLike, length: ArrayLike) -> Array:

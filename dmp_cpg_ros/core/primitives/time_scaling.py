@@ -48,48 +48,19 @@ class StepGrid:
     length: float
     density: Array
 
+    def halved(self) -> StepGrid:
+        """Every second node."""
+        return StepGrid(
+            self.elapsed[::2], self.scaled[::2], self.tau[::2], self.length, self.density[::2])
 
-@dataclass(frozen=True)
-class TimeScaling:
-    """τ as a filtered reference: τ̇ = α_τ (τ_ext − τ), with scaled time in closed form.
 
-    Attributes
-    ----------
-    rate : float
-        α_τ > 0 [1/s].
-
-    Raises
-    ------
-    ParameterError
-        If the rate is not a positive finite number.
-    """
-
-    rate: float
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        FirstOrderFilter(self.rate)
-
-    def tau_at(self, tau: float, command: float, elapsed: ArrayLike) -> Array:
-        """τ some time after the start of a step with the command held.
-
-        Parameters
-        ----------
-        tau, command : float
-            τ at the start and τ_ext, both positive.
-        elapsed : array_like (...)
-            Time since the start of the step [s].
-
-        Returns
-        -------
-        ndarray (...)
-        """
-        return FirstOrderFilter(self.rate).at(tau, command, elapsed)
+class TimeScaling(FirstOrderFilter):
+    """τ as a filtered reference: τ̇ = α_τ (τ_ext − τ), with scaled time in closed form."""
 
     def scaled_time(self, tau: float, command: float, elapsed: ArrayLike) -> Array:
         """Scaled time s = ∫ dt/τ(t) since the start of the step.
 
-        Closed form s = t/τ_ext + ln(τ(t)/τ(0))/(α τ_ext), with τ(t) from :meth:`tau_at`.
+        Closed form s = t/τ_ext + ln(τ(t)/τ(0))/(α τ_ext), with τ(t) from :meth:`at`.
 
         Parameters
         ----------
@@ -155,16 +126,14 @@ class TimeScaling:
         if tau == command:
             elapsed, taus = fraction * dt, np.full(count, tau)
             scaled = elapsed / tau
-        elif form == 'scaled':
-            scaled = fraction * float(self.scaled_time(tau, command, dt))
-            elapsed = self.real_time(tau, command, scaled)
-            taus = self.tau_at(tau, command, elapsed)
         else:
-            elapsed = fraction * dt
-            scaled, taus = (
-                self.scaled_time(tau, command, elapsed),
-                self.tau_at(tau, command, elapsed),
-            )
+            if form == 'scaled':
+                scaled = fraction * float(self.scaled_time(tau, command, dt))
+                elapsed = self.real_time(tau, command, scaled)
+            else:
+                elapsed = fraction * dt
+                scaled = self.scaled_time(tau, command, elapsed)
+            taus = self.at(tau, command, elapsed)
         if form == 'scaled':
             return StepGrid(elapsed, scaled, taus, float(scaled[-1]), np.ones(count))
         return StepGrid(elapsed, scaled, taus, dt, 1.0 / taus)

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import isnan
 
 import numpy as np
@@ -48,13 +49,13 @@ class SensorReadings:
     specific_force_in_base: Array
     foot_force: Array
 
-    @property
+    @cached_property
     def imu_is_usable(self) -> bool:
         """Whether gyroscope and accelerometer both say something possible."""
         return _within(self.rate_in_base.tolist(), FASTEST_TURN) and _within(
             self.specific_force_in_base.tolist(), HARDEST_BLOW)
 
-    @property
+    @cached_property
     def usable_legs(self) -> tuple[bool, ...]:
         """Whether angles and velocities of each leg's joints are possible."""
         q, q_dot = self.joint_position.tolist(), self.joint_velocity.tolist()
@@ -65,7 +66,7 @@ class SensorReadings:
             for i in _FIRST_JOINT
         )
 
-    @property
+    @cached_property
     def usable_contacts(self) -> tuple[bool, ...]:
         """Whether each foot's force is possible."""
         limit = LARGEST_FORCE

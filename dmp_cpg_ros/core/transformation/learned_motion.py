@@ -30,8 +30,7 @@ from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
-from dmp_cpg_ros.core.primitives.states import RhythmicInput, RhythmicState
+from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput, RhythmicPrimitive, RhythmicState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import FootPath

@@ -25,7 +25,8 @@ from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.learning.learning import FitOptions, ridge_regression, smallest_good
 from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, derivatives
-from dmp_cpg_ros.core.primitives.states import DiscreteInput, RhythmicInput
+from dmp_cpg_ros.core.primitives.discrete import DiscreteInput
+from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput
 from dmp_cpg_ros.paper.algebra import transformed
 from dmp_cpg_ros.paper.homogeneous import Homogeneous
 
@@ -346,6 +347,27 @@ def test_forces_of_noisy_samples_with_a_gap_are_refused_and_responses_are_not(me
         learn_discrete(recorded, 25, options=FitOptions(method))
     learned = learn_discrete(recorded, 10, options=FitOptions(ridge=1e-4))
     assert np.abs(learned.rollout(clean.times).positions - clean.positions).max() < 0.2
+
+
+@pytest.mark.parametrize('method', ['response', 'joint', 'local'])
+@pytest.mark.parametrize('gap', [0.0, 0.3])
+@pytest.mark.parametrize('noise', [0.0, 1e-3, 1e-2])
+def test_what_is_learned_from_uneven_samples_is_right_or_refused(method, gap, noise):
+    rng, clean = np.random.default_rng(1), straight_reach([0.0, 1.0], [1.0, -1.0], dt=0.002)
+    kept = np.sort(rng.choice(len(clean.times), 350, replace=False))
+    kept = kept[np.abs(clean.times[kept] - 0.5) > 0.5 * gap]
+    recorded = Demonstration(
+        clean.times[kept], clean.positions[kept] + noise * rng.normal(size=(len(kept), 2)))
+    try:
+        learned = learn_discrete(recorded, 25, options=FitOptions(method))
+    except DataError as error:
+        assert 'gaps' in str(error) and (gap or noise)
+    else:
+        made, size = learned.rollout(clean.times).positions, np.ptp(clean.positions, axis=0)
+        errors = np.abs(made - clean.positions) / size
+        assert errors[kept].max() < 0.75
+        assert (np.ptp(made, axis=0) / size).max() < 1.4
+        assert gap or errors.max() < 0.75
 
 
 @pytest.mark.parametrize('goal', [np.full(2, np.nan), np.zeros(5), np.zeros(1)])

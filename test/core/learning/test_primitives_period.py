@@ -94,6 +94,19 @@ def test_less_than_a_cycle_and_a_half_is_refused(part, shape):
         find_period(Demonstration(times, SHAPES[shape](np.pi * times + 0.4)))
 
 
+@pytest.mark.parametrize('cycles', [1.1, 1.3])
+@pytest.mark.parametrize('shape', ['pulses', 'two harmonics'])
+@pytest.mark.parametrize('phase', [0.4, 1.5, 2.5])
+def test_a_little_more_than_a_cycle_is_refused_or_right(cycles, shape, phase):
+    times = np.linspace(0.0, 2.0 * cycles, 400)
+    shapes = {**SHAPES, 'two harmonics': lambda u: np.sin(u) + 0.4 * np.cos(2.0 * u)}
+    recording = Demonstration(times, shapes[shape](np.pi * times + phase))
+    try:
+        assert find_period(recording) == pytest.approx(2.0, rel=1e-3)
+    except DataError as error:
+        assert '1.5 cycles' in str(error)
+
+
 def test_a_gap_in_uneven_samples_does_not_matter():
     times = np.sort(np.random.default_rng(1).uniform(0.0, 5.0, 500))
     times = times[(times < 2.0) | (times > 2.9)]

@@ -12,12 +12,13 @@ from core_examples import geometry, quadruped
 
 from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.modes.motion import LegMotion, phase_at
+from dmp_cpg_ros.core.modes.leg_control import LegMotion
 from dmp_cpg_ros.core.modes.motion_library import (
     Movements,
     folded_length,
     leg_angles,
     lying_posture,
+    phase_at,
     raised_posture,
     standing_posture,
 )

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.primitives.basis import GaussianBases
-from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
+from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
-from dmp_cpg_ros.core.primitives.states import DiscreteInput
 from dmp_cpg_ros.core.primitives.time_scaling import scaled_times
 
 DECAY = 4.6
@@ -177,6 +176,17 @@ def test_a_step_leaves_the_given_state_alone():
     p.step(state, DiscreteInput(p.goal + 1.0, 2.0), 0.1)
     for kept, now in zip(copies, (state.position, state.velocity, state.goal), strict=True):
         np.testing.assert_array_equal(kept, now)
+
+
+@pytest.mark.parametrize('tau', [0.5, 1.0])
+def test_a_rollout_between_few_times_is_that_between_many(tau):
+    p = primitive()
+    command, times = DiscreteInput(p.goal + 0.5, tau), np.linspace(0.0, tau, 801)
+    exact, few = p.rollout(times, command), np.array([0, 30, 400, 800])
+    made = p.rollout(times[few], command)
+    scale = np.ptp(exact.positions)
+    np.testing.assert_allclose(made.positions, exact.positions[few], atol=1e-4 * scale)
+    np.testing.assert_allclose(made.velocities, exact.velocities[few], atol=1e-2 * scale)
 
 
 @pytest.mark.parametrize(

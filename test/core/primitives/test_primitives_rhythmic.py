@@ -15,10 +15,13 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.primitives.basis import VonMisesBases
-from dmp_cpg_ros.core.primitives.hopf_flow import hopf_flow
-from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
+from dmp_cpg_ros.core.primitives.rhythmic import (
+    RhythmicInput,
+    RhythmicPrimitive,
+    hopf_flow,
+)
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
-from dmp_cpg_ros.core.primitives.states import RhythmicInput
+from dmp_cpg_ros.core.primitives.time_scaling import StepGrid
 
 OMEGA = 2.0 * np.pi
 
@@ -37,7 +40,8 @@ def primitive(seed=0, dofs=2, form='scaled', count=9):
 
 def flow(x, omega, rho, radius_of, h):
     nodes = np.linspace(0.0, h, 5)
-    return hopf_flow(x, omega, rho, np.array([radius_of(s) for s in nodes]), nodes, np.ones(5), h)
+    grid = StepGrid(nodes, nodes, np.ones(5), h, np.ones(5))
+    return hopf_flow(x, omega, rho, np.array([radius_of(s) for s in nodes]), grid)
 
 
 def runge_kutta(x, omega, rho, radius_of, h, steps=400):
@@ -217,6 +221,17 @@ def test_at_rest_in_the_origin_there_is_no_force():
     for _ in range(200):
         state = p.step(state, p.default_input(), 0.01)
     np.testing.assert_allclose(state.position, p.centre, atol=1e-6)
+
+
+@pytest.mark.parametrize('tau', [0.5, 1.0])
+def test_a_rollout_between_few_times_is_that_between_many(tau):
+    p = primitive()
+    command, times = RhythmicInput(p.centre + 0.5, 0.7, tau), np.linspace(0.0, tau, 801)
+    exact, few = p.rollout(times, command), np.array([0, 30, 400, 800])
+    made = p.rollout(times[few], command)
+    scale = np.ptp(exact.positions)
+    np.testing.assert_allclose(made.positions, exact.positions[few], atol=1e-4 * scale)
+    np.testing.assert_allclose(made.velocities, exact.velocities[few], atol=1e-2 * scale)
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def test_scaled_time_grows_at_one_over_tau(rate, tau, command, t):
     scaling, h = TimeScaling(rate), 1e-6
     ends = scaling.scaled_time(tau, command, [t - h, t + h])
     np.testing.assert_allclose(
-        np.diff(ends)[0] / (2.0 * h), 1.0 / scaling.tau_at(tau, command, t), rtol=1e-6
+        np.diff(ends)[0] / (2.0 * h), 1.0 / scaling.at(tau, command, t), rtol=1e-6
     )
     assert scaling.scaled_time(tau, command, 0.0) == 0.0
 
@@ -70,7 +70,7 @@ def test_grid_nodes_agree_with_the_closed_forms(tau, command, dt, form):
     np.testing.assert_allclose(
         grid.scaled, scaling.scaled_time(tau, command, grid.elapsed), atol=1e-10
     )
-    np.testing.assert_allclose(grid.tau, scaling.tau_at(tau, command, grid.elapsed), rtol=1e-12)
+    np.testing.assert_allclose(grid.tau, scaling.at(tau, command, grid.elapsed), rtol=1e-12)
     even = grid.scaled if form == 'scaled' else grid.elapsed
     np.testing.assert_allclose(even, np.linspace(0.0, grid.length, 5), atol=1e-12)
 
@@ -86,7 +86,7 @@ def test_grid_refuses_what_has_no_meaning(tau, command, dt):
 
 def test_scaled_times_of_a_profile_match_the_closed_form():
     scaling, times = TimeScaling(2.0), np.linspace(0.0, 1.0, 30)
-    by_quadrature = scaled_times(times, lambda t: float(scaling.tau_at(0.5, 2.0, t)))
+    by_quadrature = scaled_times(times, lambda t: float(scaling.at(0.5, 2.0, t)))
     np.testing.assert_allclose(by_quadrature, scaling.scaled_time(0.5, 2.0, times), atol=1e-13)
 
 
