@@ -178,15 +178,17 @@ class WalkingLoop:
     ) -> JointTargets:
         """Targets of all legs."""
         legs = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
-        return JointTargets(*(
-            np.concatenate([getattr(leg, name) for leg in legs])
-            for name in ('position', 'velocity', 'effort')))
+        return JointTargets(
+            np.concatenate([leg.position for leg in legs]),
+            np.concatenate([leg.velocity for leg in legs]),
+            np.concatenate([leg.effort for leg in legs]))
 
     def _leg(
         self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
     ) -> JointTargets:
+        canon = self.canon
         self.leg_states[i], targets = self.legs[i].step(
-            self.leg_states[i], self.canon.gait, self.x, x_dot, self.r, feedback,
+            self.leg_states[i], canon.gait, canon.x, x_dot, self.r, feedback,
             state.joint_position, state.joint_velocity, dt)
         return targets
 

@@ -92,9 +92,9 @@ class AndronovHopf:
             turned = x @ phase_generator().T
             return np.asarray(np.asarray(omega)[..., None] * turned + growth[..., None] * x)
         z = np.ascontiguousarray(x).view(complex)[..., 0]
-        linear = self.rho * self.radius**2 - 1j * omega
-        rate = (linear - self.rho * (z.real * z.real + z.imag * z.imag)) * z
-        return np.ravel(rate).view(float).reshape(x.shape)
+        x_1, x_2, linear = z.real, z.imag, self.rho * self.radius**2 - 1j * omega
+        rate = (linear - self.rho * (x_1 * x_1 + x_2 * x_2)) * z
+        return rate.ravel().view(float).reshape(x.shape)
 
     def jacobian(self, x: Array, omega: float | Array) -> Array:
         """Jacobian A = ∂f/∂x = ω S + ρ (r² − |x|²) I − 2ρ x xᵀ.

@@ -15,7 +15,7 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from math import atan2, ceil, cos, sin
+from math import atan2, ceil, cos, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
-from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned, wrapped
+from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned
 from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
@@ -298,7 +298,7 @@ class GaitNetwork:
             for (x_1, x_2), place in zip(x.tolist(), places, strict=True)
         ]
         mean = atan2(sum(map(sin, relative)), sum(map(cos, relative)))
-        return wrapped(np.array(relative) - mean)
+        return np.array([(angle - mean + pi) % (2.0 * pi) - pi for angle in relative])
 
 
 def _turned(x: Array, phases: Array | None) -> Array:

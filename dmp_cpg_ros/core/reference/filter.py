@@ -141,7 +141,7 @@ class ReferenceSystem:
 
     def __init__(self, parameters: ReferenceParameters) -> None:
         """Keep the parameters."""
-        self.parameters = parameters
+        self.parameters, self._filter = parameters, FirstOrderFilter(parameters.alpha_r)
 
     def step(self, r: Array, r_ext: Array, dt: float) -> Array:
         """Advance: r(t + dt) = r_ext + (r − r_ext) exp(−α_r dt), less where v changes too fast.
@@ -159,13 +159,13 @@ class ReferenceSystem:
         -------
         ndarray (3,)
         """
-        plain = FirstOrderFilter(self.parameters.alpha_r)
-        following = plain.step(r, r_ext, dt)
+        kept = self._filter.kept(dt)
+        following = r_ext + (r - r_ext) * kept
         change, most = following[:2] - r[:2], self.parameters.max_acceleration * dt
         if change @ change <= most * most:
             return following
         if following[:2] @ following[:2] <= r[:2] @ r[:2]:
-            most = max(most, float(1.0 - plain.kept(dt)) * float(np.sqrt(r[:2] @ r[:2])))
+            most = max(most, float(1.0 - kept) * float(np.sqrt(r[:2] @ r[:2])))
         if change @ change > most * most * (1.0 + 1e-12):
             following[:2] = r[:2] + change * (most / float(np.sqrt(change @ change)))
         return following
