@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,8 +95,7 @@ class PostureFeedback:
             self.correction, float(self.foot_force[i]))
 
 
-@dataclass(frozen=True)
-class PostureState:
+class PostureState(NamedTuple):
     """The controller's own state.
 
     Attributes
@@ -176,9 +176,7 @@ class PostureController:
         feedback : PostureFeedback
         """
         p, leg_length = self.parameters, self.scale.leg_length
-        reference = gait.limited(triple(r.tolist()), self.scale)
-        speed = self.scale.foot_speed(*reference)
-        omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
+        reference, omega, duty = gait.pace(r, self.scale)
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
         activity = activities_step(
             memory.activity, rates, gait.own_omegas(omega), p.activity_rate, dt)

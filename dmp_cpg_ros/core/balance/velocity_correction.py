@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import atan2, exp, hypot, isnan, pi
+from typing import NamedTuple
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -16,8 +16,7 @@ SLOWEST = 0.3
 """Froude speed below which the limit of the correction shrinks no more."""
 
 
-@dataclass(frozen=True)
-class VelocityCorrection:
+class VelocityCorrection(NamedTuple):
     """Integral velocity and heading correction, slow: added to the velocity of the standing feet.
 
     Attributes

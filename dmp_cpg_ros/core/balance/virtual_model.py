@@ -23,8 +23,8 @@ of which λ is eliminated: three equations are left, with the feet's second mome
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import sqrt
+from typing import NamedTuple
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
@@ -40,8 +40,7 @@ feet well posed.
 EQUAL = (1.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True)
-class BodyMotion:
+class BodyMotion(NamedTuple):
     """What the virtual model takes of the body, in the frame of the ground.
 
     Attributes

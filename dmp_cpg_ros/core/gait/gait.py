@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups
 from dmp_cpg_ros.core.gait.speed_limit import within_limit
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import Triple
+from dmp_cpg_ros.core.maths.vec3 import Triple, triple
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
@@ -66,6 +66,24 @@ class BodyScale:
         )
 
 
+class Pace(NamedTuple):
+    """What a gait makes of a reference.
+
+    Attributes
+    ----------
+    velocity : tuple of float
+        The reference within the gait's limit, v_x, v_y [m/s], γ [rad/s].
+    omega : float
+        Angular frequency ω of the gait [rad/s].
+    duty : float
+        Duty factor β.
+    """
+
+    velocity: Triple
+    omega: float
+    duty: float
+
+
 class CycleOfLegs:
     """What a gait and a blend of two have in common.
 
@@ -80,6 +98,35 @@ class CycleOfLegs:
 
     rest: float
     highest_speed: float
+    _paced: ClassVar[Any] = None
+
+    def omega(self, foot_speed: float, scale: BodyScale) -> float:
+        """Angular frequency ω of the oscillators at a foot speed [rad/s].
+
+        Parameters
+        ----------
+        foot_speed : float
+            As from :meth:`BodyScale.foot_speed` [m/s].
+        scale : BodyScale
+            The robot's lengths.
+        """
+        raise NotImplementedError
+
+    def duty(self, foot_speed: float, scale: BodyScale) -> float:
+        """Duty factor β at a foot speed."""
+        raise NotImplementedError
+
+    def pace(self, r: Array, scale: BodyScale) -> Pace:
+        """Velocity, frequency and duty factor at a reference (v_x, v_y, γ), ndarray (3,); the
+        last are kept, for the body and its legs ask in turn.
+        """
+        asked = (r.tolist(), scale)
+        if self._paced is None or self._paced[0] != asked:
+            velocity = self.limited(triple(asked[0]), scale)
+            speed = scale.foot_speed(*velocity)
+            pace = Pace(velocity, self.omega(speed, scale), self.duty(speed, scale))
+            object.__setattr__(self, '_paced', (asked, pace))
+        return self._paced[1]
 
     def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
         """Velocity (v_x, v_y, γ) that the gait does of one that is asked for [m/s], [rad/s], see
@@ -192,6 +239,7 @@ class Gait(CycleOfLegs):
         if cadence_scale == 1.0:
             return self
         scaled = copy(self)
+        object.__setattr__(scaled, '_paced', None)
         cadence = self.cadence * cadence_scale
         object.__setattr__(scaled, 'cadence', cadence)
         object.__setattr__(scaled, 'cadence_scale', self.cadence_scale * cadence_scale)

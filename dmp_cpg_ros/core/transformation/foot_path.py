@@ -17,8 +17,8 @@ through a first-order filter as the paper uses for amplitudes (:func:`activity_s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import cos, exp, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,7 @@ of the ground before it is moved along it.
 """
 
 
-@dataclass(frozen=True)
-class FootPath:
+class FootPath(NamedTuple):
     """Path of one foot for a held reference.
 
     Attributes

@@ -9,7 +9,7 @@ Jacobian.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,8 +110,7 @@ class LegState:
     motion: Any = None
 
 
-@dataclass(frozen=True)
-class LegFeedback:
+class LegFeedback(NamedTuple):
     """The part of the body's feedback that one leg's path takes.
 
     Attributes
@@ -171,7 +170,7 @@ class LegPrimitive:
         self.stumble_lift = parameters.stumble_lift * description.stance_height
         self.stumble_lag = parameters.stumble_lag * description.stance_height
         self.touch_force = LOADED * quarter_weight(description)
-        self.inertia = np.asarray(geometry.rotor_inertia, dtype=float)
+        self._inertia = [float(J) for J in geometry.rotor_inertia]
         self.transformation = SpringDamper(
             np.full(3, parameters.stiffness), np.full(3, parameters.damping))
 
@@ -214,15 +213,13 @@ class LegPrimitive:
             g_θ [rad] and g_θ̇ [rad/s].
         """
         p = self.parameters
-        v_x, v_y, gamma = gait.limited(r.tolist(), self.scale)
-        speed = self.scale.foot_speed(v_x, v_y, gamma)
-        duty = gait.duty(speed, self.scale)
-        omega = gait.own_omegas(gait.omega(speed, self.scale))[self.place]
+        reference, omega, duty = gait.pace(r, self.scale)
+        omega = gait.own_omegas(omega)[self.place]
         x_1, x_2 = x.tolist()
         rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
-        path = self._path((v_x, v_y, gamma), omega, duty, activity, state.stumble, feedback)
+        path = self._path(reference, omega, duty, activity, state.stumble, feedback)
         motion, foot, path_velocity = self._motion.step(
             state.motion, path, position, rate, dt)
         offset_rate, stumble = self._offset_rate(
@@ -304,13 +301,14 @@ class LegPrimitive:
         -------
         JointTargets
         """
-        joints = state.joints if measured is None else measured
-        acceleration = self.transformation.acceleration(
-            joints.position, joints.velocity - goal_velocity, goal, np.zeros(3)
-        )
-        return JointTargets(
-            joints.position, joints.velocity, self.inertia * acceleration + feedback
-        )
+        joints, p = state.joints if measured is None else measured, self.parameters
+        effort = [
+            J * (p.stiffness * (g - y) - p.damping * (y_dot - g_dot)) + tau
+            for J, y, y_dot, g, g_dot, tau in zip(
+                self._inertia, joints.position.tolist(), joints.velocity.tolist(), goal.tolist(),
+                goal_velocity.tolist(), feedback.tolist(), strict=True)
+        ]
+        return JointTargets(joints.position, joints.velocity, np.array(effort))
 
 
 def body_scale(description: RobotDescription) -> BodyScale:

@@ -22,8 +22,8 @@ body up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import exp, hypot, pi
+from typing import NamedTuple
 
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.transformation.foot_path import LOWERING, FootPath
@@ -73,8 +73,7 @@ POST_STUMBLE_SWINGS = 2
 """Swings after a stumble in which the foot steps higher from the start."""
 
 
-@dataclass(frozen=True)
-class SwingProgress:
+class SwingProgress(NamedTuple):
     """How far a swinging foot has come, along the direction in which the body moves over it.
 
     Attributes
@@ -139,8 +138,7 @@ def swing_progress(
     )
 
 
-@dataclass(frozen=True)
-class Stumble:
+class Stumble(NamedTuple):
     """State of the stumbling reflex of one foot.
 
     Attributes
