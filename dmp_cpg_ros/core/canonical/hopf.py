@@ -87,13 +87,14 @@ class AndronovHopf:
         ndarray (..., 2)
             ẋ [1/s].
         """
-        if np.iscomplexobj(x):  # of a derivative by complex steps
-            growth = self.rho * (self.radius**2 - np.sum(x * x, axis=-1))
-            turned = x @ phase_generator().T
-            return np.asarray(np.asarray(omega)[..., None] * turned + growth[..., None] * x)
+        squared = x * x
+        at_origin = self.rho * self.radius**2
+        damping = self.rho * (squared[..., 0] + squared[..., 1])
+        if x.dtype.kind == 'c':  # a step of a derivative: x₁ and x₂ are no parts of one number
+            turning = np.asarray(omega)[..., None] * (x @ phase_generator().T)
+            return np.asarray(turning + (at_origin - damping)[..., None] * x)
         z = np.ascontiguousarray(x).view(complex)[..., 0]
-        x_1, x_2, linear = z.real, z.imag, self.rho * self.radius**2 - 1j * omega
-        rate = (linear - self.rho * (x_1 * x_1 + x_2 * x_2)) * z
+        rate = (at_origin - 1j * omega - damping) * z
         return rate.ravel().view(float).reshape(x.shape)
 
     def jacobian(self, x: Array, omega: float | Array) -> Array:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,7 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, Leg
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class LegControlState:
+class LegControlState(NamedTuple):
     """State of the leg block.
 
     Attributes

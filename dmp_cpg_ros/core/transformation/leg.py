@@ -85,8 +85,7 @@ class LegParameters(Parameters):
         'fraction of the standing height', minimum=0.005, maximum=1.0)
 
 
-@dataclass(frozen=True)
-class LegState:
+class LegState(NamedTuple):
     """State of one leg's primitive.
 
     Attributes
