@@ -8,9 +8,9 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +52,7 @@ from dmp_cpg_ros.core.transformation.leg import body_scale
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Tick:
+class Tick(NamedTuple):
     """Everything that one tick produced.
 
     Attributes
@@ -178,10 +177,9 @@ class WalkingLoop:
     ) -> JointTargets:
         """Targets of all legs."""
         legs = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
-        return JointTargets(
-            np.concatenate([leg.position for leg in legs]),
-            np.concatenate([leg.velocity for leg in legs]),
-            np.concatenate([leg.effort for leg in legs]))
+        columns = [leg.position for leg in legs] + [leg.velocity for leg in legs] + [
+            leg.effort for leg in legs]
+        return JointTargets(*np.concatenate(columns).reshape(3, -1))
 
     def _leg(
         self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,

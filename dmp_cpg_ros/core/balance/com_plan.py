@@ -38,10 +38,6 @@ from math import cos, pi, sin
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.robot_model.state import LEGS
-
-LEFT, RIGHT = (
-    tuple(LEGS.index(leg) for leg in side) for side in (('fl', 'rl'), ('fr', 'rr')))
 
 
 class LateralPlan(NamedTuple):
@@ -93,11 +89,11 @@ def lateral_plan(
     LateralPlan
     """
     along = quadrature = 0.0
-    for swinging, standing in ((RIGHT, LEFT), (LEFT, RIGHT)):
-        front, hind = (cycle_position[leg] for leg in swinging)
+    (fl, fr, rl, rr), (y_fl, y_fr, y_rl, y_rr) = cycle_position, across
+    for front, hind, standing in ((fr, rr, y_fl + y_rl), (fl, rl, y_fr + y_rr)):
         amplitude, middle = _both_swing(front, hind, 1.0 - duty)
         if amplitude != 0.0:
-            amplitude *= 0.5 * sum(across[leg] for leg in standing)
+            amplitude *= 0.5 * standing
             along += amplitude * cos(2.0 * pi * middle)
             quadrature += amplitude * sin(2.0 * pi * middle)
     if along == quadrature == 0.0:

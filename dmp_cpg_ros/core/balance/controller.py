@@ -151,7 +151,7 @@ class PostureController:
 
     def step(
         self, memory: PostureState, state: RobotState, gait: GaitInForce, x: Array, x_dot: Array,
-        r: Array, dt: float,
+        r: Array, dt: float, command: BodyCommand = STANDING,
     ) -> tuple[PostureState, PostureFeedback]:
         """Compute the feedback of one tick.
 
@@ -169,6 +169,8 @@ class PostureController:
             Reference v_x, v_y [m/s], γ [rad/s].
         dt : float
             Time since the last tick [s].
+        command : BodyCommand
+            What the body does.
 
         Returns
         -------
@@ -176,10 +178,10 @@ class PostureController:
         feedback : PostureFeedback
         """
         p, leg_length = self.parameters, self.scale.leg_length
-        reference, omega, duty = gait.pace(r, self.scale)
+        reference, omega, own_omegas, duty = gait.pace(r, self.scale)
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
         activity = activities_step(
-            memory.activity, rates, gait.own_omegas(omega), p.activity_rate, dt)
+            memory.activity, rates, own_omegas, p.activity_rate, dt)
         swings = activity.tolist()
         positions = [
             gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
@@ -209,10 +211,7 @@ class PostureController:
             self._torque(body, legs, feet, load, planned, bounce, sway.acceleration),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
             np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
-            np.array(correction),
-            measured=state.joint_position,
-            foot_force=believed(state.foot_force),
-        )
+            np.array(correction), command, state.joint_position, believed(state.foot_force))
 
     def _height(self, feet: list[Triple], load: list[float]) -> float:
         """Height of the centre of mass over the ground under the feet that carry [m]."""

@@ -9,7 +9,7 @@ with α_i = 0 except where inhibition is switched on.
 
 from __future__ import annotations
 
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,4 +161,5 @@ class CanonicalSystem:
             if len(self._steps) > MOST_KEPT:
                 self._steps.clear()
             step = self._steps[key] = ExponentialStep(*self.linear_part(gains), dt)
-        return step(x, partial(self.oscillators.field, omega=omega))
+        field = self.oscillators.field
+        return step(x, lambda at: field(at, omega))

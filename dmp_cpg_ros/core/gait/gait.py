@@ -24,7 +24,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups
 from dmp_cpg_ros.core.gait.speed_limit import within_limit
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import Triple, triple
+from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
 Array = NDArray[np.float64]
@@ -75,12 +75,15 @@ class Pace(NamedTuple):
         The reference within the gait's limit, v_x, v_y [m/s], γ [rad/s].
     omega : float
         Angular frequency ω of the gait [rad/s].
+    own_omegas : list of four floats
+        Frequencies with which the legs go through their cycles [rad/s].
     duty : float
         Duty factor β.
     """
 
     velocity: Triple
     omega: float
+    own_omegas: list[float]
     duty: float
 
 
@@ -116,16 +119,23 @@ class CycleOfLegs:
         """Duty factor β at a foot speed."""
         raise NotImplementedError
 
+    def own_omegas(self, omega: float) -> list[float]:
+        """Frequencies with which the legs go through their cycles when the gait's is ω
+        [rad/s].
+        """
+        raise NotImplementedError
+
     def pace(self, r: Array, scale: BodyScale) -> Pace:
         """Velocity, frequency and duty factor at a reference (v_x, v_y, γ), ndarray (3,); the
         last are kept, for the body and its legs ask in turn.
         """
-        asked = (r.tolist(), scale)
+        asked = (*r.tolist(), scale.leg_length, scale.hip_radius)
         if self._paced is None or self._paced[0] != asked:
-            velocity = self.limited(triple(asked[0]), scale)
+            velocity = self.limited(asked[:3], scale)
             speed = scale.foot_speed(*velocity)
-            pace = Pace(velocity, self.omega(speed, scale), self.duty(speed, scale))
-            object.__setattr__(self, '_paced', (asked, pace))
+            omega, duty = self.omega(speed, scale), self.duty(speed, scale)
+            object.__setattr__(
+                self, '_paced', (asked, Pace(velocity, omega, self.own_omegas(omega), duty)))
         return self._paced[1]
 
     def limited(self, velocity: Triple, scale: BodyScale) -> Triple:

@@ -161,9 +161,11 @@ class ReferenceSystem:
         """
         kept = self._filter.kept(dt)
         following = r_ext + (r - r_ext) * kept
-        change, most = following[:2] - r[:2], self.parameters.max_acceleration * dt
-        if change @ change <= most * most:
+        most = self.parameters.max_acceleration * dt
+        change_x, change_y, _ = (following - r).tolist()
+        if change_x * change_x + change_y * change_y <= most * most:
             return following
+        change = following[:2] - r[:2]
         if following[:2] @ following[:2] <= r[:2] @ r[:2]:
             most = max(most, float(1.0 - kept) * float(np.sqrt(r[:2] @ r[:2])))
         if change @ change > most * most * (1.0 + 1e-12):

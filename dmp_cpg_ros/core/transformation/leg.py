@@ -212,8 +212,8 @@ class LegPrimitive:
             g_θ [rad] and g_θ̇ [rad/s].
         """
         p = self.parameters
-        reference, omega, duty = gait.pace(r, self.scale)
-        omega = gait.own_omegas(omega)[self.place]
+        reference, _, own_omegas, duty = gait.pace(r, self.scale)
+        omega = own_omegas[self.place]
         x_1, x_2 = x.tolist()
         rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
@@ -221,9 +221,10 @@ class LegPrimitive:
         path = self._path(reference, omega, duty, activity, state.stumble, feedback)
         motion, foot, path_velocity = self._motion.step(
             state.motion, path, position, rate, dt)
+        offset = triple(state.shift_in_base.tolist())
         offset_rate, stumble = self._offset_rate(
-            state, activity, path, position, path_velocity, feedback, dt)
-        offset = moved(triple(state.shift_in_base.tolist()), offset_rate, dt)
+            state, offset, activity, path, position, path_velocity, feedback, dt)
+        offset = moved(offset, offset_rate, dt)
         bounce = gait.bounce(position, duty, omega)
         foot = plus(plus(foot, offset), (0.0, 0.0, stumble.height - activity * bounce.height))
         velocity = plus(plus(offset_rate, path_velocity), (0.0, 0.0, stumble.rate))
@@ -243,7 +244,7 @@ class LegPrimitive:
             self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
 
     def _offset_rate(
-        self, state: LegState, activity: float, path: FootPath, position: float,
+        self, state: LegState, offset: Triple, activity: float, path: FootPath, position: float,
         path_velocity: Triple, feedback: LegFeedback, dt: float,
     ) -> tuple[Triple, Stumble]:
         """Rate of the foothold offset [m/s]: placement and stumbling reflex in swing, following
@@ -251,7 +252,7 @@ class LegPrimitive:
         """
         if dt <= 0.0:
             return (0.0, 0.0, 0.0), state.stumble
-        offset, swung = triple(state.shift_in_base.tolist()), path.swung(position)
+        swung = path.swung(position)
         measured = self.kinematics.foot(feedback.joint_position)
         target = self.kinematics.foot(state.joints.position)
         away = minus(measured, target)
