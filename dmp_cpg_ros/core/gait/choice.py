@@ -29,20 +29,13 @@ class GaitChoiceParameters(Parameters):
 
     auto_gait: bool = parameter(False, 'whether the gait is chosen by the reference speed')
     auto_gaits: tuple[str, ...] = parameter(
-        ('walk', 'trot'), 'gaits that auto_gait chooses among, from slow to fast'
-    )
+        ('walk', 'trot'), 'gaits that auto_gait chooses among, from slow to fast')
     auto_speeds: tuple[float, ...] = parameter(
-        (0.3,),
-        'dimensionless foot speeds u / sqrt(g l) at which auto_gait changes to the next gait',
-        minimum=0.0,
-        maximum=10.0,
-    )
+        (0.3,), 'dimensionless foot speeds u / sqrt(g l) at which auto_gait changes to the next '
+        'gait', 0.0, 10.0)
     auto_hysteresis: float = parameter(
-        0.05,
-        'width of the band around each of auto_speeds in which auto_gait keeps the gait',
-        minimum=0.0,
-        maximum=2.0,
-    )
+        0.05, 'width of the band around each of auto_speeds in which auto_gait keeps the gait',
+        0.0, 2.0)
 
     def __post_init__(self) -> None:
         """Validate; one speed between every two gaits, and bands that do not overlap."""

@@ -41,43 +41,24 @@ LONGEST_STEP = 0.005
 class CanonicalParameters(Parameters):
     """Parameters of the coupled canonical oscillators."""
 
-    rho: float = parameter(
-        8.0, 'attraction rho to the limit cycle', unit='1/s', minimum=0.1, maximum=1e3
-    )
-    radius: float = parameter(1.0, 'radius r of the limit cycle', minimum=0.01, maximum=100.0)
-    coupling_gain: float = parameter(
-        100.0, 'gain k of every coupling', unit='1/s', minimum=0.0, maximum=1e4
-    )
+    rho: float = parameter(8.0, 'attraction rho to the limit cycle', 0.1, 1e3, unit='1/s')
+    radius: float = parameter(1.0, 'radius r of the limit cycle', 0.01, 100.0)
+    coupling_gain: float = parameter(100.0, 'gain k of every coupling', 0.0, 1e4, unit='1/s')
     coupling_graph: str = parameter(
-        'all_to_all',
-        'coupling graph of the legs',
-        choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'),
-    )
-    cadence_scale: float = parameter(
-        1.0, "factor on the gait's cadence at every speed", minimum=0.25, maximum=4.0
-    )
+        'all_to_all', 'coupling graph of the legs',
+        choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'))
+    cadence_scale: float = parameter(1.0, "factor on the gait's cadence at every speed", 0.25, 4.0)
     contact_feedback: bool = parameter(
-        False, 'whether early and late touchdown shift the phase of the legs'
-    )
+        False, 'whether early and late touchdown shift the phase of the legs')
     contact_gain: float = parameter(
-        20.0,
-        'frequency offset per phase by which a touchdown is early or late',
-        unit='1/s',
-        minimum=0.0,
-        maximum=1e3,
-    )
+        20.0, 'frequency offset per phase by which a touchdown is early or late', 0.0, 1e3,
+        unit='1/s')
     contact_hold: float = parameter(
-        0.5,
-        'largest decrease of the cadence by late feet, as a fraction of the cadence',
-        minimum=0.0,
-        maximum=0.9,
-    )
+        0.5, 'largest decrease of the cadence by late feet, as a fraction of the cadence', 0.0,
+        0.9)
     margin_share: float = parameter(
-        0.5,
-        'fraction of the margin for unequal leg frequencies that contact feedback may use',
-        minimum=0.0,
-        maximum=0.95,
-    )
+        0.5, 'fraction of the margin for unequal leg frequencies that contact feedback may use',
+        0.0, 0.95)
 
 
     @property

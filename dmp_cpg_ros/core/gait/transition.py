@@ -59,12 +59,8 @@ class GaitChangeParameters(Parameters):
     """How gaits change."""
 
     gait_change_rate: float = parameter(
-        0.25,
-        "largest change of a leg's frequency during a change of gait, as a fraction of the "
-        "gait's frequency",
-        minimum=0.01,
-        maximum=0.6,
-    )
+        0.25, "largest change of a leg's frequency during a change of gait, as a fraction of the "
+        "gait's frequency", 0.01, 0.6)
 
 
 @dataclass(frozen=True)

@@ -98,9 +98,7 @@ class ExponentialStep:
             ]
         )  # on [x, N_0, N_half, N_end]
         self._c_half, self._c = 0.5 * dt * half[1] @ c, dt * p1 @ c
-        n, stages = len(c), np.empty(4 * len(c))  # x, N_0, N_half, N_end
-        self._stages = stages.reshape(4, n)
-        self._until = stages[: 2 * n], stages[: 3 * n], stages
+        self._stages = np.empty(4 * len(c))
 
     def __call__(self, x: Array, nonlinear: Callable[[Array], Array]) -> Array:
         """Advance by one step.
@@ -117,11 +115,11 @@ class ExponentialStep:
         ndarray (...)
             State one step later.
         """
-        stages, (first, second, third), shape = self._stages, self._until, x.shape
-        stages[0] = x.ravel()  # below, dot has half the overhead of @ at this size
-        stages[1] = nonlinear(x).ravel()
-        half = self._to_half.dot(first) + self._c_half
-        stages[2] = nonlinear(half.reshape(shape)).ravel()
-        end = self._to_end.dot(second) + self._c
-        stages[3] = nonlinear(end.reshape(shape)).ravel()
-        return (self._final.dot(third) + self._c).reshape(shape)
+        n, stages, shape = x.size, self._stages, x.shape
+        stages[:n] = x.ravel()  # below, dot has half the overhead of @ at this size
+        stages[n : 2 * n] = nonlinear(x).ravel()
+        half = self._to_half.dot(stages[: 2 * n]) + self._c_half
+        stages[2 * n : 3 * n] = nonlinear(half.reshape(shape)).ravel()
+        end = self._to_end.dot(stages[: 3 * n]) + self._c
+        stages[3 * n :] = nonlinear(end.reshape(shape)).ravel()
+        return (self._final.dot(stages) + self._c).reshape(shape)

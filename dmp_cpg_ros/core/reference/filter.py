@@ -29,39 +29,22 @@ Array = NDArray[np.float64]
 class ReferenceParameters(Parameters):
     """Parameters of the reference system."""
 
-    alpha_r: float = parameter(
-        3.0, 'rate of the reference filters', unit='1/s', minimum=0.05, maximum=50.0
-    )
+    alpha_r: float = parameter(3.0, 'rate of the reference filters', 0.05, 50.0, unit='1/s')
     max_speed: float = parameter(
-        3.5, 'largest forward speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
-    )
+        3.5, 'largest forward speed that is accepted', 0.0, 10.0, unit='m/s')
     max_lateral_speed: float = parameter(
-        0.6, 'largest sideways speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
-    )
+        0.6, 'largest sideways speed that is accepted', 0.0, 10.0, unit='m/s')
     max_turn_rate: float = parameter(
-        2.2, 'largest turn rate that is accepted', unit='rad/s', minimum=0.0, maximum=10.0
-    )
+        2.2, 'largest turn rate that is accepted', 0.0, 10.0, unit='rad/s')
     max_curve: float = parameter(
-        0.3,
-        'largest acceleration towards the centre of a curve, at low speed',
-        unit='g',
-        minimum=0.01,
-        maximum=10.0,
-    )
+        0.3, 'largest acceleration towards the centre of a curve, at low speed', 0.01, 10.0,
+        unit='g')
     max_acceleration: float = parameter(
-        4.0,
-        'largest acceleration of the reference, except when braking to rest',
-        unit='m/s^2',
-        minimum=0.1,
-        maximum=1e3,
-    )
+        4.0, 'largest acceleration of the reference, except when braking to rest', 0.1, 1e3,
+        unit='m/s^2')
     cmd_vel_timeout: float = parameter(
-        0.5,
-        'time without cmd_vel after which the command is zero; 0: never',
-        unit='s',
-        minimum=0.0,
-        maximum=3600.0,
-    )
+        0.5, 'time without cmd_vel after which the command is zero; 0: never', 0.0, 3600.0,
+        unit='s')
 
 
 class CommandGate:

@@ -47,42 +47,32 @@ class LegParameters(Parameters):
     """Parameters of a leg's transformation systems."""
 
     stiffness: float = parameter(
-        6400.0, 'stiffness k of the transformation system', unit='1/s^2', minimum=1.0, maximum=1e6
-    )
+        6400.0, 'stiffness k of the transformation system', 1.0, 1e6, unit='1/s^2')
     damping: float = parameter(
-        160.0, 'damping b of the transformation system', unit='1/s', minimum=0.1, maximum=1e4
-    )
+        160.0, 'damping b of the transformation system', 0.1, 1e4, unit='1/s')
     reading: str = parameter(
-        'kinematic',
-        'whether the joint follows the primitive or receives its torque',
-        choices=('kinematic', 'torque'),
-    )
+        'kinematic', 'whether the joint follows the primitive or receives its torque',
+        choices=('kinematic', 'torque'))
     clearance: float = parameter(
-        0.2, 'height of the swing as a fraction of the standing height', minimum=0.0, maximum=0.6
-    )
+        0.2, 'height of the swing as a fraction of the standing height', 0.0, 0.6)
     motion: str = parameter(
-        '', 'file of a learned motion of the feet, scaled to the clearance; empty: the foot path'
-    )
+        '', 'file of a learned motion of the feet, scaled to the clearance; empty: the foot path')
     activity_rate: float = parameter(
-        12.0, 'rate at which the swing height follows the phase speed', unit='1/s', minimum=0.1,
-        maximum=1e3)
+        12.0, 'rate at which the swing height follows the phase speed', 0.1, 1e3, unit='1/s')
     placement_rate: float = parameter(
-        40.0, 'rate at which a swinging foot follows its placement shift', unit='1/s', minimum=0.1,
-        maximum=1e3)
+        40.0, 'rate at which a swinging foot follows its placement shift', 0.1, 1e3, unit='1/s')
     yielding_rate: float = parameter(
         20.0, 'rate at which the target of a standing foot approaches the measured foot position',
-        unit='1/s', minimum=0.0, maximum=1e3)
+        0.0, 1e3, unit='1/s')
     levelling_rate: float = parameter(
         10.0, 'rate at which a standing foot returns the height that compensated the tilt',
-        unit='1/s', minimum=0.1, maximum=1e3)
+        0.1, 1e3, unit='1/s')
     stumble_lift: float = parameter(
-        0.13,
-        'additional height of a swinging foot that meets an obstacle, as a fraction of the '
-        'standing height; 0: no reflex', minimum=0.0, maximum=0.4)
+        0.13, 'additional height of a swinging foot that meets an obstacle, as a fraction of the '
+        'standing height; 0: no reflex', 0.0, 0.4)
     stumble_lag: float = parameter(
-        0.035,
-        'distance from its target at which a swinging foot at rest has met an obstacle, as a '
-        'fraction of the standing height', minimum=0.005, maximum=1.0)
+        0.035, 'distance from its target at which a swinging foot at rest has met an obstacle, as '
+        'a fraction of the standing height', 0.005, 1.0)
 
 
 class LegState(NamedTuple):
