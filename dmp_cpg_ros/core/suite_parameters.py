@@ -158,9 +158,9 @@ class CertificateParameters(Parameters):
 
 
 CERTIFIED: tuple[type[Parameters], ...] = (
-    CanonicalParameters, InhibitionParameters, VotingParameters, ReferenceParameters, LegParameters,
-    PostureParameters, TickParameters, GaitParameters, GaitChangeParameters, GaitChoiceParameters,
-    RobotFileParameters)
+    CanonicalParameters, InhibitionParameters, VotingParameters, ReferenceParameters,
+    LegParameters, PostureParameters, TickParameters, GaitParameters, GaitChangeParameters,
+    GaitChoiceParameters, RobotFileParameters)
 """Parameter sets that the certificate is computed from; nodes that compute it declare all of
 them.
 """

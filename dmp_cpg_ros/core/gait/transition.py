@@ -93,9 +93,7 @@ class GaitTransition:
         arcs = arcs_between(before.rest - before.lag, after.rest - after.lag, *middle)
         rest_arc = (after.rest - before.rest + 0.5) % 1.0 - 0.5
         moves = arcs - arcs[0] + round(float(before.lag[0] - after.lag[0]), 12)
-        object.__setattr__(self, 'arcs', arcs)
-        object.__setattr__(self, 'rest_arc', rest_arc)
-        object.__setattr__(self, 'offset_arcs', moves)
+        vars(self).update(arcs=arcs, rest_arc=rest_arc, offset_arcs=moves)
 
     @property
     def common_arc(self) -> float:
@@ -151,14 +149,15 @@ class BlendedGait(CycleOfLegs):
         if not (0.0 <= s <= 1.0 and 0.0 <= self.rate < float('inf')):
             raise ParameterError(
                 f'a blend needs a share in [0, 1] and a rate that is not negative, not {s!r} and '
-                f'{self.rate!r}'
-            )
-        transition, weight = self.transition, s * s * (3.0 - 2.0 * s)
-        object.__setattr__(self, 'weight', weight)
-        object.__setattr__(self, 'turning', 2.0 * np.pi * 6.0 * s * (1.0 - s) * self.rate)
-        object.__setattr__(self, 'rest', transition.before.rest + weight * transition.rest_arc)
-        object.__setattr__(self, 'highest_speed', blended_limit(
-            transition.before.highest_speed, transition.after.highest_speed, weight))
+                f'{self.rate!r}')
+        way, weight = self.transition, s * s * (3.0 - 2.0 * s)
+        turning = 2.0 * np.pi * 6.0 * s * (1.0 - s) * self.rate
+        phases = way.before.phases + (2.0 * np.pi * weight) * way.offset_arcs
+        vars(self).update(
+            weight=weight, turning=turning, rest=way.before.rest + weight * way.rest_arc,
+            highest_speed=blended_limit(
+                way.before.highest_speed, way.after.highest_speed, weight),
+            phases=phases, moving_phases=phases, rest_rate=turning * way.rest_arc)
 
     @property
     def name(self) -> str:
@@ -168,17 +167,6 @@ class BlendedGait(CycleOfLegs):
     def scaled(self, cadence_scale: float) -> BlendedGait:
         """Return this blend with this factor on its cadences."""
         return replace(self, cadence_scale=cadence_scale)
-
-    @property
-    def phases(self) -> Array:
-        """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
-        transition = self.transition
-        return transition.before.phases + (2.0 * np.pi * self.weight) * transition.offset_arcs
-
-    @property
-    def moving_phases(self) -> Array:
-        """Offsets that move: the present :attr:`phases`."""
-        return self.phases
 
     def following(self, omega: float, change_rate: float, pauses: bool, dt: float
                   ) -> tuple[GaitInForce, float]:
@@ -210,8 +198,7 @@ class BlendedGait(CycleOfLegs):
         share = self.share + rate * dt
         following: GaitInForce = (
             transition.after.scaled(self.cadence_scale) if share >= 1.0
-            else replace(self, share=share, rate=rate)
-        )
+            else replace(self, share=share, rate=rate))
         weight = following.weight if isinstance(following, BlendedGait) else 1.0
         return following, 2.0 * np.pi * transition.common_arc * (weight - self.weight)
 
@@ -222,29 +209,23 @@ class BlendedGait(CycleOfLegs):
         omega = omega + self.turning * self.transition.common_arc
         return omega + self.turning * self.transition.offset_arcs
 
-    @property
-    def rest_rate(self) -> float:
-        """Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]."""
-        return self.turning * self.transition.rest_arc
-
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω at a foot speed, as :meth:`Gait.omega` [rad/s]."""
         foot_speed = min(foot_speed, scale.speed(self.highest_speed))
+        before, after = self.transition.before, self.transition.after
         return self.cadence_scale * self._blended(
-            self.transition.before.omega(foot_speed, scale),
-            self.transition.after.omega(foot_speed, scale),
-        )
+            before.omega(foot_speed, scale), after.omega(foot_speed, scale))
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed, as :meth:`Gait.duty`."""
         foot_speed = min(foot_speed, scale.speed(self.highest_speed))
-        return self._blended(
-            self.transition.before.duty(foot_speed, scale),
-            self.transition.after.duty(foot_speed, scale),
-        )
+        before, after = self.transition.before, self.transition.after
+        return self._blended(before.duty(foot_speed, scale), after.duty(foot_speed, scale))
 
     def own_omegas(self, omega: float) -> list[float]:
-        """Frequencies with which the legs go through their cycles when the gait's is ω [rad/s]."""
+        """Frequencies with which the legs go through their cycles, as
+        :meth:`Gait.own_omegas` [rad/s].
+        """
         return [omega + self.turning * arc for arc in self.transition.arcs.tolist()]
 
     def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
@@ -252,10 +233,6 @@ class BlendedGait(CycleOfLegs):
         before, after = self.transition.before, self.transition.after
         return before.bounce(cycle_position, duty, omega).mixed(
             after.bounce(cycle_position, duty, omega), self.weight)
-
-    def cycle_position(self, phi: Array | float) -> Array:
-        """Where legs are in their cycle, as :meth:`Gait.cycle_position`."""
-        return (np.asarray(phi) / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
 
     def _blended(self, before: float, after: float) -> float:
         return before + self.weight * (after - before)
