@@ -121,8 +121,7 @@ class WalkingLoop:
         self.estimator = (
             BodyEstimator(description, p.estimation, legs)
             if p.state_source.state_source == ESTIMATE
-            else None
-        )
+            else None)
         self.body = BodyControl(description, p.posture, p.mode, legs)
         self.legs = [LegControl(leg, description, p.leg, self.body.modes.movements, p.motion)
                      for leg in LEGS]
@@ -169,8 +168,7 @@ class WalkingLoop:
             self.mode.mode)
         self.inhibition = self.supervisor.inhibition(self.stop)
         targets = self._joint_targets(state, x_dot, feedback, dt)
-        return Tick(
-            state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait)
+        return Tick(state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait)
 
     def _joint_targets(
         self, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
@@ -221,8 +219,7 @@ class WalkingLoop:
         self.stop = self.supervisor.request(self.stop, stop)
         return predict(
             self.supervisor, self.reference, self.canonical, self.stop, self.inhibition,
-            self.canon, self.r, self.gate.at(self.stop.time_ns), self._dt,
-        )
+            self.canon, self.r, self.gate.at(self.stop.time_ns), self._dt)
 
     def change(self, values: Mapping[str, Any]) -> str:
         """Change parameters as the nodes' services do; they act from the next tick on.

@@ -60,8 +60,7 @@ class SuiteParameters:
     @property
     def sets(self) -> dict[str, Parameters]:
         """Parameter sets by the name of their part."""
-        return {name: value for name, value in vars(self).items()
-                if isinstance(value, Parameters)}
+        return {name: value for name, value in vars(self).items() if isinstance(value, Parameters)}
 
 
 @dataclass(frozen=True)

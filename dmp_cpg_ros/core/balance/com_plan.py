@@ -138,5 +138,4 @@ def contact_weights(
     lift_off = 0.5 * (1.0 - duty)
     return [
         max(min(max((abs(position) - lift_off) / transfer, 0.0), 1.0), 1.0 - swings)
-        for position, swings in zip(cycle_position, activity, strict=True)
-    ]
+        for position, swings in zip(cycle_position, activity, strict=True)]

@@ -141,8 +141,7 @@ class PostureController:
         self._torque_limit = [triple(leg.torque_limit.tolist()) for leg in description.legs]
         inertia = description.base_inertia.diagonal()
         # moments count as the accelerations that they cause at the length of a leg
-        self._importance = triple(
-            (description.mass * self.scale.leg_length / inertia).tolist())
+        self._importance = triple((description.mass * self.scale.leg_length / inertia).tolist())
 
     def initial_state(self) -> PostureState:
         """State of a robot that stands."""
@@ -180,11 +179,9 @@ class PostureController:
         p, leg_length = self.parameters, self.scale.leg_length
         reference, omega, own_omegas, duty = gait.pace(r, self.scale)
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
-        activity = activities_step(
-            memory.activity, rates, own_omegas, p.activity_rate, dt)
+        activity = activities_step(memory.activity, rates, own_omegas, p.activity_rate, dt)
         swings = activity.tolist()
-        positions = [
-            gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
+        positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
         load = contact_weights(positions, duty, swings, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
         velocity = times(R_ground_base, triple(state.base_velocity_in_base.tolist()))
@@ -199,12 +196,10 @@ class PostureController:
         lean_x, lean_y = lean(upward, self.model.height)
         shift = [
             (along + p.slope_lean * lean_x, across + p.slope_lean * lean_y)
-            for along, across in self.placement.shift(p, measured, planned, pi * duty / omega)
-        ]
+            for along, across in self.placement.shift(p, measured, planned, pi * duty / omega)]
         raised = self.placement.raised(p, shift, R_ground_base)
         legs = self.legs.at(state.joint_position.tolist())
-        feet = [
-            times(R_ground_base, minus(foot, self._com_in_base)) for foot, _ in legs]
+        feet = [times(R_ground_base, minus(foot, self._com_in_base)) for foot, _ in legs]
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         return PostureState(activity, integral), PostureFeedback(
@@ -246,8 +241,7 @@ class PostureController:
         load: list[float], r: Triple, bounce: Bounce, sway_acceleration: float,
     ) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
-        force, moment = self.model.wrench(
-            self.parameters, body, r, bounce, sway_acceleration)
+        force, moment = self.model.wrench(self.parameters, body, r, bounce, sway_acceleration)
         forces = distribute(
             force, moment, feet, load, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
@@ -256,8 +250,6 @@ class PostureController:
             a, b, c = transposed_times(J, transposed_times(body.R_ground_base, on_foot))
             most_a, most_b, most_c = limits
             torques += (
-                min(max(-a, -most_a), most_a),
-                min(max(-b, -most_b), most_b),
-                min(max(-c, -most_c), most_c),
-            )
+                min(max(-a, -most_a), most_a), min(max(-b, -most_b), most_b),
+                min(max(-c, -most_c), most_c))
         return np.array(torques)

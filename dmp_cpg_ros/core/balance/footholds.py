@@ -77,8 +77,7 @@ class FootPlacement:
         self._lateral = [leg.lateral_offset for leg in kinematics]
         self._depth = [
             float(leg.geometry.hip_in_base[2]) - height
-            for leg, (_, _, height) in zip(kinematics, self._footholds, strict=True)
-        ]
+            for leg, (_, _, height) in zip(kinematics, self._footholds, strict=True)]
 
     def over_feet(self, velocity: Triple) -> list[Pair]:
         """Velocity of the body over its feet, v + γ ẑ × p.
@@ -115,8 +114,7 @@ class FootPlacement:
         """
         reached = []
         for (x, y), straight, depth, lateral in zip(
-            down, self._straight, self._depth, self._lateral, strict=True
-        ):
+            down, self._straight, self._depth, self._lateral, strict=True):
             room = max((reach * straight) ** 2 - depth * depth, 1e-6)
             squared, outward = max(x * x + y * y, 1e-12), lateral * y
             share = min((sqrt(outward * outward + squared * room) - outward) / squared, 1.0)
@@ -149,8 +147,7 @@ class FootPlacement:
             wished.append((way * x - capture * wanted_x, way * y - capture * wanted_y))
         shift = []
         for (x, y), (wanted_x, wanted_y), (_, place, _) in zip(
-            self.within_reach(wished, p.reach), wanted, self._footholds, strict=True
-        ):
+            self.within_reach(wished, p.reach), wanted, self._footholds, strict=True):
             y = _on_own_side(y, place)
             shift.append((x - half_stance * wanted_x, y - half_stance * wanted_y))
         return shift

@@ -64,13 +64,11 @@ class VelocityCorrection(NamedTuple):
         kept = exp(-(1.0 - moving) * p.activity_rate * dt)
         along, across = (
             min(max(before + gain * (wanted - is_now), -limit), limit) * kept
-            for before, wanted, is_now in zip(self.correction, r[:2], velocity[:2], strict=True)
-        )
+            for before, wanted, is_now in zip(self.correction, r[:2], velocity[:2], strict=True))
         turn = 0.0 if isnan(self.yaw) else (yaw - self.yaw + pi) % (2.0 * pi) - pi
         error = (self.heading_error + r[2] * dt - turn) * moving
         return VelocityCorrection(
-            (along, across), min(max(error, -p.heading_limit), p.heading_limit), yaw
-        )
+            (along, across), min(max(error, -p.heading_limit), p.heading_limit), yaw)
 
     def acting(self, p: PostureParameters, leg_length: float, moving: float) -> Triple:
         """Correction of v_x, v_y [m/s], γ [rad/s] that the legs apply."""

@@ -109,8 +109,7 @@ class VirtualModel:
         lift = (
             squared * p.height_stiffness * (self.height + bounce.height - body.height)
             + rate * p.height_damping * (bounce.velocity - body.velocity[2])
-            + bounce.acceleration
-        )
+            + bounce.acceleration)
         stiffness, damping = squared * p.attitude_stiffness, rate * p.attitude_damping
         mass, (up_x, up_y, up_z) = self._mass, body.upward_in_ground
         i_x, i_y, i_z = self._inertia
@@ -118,14 +117,11 @@ class VirtualModel:
             (
                 mass * (push * (r[0] - body.velocity[0]) + GRAVITY * up_x),
                 mass * (push * (r[1] - body.velocity[1]) + sway_acceleration + GRAVITY * up_y),
-                mass * (lift + GRAVITY * up_z),
-            ),
+                mass * (lift + GRAVITY * up_z)),
             (
                 -i_x * (stiffness * roll + damping * body.rate[0]),
                 -i_y * (stiffness * pitch + damping * body.rate[1]),
-                i_z * rate * p.yaw_rate_gain * (r[2] - body.rate[2]),
-            ),
-        )
+                i_z * rate * p.yaw_rate_gain * (r[2] - body.rate[2])))
 
 
 def distribute(
@@ -202,5 +198,4 @@ def _multipliers(
     return (
         ((force[0] - total * x) / inertia, (force[1] - total * y) / inertia,
          (force[2] - total * z) / inertia),
-        turn,
-    )
+        turn)

@@ -55,8 +55,7 @@ class CouplingGraph:
             raise ParameterError(
                 f'{len(self.edges)} edges and {self.size} nodes need gains '
                 f'({len(self.edges)}, 2, 2) and phases ({self.size},), '
-                f'not {self.gains.shape} and {self.phases.shape}'
-            )
+                f'not {self.gains.shape} and {self.phases.shape}')
         if not (np.all(np.isfinite(self.gains)) and np.all(np.isfinite(self.phases))):
             raise ParameterError('coupling gains and phase offsets must be finite')
         _check_edges(self.edges, self.size)
@@ -65,8 +64,7 @@ class CouplingGraph:
             if smallest <= 0.0:
                 raise ParameterError(
                     f'gain of edge {edge} must have a positive definite symmetric part; '
-                    f'its smallest eigenvalue is {smallest:.4g}'
-                )
+                    f'its smallest eigenvalue is {smallest:.4g}')
 
     def coupling_matrix(self) -> Array:
         """Matrix −L with ẋ = … − L x in the original coordinates (offsets included).
@@ -76,8 +74,7 @@ class CouplingGraph:
         ndarray (2N, 2N)
         """
         return self._block_matrix(
-            self.gains, lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j]))
-        )
+            self.gains, lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j])))
 
     def block_laplacian(self) -> Array:
         """Block Laplacian L in the co-rotated coordinates, where locked states are equal.
@@ -93,9 +90,7 @@ class CouplingGraph:
         turned = np.array(
             [
                 turns[i].T @ gain @ turns[i]
-                for (i, _), gain in zip(self.edges, self.gains, strict=True)
-            ]
-        )
+                for (i, _), gain in zip(self.edges, self.gains, strict=True)])
         return -self._block_matrix(turned.reshape(-1, 2, 2), lambda i, j: np.eye(2))
 
     def _block_matrix(self, gains: Array, seen_from: Callable[[int, int], Array]) -> Array:
@@ -129,8 +124,7 @@ def graph_from_edges(
     K = gain * np.eye(2) if np.ndim(gain) == 0 else np.asarray(gain, dtype=float)
     gains = np.broadcast_to(K, (len(edges), 2, 2)).copy()
     return CouplingGraph(
-        size, edges, gains, np.zeros(size) if phases is None else np.asarray(phases, float)
-    )
+        size, edges, gains, np.zeros(size) if phases is None else np.asarray(phases, float))
 
 
 def topology(name: str, size: int) -> Edges:
@@ -156,8 +150,7 @@ def topology(name: str, size: int) -> Edges:
         return tuple((j, i) for i, j in following + [(size - 1, 0)])
     if name not in undirected:
         raise ParameterError(
-            f"topology '{name}' is not known; valid are {', '.join(undirected)}, directed_ring"
-        )
+            f"topology '{name}' is not known; valid are {', '.join(undirected)}, directed_ring")
     return tuple(edge for i, j in undirected[name] for edge in ((i, j), (j, i)))
 
 
@@ -165,5 +158,4 @@ def _check_edges(edges: Iterable[tuple[int, int]], size: int) -> None:
     for i, j in edges:
         if not (0 <= i < size and 0 <= j < size and i != j):
             raise ParameterError(
-                f'edge ({i}, {j}) is not between two of the nodes 0 to {size - 1}'
-            )
+                f'edge ({i}, {j}) is not between two of the nodes 0 to {size - 1}')

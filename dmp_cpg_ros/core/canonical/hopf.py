@@ -115,5 +115,4 @@ class AndronovHopf:
         return (
             np.asarray(omega)[..., None, None] * phase_generator()
             + growth[..., None, None] * np.eye(2)
-            - 2.0 * np.asarray(self.rho)[..., None, None] * x[..., :, None] * x[..., None, :]
-        )
+            - 2.0 * np.asarray(self.rho)[..., None, None] * x[..., :, None] * x[..., None, :])

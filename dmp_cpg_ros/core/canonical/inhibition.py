@@ -43,15 +43,13 @@ class InhibitionParameters(Parameters):
         if not self.inhibited_legs or len(set(self.inhibited_legs)) != len(self.inhibited_legs):
             raise ParameterError(
                 f'inhibited_legs = {list(self.inhibited_legs)} must name one or more of '
-                f'{", ".join(LEGS)}, none twice'
-            )
+                f'{", ".join(LEGS)}, none twice')
 
     @cached_property
     def armed_gains(self) -> Array:
         """Gains α_i of the four legs when inhibition is armed, ndarray (4,) [1/s]."""
         return np.array(
-            [self.inhibition_gain if leg in self.inhibited_legs else 0.0 for leg in LEGS]
-        )
+            [self.inhibition_gain if leg in self.inhibited_legs else 0.0 for leg in LEGS])
 
 
 @dataclass(frozen=True)
@@ -106,5 +104,4 @@ def initial_inhibition(parameters: InhibitionParameters) -> Inhibition:
     """Inhibition before the first request: armed when the gait starts at rest."""
     stopped = parameters.start_inhibited
     return Inhibition(
-        stopped, parameters.armed_gains * float(stopped), parameters.region_radius, stopped
-    )
+        stopped, parameters.armed_gains * float(stopped), parameters.region_radius, stopped)

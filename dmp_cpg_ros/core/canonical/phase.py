@@ -86,8 +86,7 @@ def scalar_phase_rates(x: Array, x_dot: Array) -> list[float]:
     """As :func:`phase_rate` of a few states (N, 2), without arithmetic on arrays."""
     return [
         scalar_phase_rate(x_1, x_2, x_1_dot, x_2_dot)
-        for (x_1, x_2), (x_1_dot, x_2_dot) in zip(x.tolist(), x_dot.tolist(), strict=True)
-    ]
+        for (x_1, x_2), (x_1_dot, x_2_dot) in zip(x.tolist(), x_dot.tolist(), strict=True)]
 
 
 def phase_rotation(phi: float) -> Array:

@@ -51,8 +51,7 @@ class CanonicalSystem:
         self.target = (
             np.stack([self.radius, np.zeros(graph.size)], axis=1)
             if target is None
-            else np.asarray(target, dtype=float)
-        )
+            else np.asarray(target, dtype=float))
         self._coupling = graph.coupling_matrix()
         self._steps: dict[tuple[bytes, float], ExponentialStep] = {}
         self._linear: dict[bytes, tuple[Array, Array]] = {}
@@ -69,8 +68,7 @@ class CanonicalSystem:
         if not isinstance(self.oscillators, AndronovHopf):
             raise ParameterError(
                 f'no bounds are known of {type(self.oscillators).__name__}; they are of '
-                'AndronovHopf'
-            )
+                'AndronovHopf')
         return self._one_per_node('rho')
 
     def _one_per_node(self, name: str) -> Array:
@@ -78,8 +76,7 @@ class CanonicalSystem:
         if np.shape(values) not in ((), (self.graph.size,)):
             raise ParameterError(
                 f'{self.graph.size} nodes need one {name} or {self.graph.size}, not '
-                f'{np.size(values)}'
-            )
+                f'{np.size(values)}')
         return np.broadcast_to(np.asarray(values, dtype=float), self.graph.size)
 
     def linear_part(self, gains: Array) -> tuple[Array, Array]:

@@ -43,15 +43,13 @@ class GaitChoiceParameters(Parameters):
         if len(self.auto_speeds) != len(self.auto_gaits) - 1:
             raise ParameterError(
                 f'auto_speeds = {list(self.auto_speeds)} must hold one speed between every two of '
-                f'auto_gaits = {list(self.auto_gaits)}'
-            )
+                f'auto_gaits = {list(self.auto_gaits)}')
         if len(set(self.auto_gaits)) != len(self.auto_gaits):
             raise ParameterError(f'auto_gaits = {list(self.auto_gaits)} must not repeat a gait')
         if np.any(np.diff(self.auto_speeds) <= self.auto_hysteresis):
             raise ParameterError(
                 f'auto_speeds = {list(self.auto_speeds)} must increase by more than '
-                f'auto_hysteresis = {self.auto_hysteresis:g}'
-            )
+                f'auto_hysteresis = {self.auto_hysteresis:g}')
 
 
 def highest_speed(

@@ -62,8 +62,7 @@ class BodyScale:
         across = LATERAL_WEIGHT * v_y
         return float(
             (v_x * v_x + across * across) ** 0.5
-            + LATERAL_WEIGHT * abs(gamma) * self.hip_radius
-        )
+            + LATERAL_WEIGHT * abs(gamma) * self.hip_radius)
 
 
 class Pace(NamedTuple):
@@ -222,8 +221,7 @@ class Gait(CycleOfLegs):
              'cadence must be positive'),
             (self.highest_speed >= max(fastest, 1e-3),
              f'highest_speed must be positive and not below the last of speed, {fastest:g}, not '
-             f'{self.highest_speed:g}'),
-        ):
+             f'{self.highest_speed:g}')):
             if not holds:
                 raise ParameterError(f"gait '{self.name}': {rule}")
         vars(self).update(

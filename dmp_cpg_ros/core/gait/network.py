@@ -54,8 +54,8 @@ class CanonicalParameters(Parameters):
         20.0, 'frequency offset per phase by which a touchdown is early or late', 0.0, 1e3,
         unit='1/s')
     contact_hold: float = parameter(
-        0.5, 'largest decrease of the cadence by late feet, as a fraction of the cadence', 0.0,
-        0.9)
+        0.5, 'largest decrease of the cadence by late feet, as a fraction of the cadence',
+        0.0, 0.9)
     margin_share: float = parameter(
         0.5, 'fraction of the margin for unequal leg frequencies that contact feedback may use',
         0.0, 0.95)
@@ -79,16 +79,9 @@ def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalS
         Locked phases relative to fl [rad].
     """
     graph = graph_from_edges(
-        len(LEGS),
-        topology(parameters.coupling_graph, len(LEGS)),
-        parameters.coupling_gain,
-        phases,
-    )
-    return CanonicalSystem(
-        graph,
-        parameters.oscillators,
-        state_at(phases, parameters.radius),
-    )
+        len(LEGS), topology(parameters.coupling_graph, len(LEGS)), parameters.coupling_gain,
+        phases)
+    return CanonicalSystem(graph, parameters.oscillators, state_at(phases, parameters.radius))
 
 
 class GaitNetwork:
@@ -276,8 +269,7 @@ class GaitNetwork:
         places = self.gait.phases.tolist()
         relative = [
             scalar_phase(x_1, x_2) - place
-            for (x_1, x_2), place in zip(x.tolist(), places, strict=True)
-        ]
+            for (x_1, x_2), place in zip(x.tolist(), places, strict=True)]
         mean = atan2(sum(map(sin, relative)), sum(map(cos, relative)))
         return np.array([(angle - mean + pi) % (2.0 * pi) - pi for angle in relative])
 

@@ -43,8 +43,7 @@ class FirstOrderFilter:
         """Validate."""
         if not (np.isfinite(self.rate) and self.rate > 0.0):
             raise ParameterError(
-                f'filter rate = {self.rate!r} 1/s must be a positive finite number'
-            )
+                f'filter rate = {self.rate!r} 1/s must be a positive finite number')
 
     def at(self, value: ArrayLike, command: ArrayLike, elapsed: ArrayLike) -> Array:
         """Filtered value some time after the start of a step.

@@ -92,14 +92,11 @@ class CommandGate:
         """
         if not np.all(np.isfinite((v_x, v_y, gamma))):
             raise DataError(
-                f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite'
-            )
+                f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite')
         p = self.parameters
         self._command = (
-            _limited(v_x, p.max_speed),
-            _limited(v_y, p.max_lateral_speed),
-            _limited(gamma, p.max_turn_rate),
-        )
+            _limited(v_x, p.max_speed), _limited(v_y, p.max_lateral_speed),
+            _limited(gamma, p.max_turn_rate))
         self._fresh = True
 
     def at(self, time_ns: int) -> tuple[float, float, float]:
@@ -115,8 +112,7 @@ class CommandGate:
             return 0.0, 0.0, 0.0
         if self._scale is None:
             return self._command
-        return limited(
-            self._command, self._scale, self.highest_speed, self.parameters.max_curve)
+        return limited(self._command, self._scale, self.highest_speed, self.parameters.max_curve)
 
 
 class ReferenceSystem:

@@ -98,8 +98,7 @@ class LearnedMotion:
         if primitive.names != MOTION_NAMES:
             raise DataError(
                 f'a motion has the degrees of freedom {", ".join(MOTION_NAMES)}, not '
-                f'{", ".join(primitive.names) or "nameless ones"}'
-            )
+                f'{", ".join(primitive.names) or "nameless ones"}')
         cycle = primitive.centre + primitive.on_cycle(np.linspace(-pi, pi, 200))[0]
         for name, column, most in zip(MOTION_NAMES, cycle.T, LARGEST * len(LEGS), strict=True):
             if not np.abs(column).max() <= most:
@@ -114,8 +113,7 @@ class LearnedMotion:
     def of_leg(self, leg: str, description: RobotDescription) -> LearnedFoot:
         """Motion of one foot, scaled to a robot."""
         dofs = slice(3 * LEGS.index(leg), 3 * LEGS.index(leg) + 3)
-        return LearnedFoot(
-            self.primitive.part(dofs), self.clearance, description.stance_height)
+        return LearnedFoot(self.primitive.part(dofs), self.clearance, description.stance_height)
 
 
 class LearnedFoot:
@@ -170,8 +168,7 @@ class LearnedFoot:
             PlayedFoot(began, played),
             (x, y + height * side, path.foothold_in_base[2] + height * lift),
             (x_dot * slower * cycle, y_dot * slower * cycle + height * side_rate,
-             height * lift_rate),
-        )
+             height * lift_rate))
 
     def _per_radian(self, played: RhythmicState) -> list[float]:
         """Derivatives by ψ [1/rad]."""

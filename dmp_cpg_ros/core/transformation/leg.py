@@ -169,14 +169,8 @@ class LegPrimitive:
         return LegState(SpringState(q, np.zeros(3)), 0.0, np.zeros(3))
 
     def step(
-        self,
-        state: LegState,
-        gait: GaitInForce,
-        x: Array,
-        x_dot: Array,
-        r: Array,
-        feedback: LegFeedback,
-        dt: float,
+        self, state: LegState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
+        feedback: LegFeedback, dt: float,
     ) -> tuple[LegState, Array, Array]:
         """Advance the leg to the time at which the inputs hold.
 
@@ -209,8 +203,7 @@ class LegPrimitive:
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
         path = self._path(reference, omega, duty, activity, state.stumble, feedback)
-        motion, foot, path_velocity = self._motion.step(
-            state.motion, path, position, rate, dt)
+        motion, foot, path_velocity = self._motion.step(state.motion, path, position, rate, dt)
         offset = triple(state.shift_in_base.tolist())
         offset_rate, stumble = self._offset_rate(
             state, offset, activity, path, position, path_velocity, feedback, dt)
@@ -267,11 +260,7 @@ class LegPrimitive:
         return np.array(angles), np.array(_joint_velocity(jacobian, velocity))
 
     def targets(
-        self,
-        state: LegState,
-        goal: Array,
-        goal_velocity: Array,
-        feedback: Array,
+        self, state: LegState, goal: Array, goal_velocity: Array, feedback: Array,
         measured: SpringState | None = None,
     ) -> JointTargets:
         """Joint targets of the parameters' reading.
@@ -296,8 +285,7 @@ class LegPrimitive:
             J * (p.stiffness * (g - y) - p.damping * (y_dot - g_dot)) + tau
             for J, y, y_dot, g, g_dot, tau in zip(
                 self._inertia, joints.position.tolist(), joints.velocity.tolist(), goal.tolist(),
-                goal_velocity.tolist(), feedback.tolist(), strict=True)
-        ]
+                goal_velocity.tolist(), feedback.tolist(), strict=True)]
         return JointTargets(joints.position, joints.velocity, np.array(effort))
 
 
@@ -334,5 +322,4 @@ def _joint_velocity(J: Matrix, velocity: Triple) -> Triple:
     return (
         (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
         (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
-        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse,
-    )
+        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse)

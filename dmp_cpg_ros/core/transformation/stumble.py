@@ -126,16 +126,9 @@ def swing_progress(
         return None
     along, across, swing = along / body_speed, across / body_speed, 1.0 - path.duty
     return SwingProgress(
-        swung,
-        along * foot[0] + across * foot[1],
-        foot[2],
-        along * target[0] + across * target[1],
-        target[2],
-        body_speed,
-        body_speed / swing,
-        path.clearance * path.omega / (2.0 * pi * swing * LOWERING),
-        touches,
-    )
+        swung, along * foot[0] + across * foot[1], foot[2], along * target[0] + across * target[1],
+        target[2], body_speed, body_speed / swing,
+        path.clearance * path.omega / (2.0 * pi * swing * LOWERING), touches)
 
 
 class Stumble(NamedTuple):
@@ -215,13 +208,11 @@ def stumble_step(
         and FEELING[0] < progress.swung < FEELING[1]
         and speed < STANDSTILL * progress.swing_speed
         and progress.target_place - progress.place > max(
-            threshold + late * max(0.0, progress.target_place - last.target_place), 2.0 * above)
-    )
+            threshold + late * max(0.0, progress.target_place - last.target_place), 2.0 * above))
     landed = before.landed or (
         progress.swung > (TOUCHED if progress.touches else TOUCHING)
         and sinking < SETTLED * progress.sinking_speed
-        and above > threshold + late * max(0.0, last.target_level - progress.target_level)
-    )
+        and above > threshold + late * max(0.0, last.target_level - progress.target_level))
     height, up = before.height, before.up or before.height >= RISEN * lift
     if tripped and not landed and (not up or progress.swung < HIGH):
         height = lift + (height - lift) * exp(-QUICKNESS * dt)
