@@ -24,10 +24,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import (
     Matrix,
@@ -42,7 +40,6 @@ from dmp_cpg_ros.core.maths.vec3 import (
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 LARGEST_RAISE = 0.35

@@ -12,9 +12,9 @@ from __future__ import annotations
 from math import atan2
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 
 def phase(x: ArrayLike) -> Array:

@@ -12,14 +12,12 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
-
-Array = NDArray[np.float64]
 
 MOST_KEPT = 64
 """Sets of gains for which matrices are kept."""

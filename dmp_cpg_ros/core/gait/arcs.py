@@ -18,11 +18,9 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import wrapped
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 ROUNDING = 1e-9
 """Differences of costs below this are ties."""

@@ -18,7 +18,6 @@ from functools import cached_property
 from math import atan2, ceil, cos, pi, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
@@ -27,11 +26,10 @@ from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned
 from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 LONGEST_STEP = 0.005
 """Longest time step of the oscillators [s]."""

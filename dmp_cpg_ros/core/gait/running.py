@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from math import copysign
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import (
     Inhibition,
@@ -42,9 +41,8 @@ from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.updated import updated
-
-Array = NDArray[np.float64]
 
 CADENCE_RATE = 0.5
 """Rate at which the factor on the cadence moves to a new value [1/s].

@@ -30,16 +30,14 @@ from dataclasses import dataclass, field, replace
 from math import exp
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.arcs import arcs_between
 from dmp_cpg_ros.core.gait.com_height import Bounce
 from dmp_cpg_ros.core.gait.gait import BodyScale, CycleOfLegs, Gait
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-
-Array = NDArray[np.float64]
 
 STEEPEST = 1.5
 """Largest slope of the weight w(s)."""

@@ -21,12 +21,10 @@ from math import cos, exp, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
-
-Array = NDArray[np.float64]
 
 LIFTING, LOWERING = 0.35, 0.5
 """Shares of the swing in which the foot rises and comes down. It rises sooner, so that it is clear

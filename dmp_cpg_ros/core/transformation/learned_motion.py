@@ -24,10 +24,10 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
@@ -35,8 +35,6 @@ from dmp_cpg_ros.core.primitives.states import RhythmicInput, RhythmicState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
-
-Array = NDArray[np.float64]
 
 MOTION_NAMES = tuple(f'{leg}_{part}' for leg in LEGS for part in ('stride', 'side', 'lift'))
 """Names of a motion's degrees of freedom, in order."""

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rate
 from dmp_cpg_ros.core.gait.contact_feedback import LOADED, quarter_weight
 from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, minus, moved, pair, plus, triple
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
@@ -38,8 +38,6 @@ from dmp_cpg_ros.core.transformation.stumble import (
     stumble_step,
     swing_progress,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
