@@ -17,14 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dmp_cpg_ros.core.balance import com_plan
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
-from dmp_cpg_ros.core.balance.com_plan import (
-    SIDEWAYS,
-    STRAIGHT,
-    LateralPlan,
-    contact_weights,
-    lateral_plan,
-)
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.velocity_correction import VelocityCorrection
@@ -33,17 +27,9 @@ from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
 from dmp_cpg_ros.core.gait.contact_feedback import believed
 from dmp_cpg_ros.core.gait.transition import GaitInForce
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import (
-    Matrix,
-    Triple,
-    minus,
-    plus,
-    times,
-    transposed_times,
-    triple,
-)
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
@@ -135,11 +121,12 @@ class PostureController:
         self.placement = FootPlacement(self.kinematics, footholds, self.scale.leg_length)
         self._across: list[float] = footholds[:, 1].tolist()
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
-        self._com_in_base = triple(description.com_in_base.tolist())
-        self._torque_limit = [triple(leg.torque_limit.tolist()) for leg in description.legs]
+        self._com_in_base = vec3.triple(description.com_in_base.tolist())
+        self._torque_limit = [vec3.triple(leg.torque_limit.tolist()) for leg in description.legs]
         inertia = description.base_inertia.diagonal()
         # moments count as the accelerations that they cause at the length of a leg
-        self._importance = triple((description.mass * self.scale.leg_length / inertia).tolist())
+        importance = description.mass * self.scale.leg_length / inertia
+        self._importance = vec3.triple(importance.tolist())
 
     def initial_state(self) -> PostureState:
         """State of a robot that stands."""
@@ -180,24 +167,24 @@ class PostureController:
         activity = activities_step(memory.activity, rates, own_omegas, p.activity_rate, dt)
         swings = activity.tolist()
         positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
-        load = contact_weights(positions, duty, swings, p.load_transfer)
+        load = com_plan.contact_weights(positions, duty, swings, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
-        velocity = times(R_ground_base, triple(state.base_velocity_in_base.tolist()))
-        rate = times(R_ground_base, triple(state.base_rate_in_base.tolist()))
+        velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))
+        rate = vec3.times(R_ground_base, vec3.triple(state.base_rate_in_base.tolist()))
         moving = sum(swings) / len(swings)
         integral = memory.integral.integrated(
             p, leg_length, moving, state.base_quaternion.tolist(), velocity, reference, dt)
         correction = integral.acting(p, leg_length, moving)
         sway = self._sway(positions, duty, omega, reference, moving)
         measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
-        planned = plus(reference, correction)
+        planned = vec3.plus(reference, correction)
         lean_x, lean_y = lean(upward, self.model.height)
         shift = [
             (along + p.slope_lean * lean_x, across + p.slope_lean * lean_y)
             for along, across in self.placement.shift(p, measured, planned, pi * duty / omega)]
         raised = self.placement.raised(p, shift, R_ground_base)
         legs = self.legs.at(state.joint_position.tolist())
-        feet = [times(R_ground_base, minus(foot, self._com_in_base)) for foot, _ in legs]
+        feet = [vec3.times(R_ground_base, vec3.minus(foot, self._com_in_base)) for foot, _ in legs]
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         return PostureState(activity, integral), PostureFeedback(
@@ -226,13 +213,13 @@ class PostureController:
 
     def _sway(
         self, positions: list[float], duty: float, omega: float, reference: Triple, moving: float
-    ) -> LateralPlan:
+    ) -> com_plan.LateralPlan:
         """Planned sway of the body; it fades with the legs' activity and with speed sideways."""
-        sway = lateral_plan(positions, duty, omega, self._across, self.model.height)
-        if sway is STRAIGHT:
-            return STRAIGHT
-        share = moving * max(0.0, 1.0 - abs(reference[1]) / self.scale.speed(SIDEWAYS))
-        return LateralPlan(*(share * value for value in sway))
+        sway = com_plan.lateral_plan(positions, duty, omega, self._across, self.model.height)
+        if sway is com_plan.STRAIGHT:
+            return com_plan.STRAIGHT
+        share = moving * max(0.0, 1.0 - abs(reference[1]) / self.scale.speed(com_plan.SIDEWAYS))
+        return com_plan.LateralPlan(*(share * value for value in sway))
 
     def _torque(
         self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
@@ -245,7 +232,7 @@ class PostureController:
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
         torques: list[float] = []
         for on_foot, (_, J), limits in zip(forces, legs, self._torque_limit, strict=True):
-            a, b, c = transposed_times(J, transposed_times(body.R_ground_base, on_foot))
+            a, b, c = vec3.transposed_times(J, vec3.transposed_times(body.R_ground_base, on_foot))
             most_a, most_b, most_c = limits
             torques += (
                 min(max(-a, -most_a), most_a), min(max(-b, -most_b), most_b),

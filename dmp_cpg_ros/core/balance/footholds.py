@@ -25,18 +25,9 @@ from collections.abc import Sequence
 from math import sqrt
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import (
-    Matrix,
-    Triple,
-    dot,
-    heading_frame,
-    rotation,
-    times,
-    transposed_times,
-    triple,
-)
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
@@ -68,7 +59,7 @@ class FootPlacement:
         self, kinematics: list[LegKinematics], footholds_in_base: Array, leg_length: float
     ) -> None:
         """Keep places and lengths."""
-        self._footholds = [triple(foot) for foot in footholds_in_base.tolist()]
+        self._footholds = [vec3.triple(foot) for foot in footholds_in_base.tolist()]
         self._leg_length = leg_length
         self._straight = [leg.thigh_length + leg.shank_length for leg in kinematics]
         self._lateral = [leg.lateral_offset for leg in kinematics]
@@ -171,7 +162,7 @@ class FootPlacement:
         upward, limit = R_ground_base[2], LARGEST_RAISE * self._leg_length
         gain, raised = p.levelling / max(upward[2], 0.3), []
         for (x, y, z), (more_x, more_y) in zip(self._footholds, shift, strict=True):
-            lost = z - dot((x + more_x, y + more_y, z), upward)
+            lost = z - vec3.dot((x + more_x, y + more_y, z), upward)
             raised.append(min(max(gain * lost, -limit), limit))
         return raised
 
@@ -231,18 +222,18 @@ def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Matrix,
     upward_in_ground : tuple of float
         Direction away from gravity.
     """
-    R_world_base = rotation(state.base_quaternion.tolist())
+    R_world_base = vec3.rotation(state.base_quaternion.tolist())
     normal, vertical = state.ground_normal_in_world, R_world_base[2]
     if normal is None or following == 0.0:
-        return heading_frame(vertical), (0.0, 0.0, 1.0)
+        return vec3.heading_frame(vertical), (0.0, 0.0, 1.0)
     x, y, z = normal.tolist()
     x, y = x / z, y / z
     squared = x * x + y * y
     share = following * squared / (squared + SLIGHT**2)
     length = sqrt(share * share * squared + 1.0)
     leaning = (share * x / length, share * y / length, 1.0 / length)
-    R_ground_base = heading_frame(transposed_times(R_world_base, leaning))
-    return R_ground_base, times(R_ground_base, vertical)
+    R_ground_base = vec3.heading_frame(vec3.transposed_times(R_world_base, leaning))
+    return R_ground_base, vec3.times(R_ground_base, vertical)
 
 
 def lean(upward_in_ground: Triple, height: float) -> tuple[float, float]:

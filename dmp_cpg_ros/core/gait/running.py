@@ -30,13 +30,8 @@ from dmp_cpg_ros.core.canonical.inhibition import (
     initial_inhibition,
 )
 from dmp_cpg_ros.core.canonical.phase import turned
+from dmp_cpg_ros.core.gait import contact_feedback as contacts
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, chosen_gait
-from dmp_cpg_ros.core.gait.contact_feedback import (
-    ContactLimits,
-    ContactState,
-    contact_feedback,
-    initial_contact_state,
-)
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
@@ -89,7 +84,7 @@ class CanonicalState:
     cadence_scale: float
     x: Array
     x_dot: Array
-    contact: ContactState
+    contact: contacts.ContactState
 
     @property
     def leading_to(self) -> Gait:
@@ -154,7 +149,7 @@ class RunningGait:
         network = self.network(gait.scaled(factor))
         x = network.rest_state(acting) if inhibition.start_inhibited else network.locked_state()
         return CanonicalState(network.gait, gait, factor, x, np.zeros_like(x),
-                              initial_contact_state())
+                              contacts.initial_contact_state())
 
     def cadence_rate(self, state: CanonicalState) -> float:
         """Rate of the factor on the cadence [1/s]."""
@@ -167,7 +162,7 @@ class RunningGait:
 
     def step(
         self, state: CanonicalState, r: Array, inhibition: Inhibition, dt: float,
-        foot_force: Array | None = None, limits: ContactLimits | None = None,
+        foot_force: Array | None = None, limits: contacts.ContactLimits | None = None,
     ) -> CanonicalState:
         """Advance by one tick.
 
@@ -194,9 +189,10 @@ class RunningGait:
         wanted = state.wanted if name == state.wanted.name else self.gaits.named(name)
         gait, cadence_scale = self._at_cadence(state, dt)
         network, x = self._begin_change(self.network(gait), state.x, r, wanted, inhibition)
-        contact, feedback = state.contact, 0.0  # type: tuple[ContactState, Array | float]
+        contact = state.contact
+        feedback: Array | float = 0.0
         if self.parameters.contact_feedback and foot_force is not None:
-            contact, feedback = contact_feedback(
+            contact, feedback = contacts.contact_feedback(
                 contact, foot_force, self.quarter, limits, network, x, r, inhibition, dt)
         if dt > 0.0:
             network, x = network.advance(x, r, inhibition, dt, feedback)

@@ -24,6 +24,7 @@ from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.transformation import stumble as reflex
 from dmp_cpg_ros.core.transformation.foot_motion import FootMotion, HermiteMotion, Motion
 from dmp_cpg_ros.core.transformation.foot_path import (
     FootPath,
@@ -32,12 +33,6 @@ from dmp_cpg_ros.core.transformation.foot_path import (
     swing_height,
 )
 from dmp_cpg_ros.core.transformation.foothold_offset import OffsetRates
-from dmp_cpg_ros.core.transformation.stumble import (
-    Stumble,
-    compliant_offset_rate,
-    stumble_step,
-    swing_progress,
-)
 
 
 @dataclass(frozen=True)
@@ -93,7 +88,7 @@ class LegState(NamedTuple):
     joints: SpringState
     activity: float
     shift_in_base: Array
-    stumble: Stumble = Stumble()
+    stumble: reflex.Stumble = reflex.Stumble()
     motion: Any = None
 
 
@@ -215,8 +210,8 @@ class LegPrimitive:
         return LegState(joints, activity, np.array(offset), stumble, motion), goal, goal_velocity
 
     def _path(
-        self, reference: Triple, omega: float, duty: float, activity: float, stumble: Stumble,
-        feedback: LegFeedback,
+        self, reference: Triple, omega: float, duty: float, activity: float,
+        stumble: reflex.Stumble, feedback: LegFeedback,
     ) -> FootPath:
         """Path of the foot for the corrected reference, higher after a stumble."""
         v_x, v_y, gamma = plus(reference, triple(feedback.correction.tolist()))
@@ -227,7 +222,7 @@ class LegPrimitive:
     def _offset_rate(
         self, state: LegState, offset: Triple, activity: float, path: FootPath, position: float,
         path_velocity: Triple, feedback: LegFeedback, dt: float,
-    ) -> tuple[Triple, Stumble]:
+    ) -> tuple[Triple, reflex.Stumble]:
         """Rate of the foothold offset [m/s]: placement and stumbling reflex in swing, following
         the ground in stance.
         """
@@ -237,19 +232,19 @@ class LegPrimitive:
         measured = self.kinematics.foot(feedback.joint_position)
         target = self.kinematics.foot(state.joints.position)
         away = minus(measured, target)
+        lift, lag = self.stumble_lift, self.stumble_lag
         if abs(position) >= 0.5 * (1.0 - path.duty):
-            stumble = stumble_step(state.stumble, None, self.stumble_lift, self.stumble_lag, dt)
+            stumble = reflex.stumble_step(state.stumble, None, lift, lag, dt)
             drift = pair(feedback.drift_in_base.tolist())
             return self.offset_rates.in_stance(offset, drift, away[:2], activity, dt), stumble
         progress = None
-        if self.stumble_lift:
+        if lift:
             touches = feedback.foot_force > self.touch_force
-            progress = swing_progress(path, swung, measured, target, touches)
-        lift = activity * self.stumble_lift
-        stumble = stumble_step(state.stumble, progress, lift, self.stumble_lag, dt)
+            progress = reflex.swing_progress(path, swung, measured, target, touches)
+        stumble = reflex.stumble_step(state.stumble, progress, activity * lift, lag, dt)
         placement, (height, _) = triple(feedback.shift_in_base.tolist()), swing_height(swung)
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
-        return compliant_offset_rate(stumble, rate, path_velocity, away), stumble
+        return reflex.compliant_offset_rate(stumble, rate, path_velocity, away), stumble
 
     def _goal(self, foot: Triple, velocity: Triple) -> tuple[Array, Array]:
         """g_θ [rad] and g_θ̇ [rad/s] of a foot in the base."""
