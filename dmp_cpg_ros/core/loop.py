@@ -104,22 +104,18 @@ class WalkingLoop:
         gaits: Mapping[str, Gait] | None = None,
     ) -> None:
         """Build the parts at rest (or free, with ``start_inhibited`` false)."""
-        self.parameters = p = parameters or SuiteParameters()
+        p = parameters or SuiteParameters()
         self._reader = reader = KnownGaits({**(gaits or {}), gait.name: gait})
         scale, legs = body_scale(description), RobotLegs(description)
         self._weight = description.mass * GRAVITY
         self.gate = CommandGate(
             p.reference, scale, highest_speed(p.gait_choice, gait.name, reader.named))
-        self.reference = ReferenceSystem(p.reference)
-        self.canonical = RunningGait(p.canonical, scale, reader, p.gait_change, p.gait_choice,
-                                     quarter_weight(description))
-        self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
-        self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
+        self.canonical = RunningGait(
+            p.canonical, scale, reader, p.gait_change, p.gait_choice, quarter_weight(description))
+        self._take(p)
         self.inbox = VoteInbox()
-        self.estimator = (
-            BodyEstimator(description, p.estimation, legs)
-            if p.state_source.state_source == ESTIMATE
-            else None)
+        self.estimator = None if p.state_source.state_source != ESTIMATE else BodyEstimator(
+            description, p.estimation, legs)
         self.body = BodyControl(description, p.posture, p.mode, legs)
         self.legs = [LegControl(leg, description, p.leg, self.body.modes.movements, p.motion)
                      for leg in LEGS]
@@ -134,6 +130,12 @@ class WalkingLoop:
         self.leg_states = [leg.initial_state() for leg in self.legs]
         self._limits: ContactLimits | None = None
         self._barring = 'standing'
+
+    def _take(self, p: SuiteParameters) -> None:
+        """Make the parts anew that may get other parameters and hold nothing else."""
+        self.parameters, self.reference = p, ReferenceSystem(p.reference)
+        self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
+        self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
 
     def tick(self, state: RobotState) -> Tick:
         """Run all parts on the robot's state of one tick.
@@ -243,22 +245,18 @@ class WalkingLoop:
         proposed = self._described(present.changed(values).parameters, wanted)
         leading_to = named(canon.leading_to.name)
         reason = refused_change(
-            proposed.parameters, (leading_to, canon.wanted, wanted), present.scale, self._dt)
+            proposed.parameters, (leading_to, canon.wanted, wanted), present.scale, self._dt,
+        ) or proposed.refused_now(present, self.network, self.inhibition, self.x)
         if reason:
             return reason
-        waits = proposed.refused_now(present, self.network, self.inhibition, self.x)
-        if waits:
-            return waits
         verdict = CertificateGate().judge(present, present.certificate(), proposed)
         if verdict.accepted:
-            self.parameters = p = proposed.parameters
+            p = proposed.parameters
+            self._take(p)
             self.gate.follow(p.reference, highest_speed(p.gait_choice, wanted.name, named))
-            self.reference = ReferenceSystem(p.reference)
             self.canonical = self.canonical.with_parameters(
                 p.canonical, p.gait_change, p.gait_choice)
             self.canon = updated(canon, wanted=wanted)
-            self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
-            self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
             self._limits = verdict.certificate.contact
         return verdict.reason
 
@@ -266,9 +264,9 @@ class WalkingLoop:
         """What a certificate is computed from."""
         choice = parameters.gait_choice
         others = [self._reader.named(name) for name in choice.auto_gaits if choice.auto_gait]
-        return Running(parameters, gait, self.canonical.scale, self._dt,
-                       tuple(other for other in others if other is not gait),
-                       self.canon.cadence_scale)
+        return Running(
+            parameters, gait, self.canonical.scale, self._dt,
+            tuple(other for other in others if other is not gait), self.canon.cadence_scale)
 
     def time_to_rest(self) -> float:
         """Bound on the time to rest of a stop that is requested now [s]."""
@@ -303,9 +301,6 @@ class WalkingLoop:
         """
         self.inbox.accept(weights, voter)
 
-    def _request_mode(self, what: str, _: Any) -> str:
-        return self.request_mode(what)
-
     def request_mode(self, what: str) -> str:
         """Ask for ``stand_up``, ``lie_down`` or ``recover``, as the services do.
 
@@ -338,6 +333,6 @@ class WalkingLoop:
             'inhibit': self.request,
             'set': self.change,
             'votes': lambda weights: self.vote(weights, 'scenario'),
-            **{what: partial(self._request_mode, what) for what in REQUESTS},
+            **{what: partial(lambda what, _: self.request_mode(what), what) for what in REQUESTS},
             'gait': self.change_gait,
         }

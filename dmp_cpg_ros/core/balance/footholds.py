@@ -129,16 +129,15 @@ class FootPlacement:
             [m]
         """
         capture = p.placement_gain * (self._leg_length / GRAVITY) ** 0.5
-        way = half_stance + capture
-        wanted, wished = self.over_feet(planned), []
-        for (x, y), (wanted_x, wanted_y) in zip(self.over_feet(measured), wanted, strict=True):
-            wished.append((way * x - capture * wanted_x, way * y - capture * wanted_y))
-        shift = []
-        for (x, y), (wanted_x, wanted_y), (_, place, _) in zip(
-            self.within_reach(wished, p.reach), wanted, self._footholds, strict=True):
-            y = _on_own_side(y, place)
-            shift.append((x - half_stance * wanted_x, y - half_stance * wanted_y))
-        return shift
+        way, wanted = half_stance + capture, self.over_feet(planned)
+        wished = [
+            (way * x - capture * planned_x, way * y - capture * planned_y)
+            for (x, y), (planned_x, planned_y) in zip(
+                self.over_feet(measured), wanted, strict=True)]
+        return [
+            (x - half_stance * planned_x, _on_own_side(y, place) - half_stance * planned_y)
+            for (x, y), (planned_x, planned_y), (_, place, _) in zip(
+                self.within_reach(wished, p.reach), wanted, self._footholds, strict=True)]
 
     def raised(
         self, p: PostureParameters, shift: Sequence[Pair], R_ground_base: Matrix
