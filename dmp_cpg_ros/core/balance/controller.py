@@ -5,14 +5,14 @@
 The virtual model (:mod:`~dmp_cpg_ros.core.balance.virtual_model`) says which wrench the body
 needs, the stance feet share it, and the forces become joint torques τ_fb = −Jᵀ f. Swinging feet
 are placed so as to catch the body (:mod:`~dmp_cpg_ros.core.balance.footholds`), and a slow loop
-corrects velocity and heading (:mod:`~dmp_cpg_ros.core.balance.velocity_correction`).
+corrects velocity and heading (:class:`VelocityCorrection`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import pi
+from math import atan2, exp, hypot, isnan, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,6 @@ from dmp_cpg_ros.core.balance import com_plan
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.balance.velocity_correction import VelocityCorrection
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
@@ -37,6 +36,9 @@ from dmp_cpg_ros.core.transformation.foot_path import activities_step
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
+
+SLOWEST = 0.3
+"""Froude speed below which the limit of the correction shrinks no more."""
 
 LARGEST_LOAD = 2.0
 """Largest normal force of a fully loaded foot, in weights of the robot."""
@@ -77,6 +79,66 @@ class PostureFeedback:
         return LegFeedback(
             self.measured[3 * i : 3 * i + 3], self.shift_in_base[i], self.drift_in_base[i],
             self.correction, float(self.foot_force[i]))
+
+
+class VelocityCorrection(NamedTuple):
+    """Integral velocity and heading correction, slow: added to the velocity of the standing feet.
+
+    Attributes
+    ----------
+    correction : tuple of float
+        Correction of the stance velocity, v_x and v_y [m/s].
+    heading_error : float
+        Commanded minus measured heading [rad].
+    yaw : float
+        Heading at the last tick [rad]; NaN before the first.
+    """
+
+    correction: tuple[float, float]
+    heading_error: float
+    yaw: float
+
+    def integrated(
+        self, p: PostureParameters, leg_length: float, moving: float,
+        quaternion: Sequence[float], velocity: Triple, r: Triple, dt: float,
+    ) -> VelocityCorrection:
+        """Integrate the errors of velocity and heading while the legs move; forget them at rest.
+
+        Parameters
+        ----------
+        p : PostureParameters
+            Gains.
+        leg_length : float
+            Standing height of the hips [m].
+        moving : float
+            Mean activity of the legs.
+        quaternion : sequence of four floats
+            Orientation of the base, x, y, z, w.
+        velocity : tuple of float
+            Of the base in the levelled frame [m/s].
+        r : tuple of float
+            Reference v_x, v_y [m/s], γ [rad/s].
+        dt : float
+            [s]
+        """
+        R = vec3.rotation(quaternion)
+        yaw = atan2(R[1][0], R[0][0])
+        slowest = SLOWEST * (GRAVITY * leg_length) ** 0.5
+        limit = p.speed_correction_limit * max(hypot(r[0], r[1]), slowest)
+        gain = p.speed_integral * (GRAVITY / leg_length) ** 0.5 * moving * dt
+        kept = exp(-(1.0 - moving) * p.activity_rate * dt)
+        along, across = (
+            min(max(before + gain * (wanted - is_now), -limit), limit) * kept
+            for before, wanted, is_now in zip(self.correction, r[:2], velocity[:2], strict=True))
+        turn = 0.0 if isnan(self.yaw) else (yaw - self.yaw + pi) % (2.0 * pi) - pi
+        error = (self.heading_error + r[2] * dt - turn) * moving
+        return VelocityCorrection(
+            (along, across), min(max(error, -p.heading_limit), p.heading_limit), yaw)
+
+    def acting(self, p: PostureParameters, leg_length: float, moving: float) -> Triple:
+        """Correction of v_x, v_y [m/s], γ [rad/s] that the legs apply."""
+        turn = p.heading_gain * (GRAVITY / leg_length) ** 0.5 * self.heading_error
+        return moving * self.correction[0], moving * self.correction[1], moving * turn
 
 
 class PostureState(NamedTuple):

@@ -27,7 +27,6 @@ from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -76,10 +75,9 @@ def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalS
     phases : ndarray (4,)
         Locked phases relative to fl [rad].
     """
-    graph = graph_from_edges(
-        len(LEGS), topology(parameters.coupling_graph, len(LEGS)), parameters.coupling_gain,
-        phases)
-    return CanonicalSystem(graph, parameters.oscillators, state_at(phases, parameters.radius))
+    p, edges = parameters, topology(parameters.coupling_graph, len(LEGS))
+    graph = graph_from_edges(len(LEGS), edges, p.coupling_gain, phases)
+    return CanonicalSystem(graph, p.oscillators, state_at(phases, p.radius))
 
 
 class GaitNetwork:
@@ -102,15 +100,13 @@ class GaitNetwork:
         With the cadence that acts: everything that asks a gait for ω must ask this one.
     """
 
-    gait: GaitInForce
-
     def __init__(
         self, parameters: CanonicalParameters, gait: GaitInForce, scale: BodyScale,
         change_rate: float = GaitChangeParameters.gait_change_rate,
     ) -> None:
         """Keep the parts."""
         self.parameters, self.scale, self.change_rate = parameters, scale, change_rate
-        self.gait = gait.scaled(parameters.cadence_scale)
+        self.gait: GaitInForce = gait.scaled(parameters.cadence_scale)
         self._systems: dict[bytes, CanonicalSystem] = {}
 
     def of(self, gait: GaitInForce) -> GaitNetwork:
@@ -157,7 +153,7 @@ class GaitNetwork:
     @property
     def highest_speed(self) -> float:
         """Foot speed at which the gait in force is held [m/s]."""
-        return self.gait.highest_speed * (GRAVITY * self.scale.leg_length) ** 0.5
+        return self.scale.speed(self.gait.highest_speed)
 
     def omega(self, r: Array) -> float:
         """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""

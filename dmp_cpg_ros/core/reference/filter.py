@@ -68,8 +68,7 @@ class CommandGate:
         self._scale = scale
         self.follow(parameters, highest_speed)
         self._command: tuple[float, float, float] = (0.0, 0.0, 0.0)
-        self._received_ns: int | None = None
-        self._fresh = False
+        self._received_ns, self._fresh = 0, False
 
     def follow(self, parameters: ReferenceParameters, highest_speed: float) -> None:
         """Take new limits; they hold for the next command, that of the gait at once."""
@@ -92,19 +91,16 @@ class CommandGate:
             raise DataError(
                 f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite')
         p = self.parameters
-        self._command = (
-            _limited(v_x, p.max_speed), _limited(v_y, p.max_lateral_speed),
-            _limited(gamma, p.max_turn_rate))
-        self._fresh = True
+        limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
+        v_x, v_y, gamma = (min(max(float(value), -limit), limit) for value, limit in zip(
+            (v_x, v_y, gamma), limits, strict=True))
+        self._command, self._fresh = (v_x, v_y, gamma), True
 
     def at(self, time_ns: int) -> tuple[float, float, float]:
         """Command that acts at a time on the robot's clock [ns]: (v_x, v_y, γ)."""
         if self._fresh:
             self._fresh, self._received_ns = False, time_ns
-        if self._received_ns is None:
-            return 0.0, 0.0, 0.0
-        if time_ns < self._received_ns:
-            self._received_ns = time_ns
+        self._received_ns = min(self._received_ns, time_ns)
         timeout = self.parameters.cmd_vel_timeout
         if timeout > 0.0 and (time_ns - self._received_ns) * 1e-9 > timeout:
             return 0.0, 0.0, 0.0
@@ -148,7 +144,3 @@ class ReferenceSystem:
         if change @ change > most * most * (1.0 + 1e-12):
             following[:2] = r[:2] + change * (most / float(np.sqrt(change @ change)))
         return following
-
-
-def _limited(value: float, limit: float) -> float:
-    return min(max(float(value), -limit), limit)
