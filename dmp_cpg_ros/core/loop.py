@@ -99,10 +99,9 @@ class WalkingLoop:
         Gaits that it may change to, beside the first.
     """
 
-    def __init__(
-        self, description: RobotDescription, gait: Gait, parameters: SuiteParameters | None = None,
-        gaits: Mapping[str, Gait] | None = None,
-    ) -> None:
+    def __init__(self, description: RobotDescription, gait: Gait,
+                 parameters: SuiteParameters | None = None,
+                 gaits: Mapping[str, Gait] | None = None) -> None:
         """Build the parts at rest (or free, with ``start_inhibited`` false)."""
         p = parameters or SuiteParameters()
         self._reader = reader = KnownGaits({**(gaits or {}), gait.name: gait})
@@ -170,18 +169,16 @@ class WalkingLoop:
         targets = self._joint_targets(state, x_dot, feedback, dt)
         return Tick(state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait)
 
-    def _joint_targets(
-        self, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
-    ) -> JointTargets:
+    def _joint_targets(self, state: RobotState, x_dot: Array, feedback: PostureFeedback,
+                       dt: float) -> JointTargets:
         """Targets of all legs."""
         legs = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
         columns = [leg.position for leg in legs] + [leg.velocity for leg in legs] + [
             leg.effort for leg in legs]
         return JointTargets(*np.concatenate(columns).reshape(3, -1))
 
-    def _leg(
-        self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
-    ) -> JointTargets:
+    def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
+             dt: float) -> JointTargets:
         canon = self.canon
         self.leg_states[i], targets = self.legs[i].step(
             self.leg_states[i], canon.gait, canon.x, x_dot, self.r, feedback,

@@ -65,10 +65,8 @@ STRAIGHT = LateralPlan(0.0, 0.0, 0.0)
 """Plan of a gait without single-side stance."""
 
 
-def lateral_plan(
-    cycle_position: Sequence[float], duty: float, omega: float, across: Sequence[float],
-    height: float,
-) -> LateralPlan:
+def lateral_plan(cycle_position: Sequence[float], duty: float, omega: float,
+                 across: Sequence[float], height: float) -> LateralPlan:
     """Lateral plan, from where its legs are in their cycles.
 
     Parameters
@@ -114,9 +112,8 @@ def _both_swing(front: float, hind: float, swing: float) -> tuple[float, float]:
     return 2.0 / pi * (sin(pi * together) - sin(pi * opposite)), hind + 0.5 * apart
 
 
-def contact_weights(
-    cycle_position: Sequence[float], duty: float, activity: Sequence[float], transfer: float
-) -> list[float]:
+def contact_weights(cycle_position: Sequence[float], duty: float, activity: Sequence[float],
+                    transfer: float) -> list[float]:
     """Contact schedule weights: how much load each foot may take, a trapezoid over its stance.
 
     Parameters

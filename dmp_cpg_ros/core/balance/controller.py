@@ -98,10 +98,9 @@ class VelocityCorrection(NamedTuple):
     heading_error: float
     yaw: float
 
-    def integrated(
-        self, p: PostureParameters, leg_length: float, moving: float,
-        quaternion: Sequence[float], velocity: Triple, r: Triple, dt: float,
-    ) -> VelocityCorrection:
+    def integrated(self, p: PostureParameters, leg_length: float, moving: float,
+                   quaternion: Sequence[float], velocity: Triple, r: Triple,
+                   dt: float) -> VelocityCorrection:
         """Integrate the errors of velocity and heading while the legs move; forget them at rest.
 
         Parameters
@@ -169,10 +168,8 @@ class PostureController:
         The robot's legs, where others ask them too.
     """
 
-    def __init__(
-        self, description: RobotDescription, parameters: PostureParameters,
-        legs: RobotLegs | None = None,
-    ) -> None:
+    def __init__(self, description: RobotDescription, parameters: PostureParameters,
+                 legs: RobotLegs | None = None) -> None:
         """Scale all parts by the robot's lengths, mass and inertia."""
         self.description, self.parameters = description, parameters
         self.legs = legs or RobotLegs(description)
@@ -195,10 +192,9 @@ class PostureController:
         return PostureState(
             np.zeros(len(self.kinematics)), VelocityCorrection((0.0, 0.0), 0.0, float('nan')))
 
-    def step(
-        self, memory: PostureState, state: RobotState, gait: GaitInForce, x: Array, x_dot: Array,
-        r: Array, dt: float, command: BodyCommand = STANDING,
-    ) -> tuple[PostureState, PostureFeedback]:
+    def step(self, memory: PostureState, state: RobotState, gait: GaitInForce, x: Array,
+             x_dot: Array, r: Array, dt: float,
+             command: BodyCommand = STANDING) -> tuple[PostureState, PostureFeedback]:
         """Compute the feedback of one tick.
 
         Parameters
@@ -263,9 +259,8 @@ class PostureController:
         carried = sum(share * z for share, z in zip(load, heights, strict=True))
         return self.foot_radius - carried / total
 
-    def _bounce(
-        self, gait: GaitInForce, positions: list[float], duty: float, omega: float, moving: float
-    ) -> Bounce:
+    def _bounce(self, gait: GaitInForce, positions: list[float], duty: float, omega: float,
+                moving: float) -> Bounce:
         """Planned bounce of the body: what the legs give way to, in the mean."""
         each = [gait.bounce(position, duty, omega) for position in positions]
         if all(one is LEVEL for one in each):
@@ -273,9 +268,8 @@ class PostureController:
         share = moving / len(each)
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
 
-    def _sway(
-        self, positions: list[float], duty: float, omega: float, reference: Triple, moving: float
-    ) -> com_plan.LateralPlan:
+    def _sway(self, positions: list[float], duty: float, omega: float, reference: Triple,
+              moving: float) -> com_plan.LateralPlan:
         """Planned sway of the body; it fades with the legs' activity and with speed sideways."""
         sway = com_plan.lateral_plan(positions, duty, omega, self._across, self.model.height)
         if sway is com_plan.STRAIGHT:
@@ -283,10 +277,8 @@ class PostureController:
         share = moving * max(0.0, 1.0 - abs(reference[1]) / self.scale.speed(com_plan.SIDEWAYS))
         return com_plan.LateralPlan(*(share * value for value in sway))
 
-    def _torque(
-        self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
-        load: list[float], r: Triple, bounce: Bounce, sway_acceleration: float,
-    ) -> Array:
+    def _torque(self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
+                load: list[float], r: Triple, bounce: Bounce, sway_acceleration: float) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
         force, moment = self.model.wrench(self.parameters, body, r, bounce, sway_acceleration)
         forces = distribute(

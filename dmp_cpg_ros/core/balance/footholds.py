@@ -55,9 +55,8 @@ class FootPlacement:
         Standing height of the hips [m].
     """
 
-    def __init__(
-        self, kinematics: list[LegKinematics], footholds_in_base: Array, leg_length: float
-    ) -> None:
+    def __init__(self, kinematics: list[LegKinematics], footholds_in_base: Array,
+                 leg_length: float) -> None:
         """Keep places and lengths."""
         self._footholds = [vec3.triple(foot) for foot in footholds_in_base.tolist()]
         self._leg_length = leg_length
@@ -109,9 +108,8 @@ class FootPlacement:
             reached.append((x * share, y * share))
         return reached
 
-    def shift(
-        self, p: PostureParameters, measured: Triple, planned: Triple, half_stance: float
-    ) -> list[Pair]:
+    def shift(self, p: PostureParameters, measured: Triple, planned: Triple,
+              half_stance: float) -> list[Pair]:
         """Shift of the footholds.
 
         Parameters
@@ -139,9 +137,8 @@ class FootPlacement:
             for (x, y), (planned_x, planned_y), (_, place, _) in zip(
                 self.within_reach(wished, p.reach), wanted, self._footholds, strict=True)]
 
-    def raised(
-        self, p: PostureParameters, shift: Sequence[Pair], R_ground_base: Matrix
-    ) -> list[float]:
+    def raised(self, p: PostureParameters, shift: Sequence[Pair],
+               R_ground_base: Matrix) -> list[float]:
         """Change of the feet's height in the base that keeps them level over the ground.
 
         Parameters
@@ -165,10 +162,8 @@ class FootPlacement:
             raised.append(min(max(gain * lost, -limit), limit))
         return raised
 
-    def drift(
-        self, p: PostureParameters, measured: Triple, planned: Triple, activity: Sequence[float],
-        sway_velocity: float = 0.0,
-    ) -> list[Pair]:
+    def drift(self, p: PostureParameters, measured: Triple, planned: Triple,
+              activity: Sequence[float], sway_velocity: float = 0.0) -> list[Pair]:
         """Velocity that standing feet add to their paths so as to go along with the ground.
 
         Without it the joint drive would hold the body to its planned velocity, with a force that

@@ -79,10 +79,8 @@ class VirtualModel:
         self._inertia = triple(description.base_inertia.diagonal().tolist())
         self.height = description.stance_height + float(description.com_in_base[2])
 
-    def wrench(
-        self, p: PostureParameters, body: BodyMotion, r: Triple, bounce: Bounce = LEVEL,
-        sway_acceleration: float = 0.0,
-    ) -> tuple[Triple, Triple]:
+    def wrench(self, p: PostureParameters, body: BodyMotion, r: Triple, bounce: Bounce = LEVEL,
+               sway_acceleration: float = 0.0) -> tuple[Triple, Triple]:
         """Force [N] and moment [N m] about the centre of mass in the frame of the ground.
 
         Parameters
@@ -124,10 +122,8 @@ class VirtualModel:
                 i_z * rate * p.yaw_rate_gain * (r[2] - body.rate[2])))
 
 
-def distribute(
-    force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequence[float], friction: float,
-    largest: float, importance: Triple = EQUAL,
-) -> list[Triple]:
+def distribute(force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequence[float],
+               friction: float, largest: float, importance: Triple = EQUAL) -> list[Triple]:
     """Forces of the ground on the feet.
 
     Parameters
@@ -168,10 +164,8 @@ def distribute(
     return forces
 
 
-def _multipliers(
-    force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequence[float], total: float,
-    importance: Triple,
-) -> tuple[Triple, Triple]:
+def _multipliers(force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequence[float],
+                 total: float, importance: Triple) -> tuple[Triple, Triple]:
     """λ and κ of the module's text."""
     damping = REGULARISATION * max(total / len(feet), 1e-9)
     c_x = c_y = c_z = 0.0

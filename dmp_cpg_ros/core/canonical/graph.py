@@ -57,7 +57,10 @@ class CouplingGraph:
                 f'not {self.gains.shape} and {self.phases.shape}')
         if not (np.all(np.isfinite(self.gains)) and np.all(np.isfinite(self.phases))):
             raise ParameterError('coupling gains and phase offsets must be finite')
-        _check_edges(self.edges, self.size)
+        for i, j in self.edges:
+            if not (0 <= i < self.size and 0 <= j < self.size and i != j):
+                raise ParameterError(
+                    f'edge ({i}, {j}) is not between two of the nodes 0 to {self.size - 1}')
         symmetric = 0.5 * (self.gains + np.swapaxes(self.gains, 1, 2))
         for edge, smallest in zip(self.edges, np.linalg.eigvalsh(symmetric)[:, 0], strict=True):
             if smallest <= 0.0:
@@ -86,13 +89,12 @@ class CouplingGraph:
             + b S, such as k I.
         """
         turns = [phase_rotation(float(phi)) for phi in self.phases]
-        turned = np.array(
-            [
-                turns[i].T @ gain @ turns[i]
-                for (i, _), gain in zip(self.edges, self.gains, strict=True)])
-        return -self._block_matrix(turned.reshape(-1, 2, 2), lambda i, j: np.eye(2))
+        turned = [turns[i].T @ gain @ turns[i]
+                  for (i, _), gain in zip(self.edges, self.gains, strict=True)]
+        return -self._block_matrix(turned, lambda i, j: np.eye(2))
 
-    def _block_matrix(self, gains: Array, seen_from: Callable[[int, int], Array]) -> Array:
+    def _block_matrix(self, gains: Iterable[Array], seen_from: Callable[[int, int], Array]
+                      ) -> Array:
         matrix = np.zeros((2 * self.size, 2 * self.size))
         for (i, j), gain in zip(self.edges, gains, strict=True):
             matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] -= gain
@@ -100,9 +102,8 @@ class CouplingGraph:
         return matrix
 
 
-def graph_from_edges(
-    size: int, edges: Edges, gain: float | Array, phases: Array | None = None,
-) -> CouplingGraph:
+def graph_from_edges(size: int, edges: Edges, gain: float | Array,
+                     phases: Array | None = None) -> CouplingGraph:
     """Graph in which every edge has the same gain.
 
     Parameters
@@ -151,10 +152,3 @@ def topology(name: str, size: int) -> Edges:
         raise ParameterError(
             f"topology '{name}' is not known; valid are {', '.join(undirected)}, directed_ring")
     return tuple(edge for i, j in undirected[name] for edge in ((i, j), (j, i)))
-
-
-def _check_edges(edges: Iterable[tuple[int, int]], size: int) -> None:
-    for i, j in edges:
-        if not (0 <= i < size and 0 <= j < size and i != j):
-            raise ParameterError(
-                f'edge ({i}, {j}) is not between two of the nodes 0 to {size - 1}')

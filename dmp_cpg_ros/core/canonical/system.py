@@ -40,9 +40,8 @@ class CanonicalSystem:
         x_{i,d}, where inhibition pulls each node; the paper's [1, 0] scaled to the radius without.
     """
 
-    def __init__(
-        self, graph: CouplingGraph, oscillators: Oscillators, target: Array | None = None,
-    ) -> None:
+    def __init__(self, graph: CouplingGraph, oscillators: Oscillators,
+                 target: Array | None = None) -> None:
         """Collect the constant matrices."""
         self.graph, self.oscillators = graph, oscillators
         self.radius = self._one_per_node('radius')

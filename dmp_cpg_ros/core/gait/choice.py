@@ -50,9 +50,8 @@ class GaitChoiceParameters(Parameters):
                 f'auto_hysteresis = {self.auto_hysteresis:g}')
 
 
-def highest_speed(
-    parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
-) -> float:
+def highest_speed(parameters: GaitChoiceParameters, name: str,
+                  named: Callable[[str], Gait]) -> float:
     """Dimensionless foot speed up to which commands are followed.
 
     Parameters

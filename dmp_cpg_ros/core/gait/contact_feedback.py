@@ -86,10 +86,9 @@ class ContactState:
     released: float
 
 
-def contact_feedback(
-    state: ContactState, force: Array, quarter: float, limits: ContactLimits | None,
-    network: GaitNetwork, x: Array, r: Array, inhibition: Inhibition, dt: float,
-) -> tuple[ContactState, Array]:
+def contact_feedback(state: ContactState, force: Array, quarter: float,
+                     limits: ContactLimits | None, network: GaitNetwork, x: Array, r: Array,
+                     inhibition: Inhibition, dt: float) -> tuple[ContactState, Array]:
     """Frequency offsets of one tick from the contacts of the feet.
 
     Parameters

@@ -293,9 +293,8 @@ class Gait(CycleOfLegs):
         return planned_bounce(cycle_position, self.groups, duty, omega)
 
 
-def limited(
-    velocity: Triple, scale: BodyScale, highest_speed: float, largest_curve: float = inf,
-) -> Triple:
+def limited(velocity: Triple, scale: BodyScale, highest_speed: float,
+            largest_curve: float = inf) -> Triple:
     """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
     share of g, that goes with it [m/s], [rad/s].
     """

@@ -100,10 +100,8 @@ class GaitNetwork:
         With the cadence that acts: everything that asks a gait for ω must ask this one.
     """
 
-    def __init__(
-        self, parameters: CanonicalParameters, gait: GaitInForce, scale: BodyScale,
-        change_rate: float = GaitChangeParameters.gait_change_rate,
-    ) -> None:
+    def __init__(self, parameters: CanonicalParameters, gait: GaitInForce, scale: BodyScale,
+                 change_rate: float = GaitChangeParameters.gait_change_rate) -> None:
         """Keep the parts."""
         self.parameters, self.scale, self.change_rate = parameters, scale, change_rate
         self.gait: GaitInForce = gait.scaled(parameters.cadence_scale)
@@ -159,9 +157,8 @@ class GaitNetwork:
         """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""
         return self.gait.omega(self.scale.foot_speed(*r.tolist()), self.scale)
 
-    def advance(
-        self, x: Array, r: Array, inhibition: Inhibition, dt: float, feedback: Array | float = 0.0,
-    ) -> tuple[GaitNetwork, Array]:
+    def advance(self, x: Array, r: Array, inhibition: Inhibition, dt: float,
+                feedback: Array | float = 0.0) -> tuple[GaitNetwork, Array]:
         """Advance the states and, while gaits change, the blend.
 
         After a gap in the robot's states the time is made up in parts of at most
@@ -200,15 +197,13 @@ class GaitNetwork:
         y = system.step(y, omega + gained / dt + feedback, gains, dt)
         return self.of(gait), _turned(y, None if moving is None else gait.phases)
 
-    def step(
-        self, x: Array, r: Array, inhibition: Inhibition, dt: float, feedback: Array | float = 0.0,
-    ) -> Array:
+    def step(self, x: Array, r: Array, inhibition: Inhibition, dt: float,
+             feedback: Array | float = 0.0) -> Array:
         """Advance the states (4, 2) as :meth:`advance`."""
         return self.advance(x, r, inhibition, dt, feedback)[1]
 
-    def rate(
-        self, x: Array, r: Array, inhibition: Inhibition, feedback: Array | float = 0.0,
-    ) -> Array:
+    def rate(self, x: Array, r: Array, inhibition: Inhibition,
+             feedback: Array | float = 0.0) -> Array:
         """Rate of the states, ẋ (4, 2) [1/s], with feedback as in :meth:`advance`: that of the
         held blend and what moves its offsets.
         """
@@ -224,9 +219,8 @@ class GaitNetwork:
         """
         return state_at(phi + self.gait.phases, self.parameters.radius)
 
-    def rest_state(
-        self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0,
-    ) -> Array:
+    def rest_state(self, inhibition: Inhibition, tick: float = 0.004,
+                   duration: float = 8.0) -> Array:
         """Equilibrium (4, 2) that is reached from the locked state under inhibition at zero
         reference.
         """

@@ -111,11 +111,10 @@ class RunningGait:
         Force on each foot of the standing robot, for contact feedback [N].
     """
 
-    def __init__(
-        self, parameters: CanonicalParameters, scale: BodyScale, gaits: KnownGaits,
-        change: GaitChangeParameters | None = None, choice: GaitChoiceParameters | None = None,
-        quarter: float = float('nan'),
-    ) -> None:
+    def __init__(self, parameters: CanonicalParameters, scale: BodyScale, gaits: KnownGaits,
+                 change: GaitChangeParameters | None = None,
+                 choice: GaitChoiceParameters | None = None,
+                 quarter: float = float('nan')) -> None:
         """Keep the parts; networks are built when they are needed."""
         self.parameters, self.scale, self.gaits, self.quarter = parameters, scale, gaits, quarter
         self.choice = choice or GaitChoiceParameters()
@@ -123,10 +122,8 @@ class RunningGait:
             parameters, next(iter(gaits.gaits.values())), scale,
             (change or GaitChangeParameters()).gait_change_rate)
 
-    def with_parameters(
-        self, parameters: CanonicalParameters, change: GaitChangeParameters,
-        choice: GaitChoiceParameters,
-    ) -> RunningGait:
+    def with_parameters(self, parameters: CanonicalParameters, change: GaitChangeParameters,
+                        choice: GaitChoiceParameters) -> RunningGait:
         """Return the block with other parameters; from the next step on they act."""
         return RunningGait(parameters, self.scale, self.gaits, change, choice, self.quarter)
 
@@ -160,10 +157,9 @@ class RunningGait:
         """Ask for a gait; raises ParameterError with the valid names."""
         return updated(state, wanted=self.gaits.named(name))
 
-    def step(
-        self, state: CanonicalState, r: Array, inhibition: Inhibition, dt: float,
-        foot_force: Array | None = None, limits: contacts.ContactLimits | None = None,
-    ) -> CanonicalState:
+    def step(self, state: CanonicalState, r: Array, inhibition: Inhibition, dt: float,
+             foot_force: Array | None = None,
+             limits: contacts.ContactLimits | None = None) -> CanonicalState:
         """Advance by one tick.
 
         Parameters

@@ -60,10 +60,8 @@ class CommandGate:
         :func:`~dmp_cpg_ros.core.gait.choice.highest_speed`.
     """
 
-    def __init__(
-        self, parameters: ReferenceParameters, scale: BodyScale | None = None,
-        highest_speed: float = inf,
-    ) -> None:
+    def __init__(self, parameters: ReferenceParameters, scale: BodyScale | None = None,
+                 highest_speed: float = inf) -> None:
         """Start with a zero command."""
         self._scale = scale
         self.follow(parameters, highest_speed)

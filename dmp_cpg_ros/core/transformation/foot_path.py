@@ -137,9 +137,8 @@ def swing_height(s: float) -> tuple[float, float]:
     return u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) * scale
 
 
-def activity_step(
-    activity: float, phase_rate: float, omega: float, rate: float, dt: float
-) -> float:
+def activity_step(activity: float, phase_rate: float, omega: float, rate: float,
+                  dt: float) -> float:
     """Advance ȧ = rate · (sat(φ̇/ω) − a) exactly for a held phase rate.
 
     Parameters
@@ -163,9 +162,8 @@ def activity_step(
     return wanted + (activity - wanted) * exp(-rate * dt)
 
 
-def activities_step(
-    activities: Array, phase_rates: list[float], omegas: list[float], rate: float, dt: float,
-) -> Array:
+def activities_step(activities: Array, phase_rates: list[float], omegas: list[float], rate: float,
+                    dt: float) -> Array:
     """As :func:`activity_step` for a few legs, (n,), without arithmetic on arrays."""
     kept, after = exp(-rate * dt), []
     for activity, phase_rate, omega in zip(activities.tolist(), phase_rates, omegas, strict=True):

@@ -126,18 +126,15 @@ class LearnedFoot:
         The swing is scaled to the height that the path asks.
     """
 
-    def __init__(
-        self, primitive: RhythmicPrimitive, clearance: float, stance_height: float
-    ) -> None:
+    def __init__(self, primitive: RhythmicPrimitive, clearance: float,
+                 stance_height: float) -> None:
         """Keep."""
         self._primitive, self._height = primitive, stance_height
         self._full = clearance * stance_height
         self._held = RhythmicInput(primitive.centre)
 
-    def step(
-        self, state: PlayedFoot | None, path: FootPath, cycle_position: float, rate: float,
-        dt: float,
-    ) -> tuple[PlayedFoot, Triple, Triple]:
+    def step(self, state: PlayedFoot | None, path: FootPath, cycle_position: float, rate: float,
+             dt: float) -> tuple[PlayedFoot, Triple, Triple]:
         """Foot at the present phase, as :meth:`FootMotion.step`."""
         psi, stretch = warped(cycle_position, path.duty)
         began, on = (psi, 0.0) if state is None else (
@@ -204,10 +201,9 @@ class FootSamples:
     foot: Array
 
 
-def learn_motion(
-    feet: Sequence[Sequence[FootSamples]], stance_height: float, bases: int = 25,
-    stiffness: float = 6400.0, damping: float = 160.0,
-) -> tuple[RhythmicPrimitive, Array]:
+def learn_motion(feet: Sequence[Sequence[FootSamples]], stance_height: float, bases: int = 25,
+                 stiffness: float = 6400.0,
+                 damping: float = 160.0) -> tuple[RhythmicPrimitive, Array]:
     """Learn one primitive for all feet.
 
     Parameters

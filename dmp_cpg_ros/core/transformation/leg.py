@@ -132,10 +132,8 @@ class LegPrimitive:
         :class:`~dmp_cpg_ros.core.transformation.foot_path.FootPath` itself without.
     """
 
-    def __init__(
-        self, leg: str, description: RobotDescription, parameters: LegParameters,
-        motion: Motion | None = None,
-    ) -> None:
+    def __init__(self, leg: str, description: RobotDescription, parameters: LegParameters,
+                 motion: Motion | None = None) -> None:
         """Derive foothold and scale from the description."""
         self._motion: FootMotion = (
             HermiteMotion() if motion is None else motion.of_leg(leg, description))
@@ -161,10 +159,8 @@ class LegPrimitive:
         q = self.kinematics.inverse(self.foothold_in_base)
         return LegState(SpringState(q, np.zeros(3)), 0.0, np.zeros(3))
 
-    def step(
-        self, state: LegState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
-        feedback: LegFeedback, dt: float,
-    ) -> tuple[LegState, Array, Array]:
+    def step(self, state: LegState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
+             feedback: LegFeedback, dt: float) -> tuple[LegState, Array, Array]:
         """Advance the leg to the time at which the inputs hold.
 
         Parameters
@@ -209,20 +205,17 @@ class LegPrimitive:
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, np.array(offset), stumble, motion), goal, goal_velocity
 
-    def _path(
-        self, reference: Triple, omega: float, duty: float, activity: float,
-        stumble: reflex.Stumble, feedback: LegFeedback,
-    ) -> FootPath:
+    def _path(self, reference: Triple, omega: float, duty: float, activity: float,
+              stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
         """Path of the foot for the corrected reference, higher after a stumble."""
         v_x, v_y, gamma = plus(reference, triple(feedback.correction.tolist()))
         clearance = self.clearance + (self.stumble_lift if stumble.post_stumble else 0.0)
         return FootPath(
             self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
 
-    def _offset_rate(
-        self, state: LegState, offset: Triple, activity: float, path: FootPath, position: float,
-        path_velocity: Triple, feedback: LegFeedback, dt: float,
-    ) -> tuple[Triple, reflex.Stumble]:
+    def _offset_rate(self, state: LegState, offset: Triple, activity: float, path: FootPath,
+                     position: float, path_velocity: Triple, feedback: LegFeedback,
+                     dt: float) -> tuple[Triple, reflex.Stumble]:
         """Rate of the foothold offset [m/s]: placement and stumbling reflex in swing, following
         the ground in stance.
         """
@@ -252,10 +245,8 @@ class LegPrimitive:
         _, jacobian = self.kinematics.foot_and_jacobian(angles)
         return np.array(angles), np.array(_joint_velocity(jacobian, velocity))
 
-    def targets(
-        self, state: LegState, goal: Array, goal_velocity: Array, feedback: Array,
-        measured: SpringState | None = None,
-    ) -> JointTargets:
+    def targets(self, state: LegState, goal: Array, goal_velocity: Array, feedback: Array,
+                measured: SpringState | None = None) -> JointTargets:
         """Joint targets of the parameters' reading.
 
         Parameters

@@ -103,9 +103,8 @@ class SwingProgress(NamedTuple):
     touches: bool = False
 
 
-def swing_progress(
-    path: FootPath, swung: float, foot: Triple, target: Triple, touches: bool = False
-) -> SwingProgress | None:
+def swing_progress(path: FootPath, swung: float, foot: Triple, target: Triple,
+                   touches: bool = False) -> SwingProgress | None:
     """Swing progress of a foot; None where the body hardly moves over it.
 
     Parameters
@@ -168,9 +167,8 @@ class Stumble(NamedTuple):
     sinking: float = 0.0
 
 
-def stumble_step(
-    before: Stumble, progress: SwingProgress | None, lift: float, threshold: float, dt: float
-) -> Stumble:
+def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, threshold: float,
+                 dt: float) -> Stumble:
     """Advance the reflex of one foot.
 
     Parameters
@@ -234,9 +232,8 @@ def _in_stance(before: Stumble, lift: float, dt: float) -> Stumble:
     return Stumble(post_stumble=post_stumble, height=height, rate=(height - before.height) / dt)
 
 
-def compliant_offset_rate(
-    stumble: Stumble, offset_rate: Triple, velocity: Triple, away: Triple
-) -> Triple:
+def compliant_offset_rate(stumble: Stumble, offset_rate: Triple, velocity: Triple,
+                          away: Triple) -> Triple:
     """Rate of the foothold offset of a swinging foot's path [m/s].
 
     Parameters
