@@ -263,7 +263,7 @@ class PostureController:
                 moving: float) -> Bounce:
         """Planned bounce of the body: what the legs give way to, in the mean."""
         each = [gait.bounce(position, duty, omega) for position in positions]
-        if all(one is LEVEL for one in each):
+        if each[0] is LEVEL:  # wherever the legs are
             return LEVEL
         share = moving / len(each)
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))

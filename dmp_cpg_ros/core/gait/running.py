@@ -181,8 +181,9 @@ class RunningGait:
         -------
         CanonicalState
         """
-        name = chosen_gait(self.choice, state.wanted.name, r, self.scale)
-        wanted = state.wanted if name == state.wanted.name else self.gaits.named(name)
+        wanted = state.wanted
+        if self.choice.auto_gait:
+            wanted = self.gaits.named(chosen_gait(self.choice, wanted.name, r, self.scale))
         gait, cadence_scale = self._at_cadence(state, dt)
         network, x = self._begin_change(self.network(gait), state.x, r, wanted, inhibition)
         contact = state.contact

@@ -198,10 +198,11 @@ class LegPrimitive:
             state, offset, activity, path, position, path_velocity, feedback, dt)
         offset = moved(offset, offset_rate, dt)
         bounce = gait.bounce(position, duty, omega)
-        foot = plus(plus(foot, offset), (0.0, 0.0, stumble.height - activity * bounce.height))
-        velocity = plus(plus(offset_rate, path_velocity), (0.0, 0.0, stumble.rate))
-        velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
-        goal, goal_velocity = self._goal(foot, velocity)
+        p_x, p_y, p_z = plus(foot, offset)
+        v_x, v_y, v_z = plus(offset_rate, path_velocity)
+        goal, goal_velocity = self._goal(
+            (p_x, p_y, p_z + (stumble.height - activity * bounce.height)),
+            (v_x, v_y, v_z + stumble.rate - activity * bounce.velocity * (rate / omega)))
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, np.array(offset), stumble, motion), goal, goal_velocity
 
