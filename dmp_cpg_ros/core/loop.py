@@ -36,7 +36,7 @@ from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.modes.manager import ModeState
@@ -253,7 +253,7 @@ class WalkingLoop:
             self.gate.follow(p.reference, highest_speed(p.gait_choice, wanted.name, named))
             self.canonical = self.canonical.with_parameters(
                 p.canonical, p.gait_change, p.gait_choice)
-            self.canon = updated(canon, wanted=wanted)
+            self.canon = replace_unchecked(canon, wanted=wanted)
             self._limits = verdict.certificate.contact
         return verdict.reason
 
@@ -287,7 +287,7 @@ class WalkingLoop:
     def _estimated(self, state: RobotState) -> RobotState:
         """State of the robot as the posture block is to know it."""
         if self.estimator is None:
-            return updated(state, foot_force=np.zeros(len(LEGS)))  # as odom, which has none
+            return replace_unchecked(state, foot_force=np.zeros(4))  # as odom, which has none
         readings = readings_of(state)
         self.estimator_state, estimate = self.estimator.step(self.estimator_state, readings)
         return estimated_state(readings, estimate)

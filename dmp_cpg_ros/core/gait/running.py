@@ -37,7 +37,7 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 
 CADENCE_RATE = 0.5
 """Rate at which the factor on the cadence moves to a new value [1/s].
@@ -155,7 +155,7 @@ class RunningGait:
 
     def want(self, state: CanonicalState, name: str) -> CanonicalState:
         """Ask for a gait; raises ParameterError with the valid names."""
-        return updated(state, wanted=self.gaits.named(name))
+        return replace_unchecked(state, wanted=self.gaits.named(name))
 
     def step(self, state: CanonicalState, r: Array, inhibition: Inhibition, dt: float,
              foot_force: Array | None = None,

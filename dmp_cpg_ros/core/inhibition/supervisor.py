@@ -27,7 +27,7 @@ from dmp_cpg_ros.core.contraction.capture import place_tolerance, radius_toleran
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
 from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
-from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import activities_step
 
@@ -183,7 +183,7 @@ class GaitSupervisor:
         A service call that asks for a start ends a stop by votes too, once nobody votes any more.
         """
         voted = state.voted and (stop or automatic or state.tally.alive)
-        return self._turned(updated(state, asked=stop, automatic=automatic, voted=voted))
+        return self._turned(replace_unchecked(state, asked=stop, automatic=automatic, voted=voted))
 
     def step(
         self, state: SupervisorState, time_ns: int, network: GaitNetwork, x: Array, x_dot: Array,
@@ -226,7 +226,7 @@ class GaitSupervisor:
             self.activity_rate,
             dt,
         )
-        state = updated(state, time_ns=time_ns, activity=activity)
+        state = replace_unchecked(state, time_ns=time_ns, activity=activity)
         if body_mode == 'standing':
             state = self._automatic(state, command)
         else:
@@ -246,10 +246,10 @@ class GaitSupervisor:
             return state
         if any(command):
             if state.idle_ns >= 0:
-                state = updated(state, idle_ns=-1)
+                state = replace_unchecked(state, idle_ns=-1)
             return self.request(state, False, True) if state.asked and state.automatic else state
         if state.idle_ns < 0:
-            state = updated(state, idle_ns=state.time_ns)
+            state = replace_unchecked(state, idle_ns=state.time_ns)
         waited = (state.time_ns - state.idle_ns) * 1e-9
         if not state.asked and waited >= self.parameters.auto_delay:
             return self.request(state, True, True)
@@ -258,15 +258,15 @@ class GaitSupervisor:
     def _voted(self, state: SupervisorState, tally: Tally) -> SupervisorState:
         """Stop when votes overcome the threshold; keep what holds until it is released."""
         if tally is not state.tally:
-            state = updated(state, tally=tally)
+            state = replace_unchecked(state, tally=tally)
         if tally.stops and not state.voted:
-            return self._turned(updated(state, voted=True, vote_gains=tally.gains))
+            return self._turned(replace_unchecked(state, voted=True, vote_gains=tally.gains))
         if not state.voted:
             return state
         if not tally.alive and self.voting.vote_resume:
-            return self._turned(updated(state, voted=False))
+            return self._turned(replace_unchecked(state, voted=False))
         if self.voting.vote_rule == SUM and np.any(tally.gains > state.vote_gains):
-            return updated(state, vote_gains=np.maximum(tally.gains, state.vote_gains))
+            return replace_unchecked(state, vote_gains=np.maximum(tally.gains, state.vote_gains))
         return state
 
     @staticmethod
@@ -275,7 +275,7 @@ class GaitSupervisor:
         stop = state.asked or state.voted
         if stop == state.requested:
             return state
-        return updated(
+        return replace_unchecked(
             state,
             word='waiting' if stop else 'releasing',
             requested=stop,
@@ -290,7 +290,7 @@ class GaitSupervisor:
         automatic = body_mode not in FALLEN_MODES
         if not state.asked:
             return self.request(state, True, automatic)
-        return updated(state, automatic=state.automatic and automatic, idle_ns=-1)
+        return replace_unchecked(state, automatic=state.automatic and automatic, idle_ns=-1)
 
     def _stopping(
         self, state: SupervisorState, network: GaitNetwork, x: Array, rates: list[float],
@@ -300,14 +300,15 @@ class GaitSupervisor:
         armed = (state.armed and inside) or (
             speed <= self.parameters.capture_speed and self.in_places(network, x))
         if not (armed and inside):
-            return updated(state, armed=armed, word='waiting')
+            return replace_unchecked(state, armed=armed, word='waiting')
         if (
             max(map(abs, rates)) > REST_PHASE_RATE
             or speed > REST_SPEED
             or max(state.activity.tolist()) > REST_ACTIVITY
         ):
-            return updated(state, armed=armed, word='captured')
-        return updated(state, armed=armed, word='at_rest', measured_s=self._measured(state))
+            return replace_unchecked(state, armed=armed, word='captured')
+        return replace_unchecked(
+            state, armed=armed, word='at_rest', measured_s=self._measured(state))
 
     def _acts(self, state: SupervisorState, target: Array, x: Array) -> bool:
         """Whether inhibition acts at a state once it is armed."""
@@ -330,7 +331,7 @@ class GaitSupervisor:
         word, measured_s = 'walking' if locked and speed > REST_SPEED else 'free', state.measured_s
         if word == state.word and isfinite(measured_s):
             return state
-        return updated(state, word=word, measured_s=self._measured(state))
+        return replace_unchecked(state, word=word, measured_s=self._measured(state))
 
     @staticmethod
     def _measured(state: SupervisorState) -> float:
