@@ -13,6 +13,7 @@ from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
@@ -24,7 +25,7 @@ GAIN_ROWS = ('synchronisation', 'contraction', 'capture', 'rest_in_region', 'tim
 """Inequalities that the two gains decide; the others depend on other parameters."""
 
 _LARGEST_COUPLING, _LARGEST_INHIBITION = 1e4, 1e5
-_PRECISION = 1e-3
+_HALVINGS = 10
 
 
 @dataclass(frozen=True)
@@ -111,11 +112,7 @@ def nearest_value(holds: Callable[[float], bool], working: float, wanted: float)
         raise ParameterError(f'{working:g} does not hold a certificate to start from')
     if holds(wanted):
         return wanted
-    low, high = working, wanted
-    while abs(high - low) > _PRECISION * abs(wanted - working):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(middle) else (low, middle)
-    return low
+    return last_that_holds(holds, working, wanted, _HALVINGS)
 
 
 def _has_margin(found: Certificate) -> bool:
