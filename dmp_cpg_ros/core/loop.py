@@ -8,12 +8,11 @@ For tuning, tests and studies. In lock-step the nodes publish the same numbers, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.certificates.changes import refused_change
@@ -34,8 +33,9 @@ from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorSta
 from dmp_cpg_ros.core.inhibition.voters import vote_sensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.modes.body_control import BodyControl
 from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.modes.manager import ModeState
@@ -48,11 +48,8 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
 
-Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class Tick:
+class Tick(NamedTuple):
     """Everything that one tick produced.
 
     Attributes
@@ -101,28 +98,22 @@ class WalkingLoop:
         Gaits that it may change to, beside the first.
     """
 
-    def __init__(
-        self, description: RobotDescription, gait: Gait, parameters: SuiteParameters | None = None,
-        gaits: Mapping[str, Gait] | None = None,
-    ) -> None:
+    def __init__(self, description: RobotDescription, gait: Gait,
+                 parameters: SuiteParameters | None = None,
+                 gaits: Mapping[str, Gait] | None = None) -> None:
         """Build the parts at rest (or free, with ``start_inhibited`` false)."""
-        self.parameters = p = parameters or SuiteParameters()
+        p = parameters or SuiteParameters()
         self._reader = reader = KnownGaits({**(gaits or {}), gait.name: gait})
         scale, legs = body_scale(description), RobotLegs(description)
         self._weight = description.mass * GRAVITY
         self.gate = CommandGate(
             p.reference, scale, highest_speed(p.gait_choice, gait.name, reader.named))
-        self.reference = ReferenceSystem(p.reference)
-        self.canonical = RunningGait(p.canonical, scale, reader, p.gait_change, p.gait_choice,
-                                     quarter_weight(description))
-        self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
-        self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
+        self.canonical = RunningGait(
+            p.canonical, scale, reader, p.gait_change, p.gait_choice, quarter_weight(description))
+        self._take(p)
         self.inbox = VoteInbox()
-        self.estimator = (
-            BodyEstimator(description, p.estimation, legs)
-            if p.state_source.state_source == ESTIMATE
-            else None
-        )
+        self.estimator = None if p.state_source.state_source != ESTIMATE else BodyEstimator(
+            description, p.estimation, legs)
         self.body = BodyControl(description, p.posture, p.mode, legs)
         self.legs = [LegControl(leg, description, p.leg, self.body.modes.movements, p.motion)
                      for leg in LEGS]
@@ -137,6 +128,12 @@ class WalkingLoop:
         self.leg_states = [leg.initial_state() for leg in self.legs]
         self._limits: ContactLimits | None = None
         self._barring = 'standing'
+
+    def _take(self, p: SuiteParameters) -> None:
+        """Make the parts anew that may get other parameters and hold nothing else."""
+        self.parameters, self.reference = p, ReferenceSystem(p.reference)
+        self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
+        self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
 
     def tick(self, state: RobotState) -> Tick:
         """Run all parts on the robot's state of one tick.
@@ -169,23 +166,21 @@ class WalkingLoop:
             self.mode.mode)
         self.inhibition = self.supervisor.inhibition(self.stop)
         targets = self._joint_targets(state, x_dot, feedback, dt)
-        return Tick(
-            state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait)
+        return Tick(state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait)
 
-    def _joint_targets(
-        self, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
-    ) -> JointTargets:
+    def _joint_targets(self, state: RobotState, x_dot: Array, feedback: PostureFeedback,
+                       dt: float) -> JointTargets:
         """Targets of all legs."""
         legs = [self._leg(i, state, x_dot, feedback, dt) for i in range(len(LEGS))]
-        return JointTargets(*(
-            np.concatenate([getattr(leg, name) for leg in legs])
-            for name in ('position', 'velocity', 'effort')))
+        columns = [leg.position for leg in legs] + [leg.velocity for leg in legs] + [
+            leg.effort for leg in legs]
+        return JointTargets(*np.concatenate(columns).reshape(3, -1))
 
-    def _leg(
-        self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback, dt: float,
-    ) -> JointTargets:
+    def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
+             dt: float) -> JointTargets:
+        canon = self.canon
         self.leg_states[i], targets = self.legs[i].step(
-            self.leg_states[i], self.canon.gait, self.x, x_dot, self.r, feedback,
+            self.leg_states[i], canon.gait, canon.x, x_dot, self.r, feedback,
             state.joint_position, state.joint_velocity, dt)
         return targets
 
@@ -220,8 +215,7 @@ class WalkingLoop:
         self.stop = self.supervisor.request(self.stop, stop)
         return predict(
             self.supervisor, self.reference, self.canonical, self.stop, self.inhibition,
-            self.canon, self.r, self.gate.at(self.stop.time_ns), self._dt,
-        )
+            self.canon, self.r, self.gate.at(self.stop.time_ns), self._dt)
 
     def change(self, values: Mapping[str, Any]) -> str:
         """Change parameters as the nodes' services do; they act from the next tick on.
@@ -247,22 +241,18 @@ class WalkingLoop:
         proposed = self._described(present.changed(values).parameters, wanted)
         leading_to = named(canon.leading_to.name)
         reason = refused_change(
-            proposed.parameters, (leading_to, canon.wanted, wanted), present.scale, self._dt)
+            proposed.parameters, (leading_to, canon.wanted, wanted), present.scale, self._dt,
+        ) or proposed.refused_now(present, self.network, self.inhibition, self.x)
         if reason:
             return reason
-        waits = proposed.refused_now(present, self.network, self.inhibition, self.x)
-        if waits:
-            return waits
         verdict = CertificateGate().judge(present, present.certificate(), proposed)
         if verdict.accepted:
-            self.parameters = p = proposed.parameters
+            p = proposed.parameters
+            self._take(p)
             self.gate.follow(p.reference, highest_speed(p.gait_choice, wanted.name, named))
-            self.reference = ReferenceSystem(p.reference)
             self.canonical = self.canonical.with_parameters(
                 p.canonical, p.gait_change, p.gait_choice)
-            self.canon = updated(canon, wanted=wanted)
-            self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
-            self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
+            self.canon = replace_unchecked(canon, wanted=wanted)
             self._limits = verdict.certificate.contact
         return verdict.reason
 
@@ -270,9 +260,9 @@ class WalkingLoop:
         """What a certificate is computed from."""
         choice = parameters.gait_choice
         others = [self._reader.named(name) for name in choice.auto_gaits if choice.auto_gait]
-        return Running(parameters, gait, self.canonical.scale, self._dt,
-                       tuple(other for other in others if other is not gait),
-                       self.canon.cadence_scale)
+        return Running(
+            parameters, gait, self.canonical.scale, self._dt,
+            tuple(other for other in others if other is not gait), self.canon.cadence_scale)
 
     def time_to_rest(self) -> float:
         """Bound on the time to rest of a stop that is requested now [s]."""
@@ -296,7 +286,7 @@ class WalkingLoop:
     def _estimated(self, state: RobotState) -> RobotState:
         """State of the robot as the posture block is to know it."""
         if self.estimator is None:
-            return updated(state, foot_force=np.zeros(len(LEGS)))  # as odom, which has none
+            return replace_unchecked(state, foot_force=np.zeros(4))  # as odom, which has none
         readings = readings_of(state)
         self.estimator_state, estimate = self.estimator.step(self.estimator_state, readings)
         return estimated_state(readings, estimate)
@@ -306,9 +296,6 @@ class WalkingLoop:
         tick on; raises DataError for a name or a number that cannot be used.
         """
         self.inbox.accept(weights, voter)
-
-    def _request_mode(self, what: str, _: Any) -> str:
-        return self.request_mode(what)
 
     def request_mode(self, what: str) -> str:
         """Ask for ``stand_up``, ``lie_down`` or ``recover``, as the services do.
@@ -342,6 +329,6 @@ class WalkingLoop:
             'inhibit': self.request,
             'set': self.change,
             'votes': lambda weights: self.vote(weights, 'scenario'),
-            **{what: partial(self._request_mode, what) for what in REQUESTS},
+            **{what: partial(lambda what, _: self.request_mode(what), what) for what in REQUESTS},
             'gait': self.change_gait,
         }

@@ -22,13 +22,8 @@ LONGEST_SHOWN = 120
 
 
 def parameter(
-    default: Any,
-    description: str,
-    *,
-    unit: str = '',
-    minimum: float | None = None,
-    maximum: float | None = None,
-    choices: tuple[str, ...] = (),
+    default: Any, description: str, minimum: float | None = None, maximum: float | None = None, *,
+    unit: str = '', choices: tuple[str, ...] = (),
 ) -> Any:
     """Describe one parameter.
 
@@ -38,10 +33,10 @@ def parameter(
         Default value; its type is the parameter's type.
     description : str
         What it does, in one sentence.
-    unit : str
-        SI unit as text, empty for pure numbers and words.
     minimum, maximum : float, optional
         Closed range for numbers (for every entry of a tuple).
+    unit : str
+        SI unit as text, empty for pure numbers and words.
     choices : tuple of str
         The words that are allowed, for strings.
 
@@ -50,16 +45,9 @@ def parameter(
     dataclasses.Field
         For use as a default in a class body.
     """
-    return dataclasses.field(
-        default=default,
-        metadata={
-            'description': description,
-            'unit': unit,
-            'minimum': minimum,
-            'maximum': maximum,
-            'choices': choices,
-        },
-    )
+    return dataclasses.field(default=default, metadata={
+        'description': description, 'minimum': minimum, 'maximum': maximum, 'unit': unit,
+        'choices': choices})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,9 +74,7 @@ class Parameters:
 
 def range_of(cls: type[Parameters], name: str) -> tuple[float, float]:
     """Smallest and largest value that a parameter may have; infinite where there is no bound."""
-    metadata = cls.__dataclass_fields__[name].metadata
-    low, high = metadata['minimum'], metadata['maximum']
-    return -math.inf if low is None else low, math.inf if high is None else high
+    return _range(cls.__dataclass_fields__[name])
 
 
 def check_names(
@@ -116,43 +102,38 @@ def shown(value: Any) -> str:
     return text if len(text) <= LONGEST_SHOWN else f'{text[:LONGEST_SHOWN]}...'
 
 
+def _range(field: dataclasses.Field[Any]) -> tuple[float, float]:
+    low, high = field.metadata['minimum'], field.metadata['maximum']
+    return -math.inf if low is None else low, math.inf if high is None else high
+
+
 def _checked(field: dataclasses.Field[Any], value: Any) -> Any:
     """Return the value converted to the type of its default, or raise ParameterError."""
-    default = field.default
-    if isinstance(default, tuple):
-        if not isinstance(value, (tuple, list)):
-            raise ParameterError(f"parameter '{field.name}' must be a list, not {shown(value)}")
-        like = default[0] if default else 0.0
-        return tuple(_checked_scalar(field, like, entry) for entry in value)
-    return _checked_scalar(field, default, value)
+    if not isinstance(field.default, tuple):
+        return _checked_scalar(field, field.default, value)
+    if not isinstance(value, (tuple, list)):
+        raise ParameterError(f"parameter '{field.name}' must be a list, not {shown(value)}")
+    return tuple(_checked_scalar(field, field.default[0], entry) for entry in value)
 
 
 def _checked_scalar(field: dataclasses.Field[Any], like: Any, value: Any) -> Any:
-    name, unit = field.name, field.metadata.get('unit', '')
+    name, unit, choices = field.name, field.metadata['unit'], field.metadata['choices']
     if isinstance(like, bool):
-        if not isinstance(value, bool):
-            raise ParameterError(f"parameter '{name}' must be true or false, not {shown(value)}")
+        fits, valid = isinstance(value, bool), 'true or false'
+    elif isinstance(like, str):
+        fits = isinstance(value, str) and (not choices or value in choices)
+        valid = f'one of {", ".join(choices)}' if choices else 'text'
+    else:
+        whole = isinstance(like, int)
+        fits = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
+        valid = 'a whole number' if whole else 'a number'
+    if not fits:
+        raise ParameterError(f"parameter '{name}' must be {valid}, not {shown(value)}")
+    if isinstance(like, (bool, str)):
         return value
-    if isinstance(like, str):
-        choices = field.metadata.get('choices', ())
-        if not isinstance(value, str) or (choices and value not in choices):
-            valid = f'one of {", ".join(choices)}' if choices else 'text'
-            raise ParameterError(f"parameter '{name}' must be {valid}, not {shown(value)}")
-        return value
-    if isinstance(like, int) and not (isinstance(value, int) and not isinstance(value, bool)):
-        raise ParameterError(f"parameter '{name}' must be a whole number, not {shown(value)}")
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise ParameterError(f"parameter '{name}' must be a number, not {shown(value)}")
-    low, high = field.metadata.get('minimum'), field.metadata.get('maximum')
-    if (
-        not math.isfinite(value)
-        or (low is not None and value < low)
-        or (high is not None and value > high)
-    ):
-        low_text = '-inf' if low is None else f'{low:g}'
-        high_text = 'inf' if high is None else f'{high:g}'
+    low, high = _range(field)
+    if not (math.isfinite(value) and low <= value <= high):
         raise ParameterError(
             f"parameter '{name}' = {shown(value)} {unit} is outside its range "
-            f'[{low_text}, {high_text}] {unit}'.replace('  ', ' ').rstrip()
-        )
-    return value if isinstance(like, int) else float(value)
+            f'[{low:g}, {high:g}] {unit}'.replace('  ', ' ').rstrip())
+    return value if whole else float(value)

@@ -18,10 +18,7 @@ from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSo
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
-from dmp_cpg_ros.core.inhibition.voting_parameters import (
-    VoteSourceParameters,
-    VotingParameters,
-)
+from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -63,8 +60,7 @@ class SuiteParameters:
     @property
     def sets(self) -> dict[str, Parameters]:
         """Parameter sets by the name of their part."""
-        return {name: value for name, value in vars(self).items()
-                if isinstance(value, Parameters)}
+        return {name: value for name, value in vars(self).items() if isinstance(value, Parameters)}
 
 
 @dataclass(frozen=True)
@@ -72,8 +68,7 @@ class RobotFileParameters(Parameters):
     """Which robot walks."""
 
     robot: str = parameter(
-        'robots/mini_quadruped.yaml', 'robot file, in the config folder or by its path'
-    )
+        'robots/mini_quadruped.yaml', 'robot file, in the config folder or by its path')
 
 
 @dataclass(frozen=True)
@@ -81,8 +76,7 @@ class GaitParameters(Parameters):
     """How it walks."""
 
     gaits_file: str = parameter(
-        'gaits.yaml', 'file with the gaits, in the config folder or by its path'
-    )
+        'gaits.yaml', 'file with the gaits, in the config folder or by its path')
     gait: str = parameter('amble', 'name of the gait')
 
 
@@ -98,12 +92,8 @@ class TickParameters(Parameters):
     """How often the robot tells its state."""
 
     control_rate: float = parameter(
-        250.0,
-        "rate of the robot's states; its period must be a whole number of physics steps",
-        unit='Hz',
-        minimum=1.0,
-        maximum=2000.0,
-    )
+        250.0, "rate of the robot's states; its period must be a whole number of physics steps",
+        1.0, 2000.0, unit='Hz')
 
     def __post_init__(self) -> None:
         """Validate; the period must be a whole number of microseconds."""
@@ -111,8 +101,7 @@ class TickParameters(Parameters):
         if abs(1e6 / self.control_rate - round(1e6 / self.control_rate)) > 1e-6:
             raise ParameterError(
                 f'control_rate = {self.control_rate:g} Hz must have a period of whole '
-                f'microseconds; 200, 250, 500 and 1000 Hz have'
-            )
+                f'microseconds; 200, 250, 500 and 1000 Hz have')
 
     @property
     def tick_ns(self) -> int:
@@ -132,51 +121,29 @@ class RobotParameters(Parameters):
     """How the robot behind the port is run."""
 
     physics: str = parameter(
-        'mujoco',
-        'simulation of the robot: MuJoCo, or joints that track perfectly',
-        choices=('mujoco', 'perfect_tracking'),
-    )
+        'mujoco', 'simulation of the robot: MuJoCo, or joints that track perfectly',
+        choices=('mujoco', 'perfect_tracking'))
     reading: str = parameter(
-        'kinematic',
-        'whether joints follow targets or receive torques only',
-        choices=('kinematic', 'torque'),
-    )
+        'kinematic', 'whether joints follow targets or receive torques only',
+        choices=('kinematic', 'torque'))
     contact_feedback: bool = parameter(
-        False, 'whether early and late touchdown shift the phase of the legs'
-    )
+        False, 'whether early and late touchdown shift the phase of the legs')
     gated: bool = parameter(
-        False,
-        'whether the robot waits for mujoco_robot/advance_until: for each tick in '
-        'lock-step, to begin in real time',
-    )
-    seed: int = parameter(0, 'seed of the initial spread', minimum=0)
+        False, 'whether the robot waits for mujoco_robot/advance_until: for each tick in '
+        'lock-step, to begin in real time')
+    seed: int = parameter(0, 'seed of the initial spread', 0)
     start_pose: str = parameter(
-        'standing',
-        'start pose: standing, lying on the belly, or fallen, drawn by the seed',
-        choices=('standing', 'lying', 'fallen'),
-    )
+        'standing', 'start pose: standing, lying on the belly, or fallen, drawn by the seed',
+        choices=('standing', 'lying', 'fallen'))
     initial_spread: float = parameter(
-        0.0,
-        'joints start at the home pose plus a uniform draw from plus or minus this',
-        unit='rad',
-        minimum=0.0,
-        maximum=0.3,
-    )
+        0.0, 'joints start at the home pose plus a uniform draw from plus or minus this', 0.0, 0.3,
+        unit='rad')
     target_timeout: float = parameter(
-        0.2,
-        "age of a leg's targets after which the fallback controller takes over",
-        unit='s',
-        minimum=0.01,
-        maximum=10.0,
-    )
+        0.2, "age of a leg's targets after which the fallback controller takes over", 0.01, 10.0,
+        unit='s')
     longest_lag: float = parameter(
-        0.024,
-        "real time: age of a leg's targets beyond which the simulation waits for newer "
-        'ones, up to target_timeout of wall time; 0: it never waits',
-        unit='s',
-        minimum=0.0,
-        maximum=10.0,
-    )
+        0.024, "real time: age of a leg's targets beyond which the simulation waits for newer "
+        'ones, up to target_timeout of wall time; 0: it never waits', 0.0, 10.0, unit='s')
     viewer: bool = parameter(False, 'whether to open a window with the robot')
 
 
@@ -185,24 +152,14 @@ class CertificateParameters(Parameters):
     """What happens without a certificate."""
 
     allow_uncertified: bool = parameter(
-        False,
-        'whether the gait may start, and parameters may change, although the certificate fails',
-    )
+        False, 'whether the gait may start, and parameters may change, although the certificate '
+        'fails')
 
 
 CERTIFIED: tuple[type[Parameters], ...] = (
-    CanonicalParameters,
-    InhibitionParameters,
-    VotingParameters,
-    ReferenceParameters,
-    LegParameters,
-    PostureParameters,
-    TickParameters,
-    GaitParameters,
-    GaitChangeParameters,
-    GaitChoiceParameters,
-    RobotFileParameters,
-)
+    CanonicalParameters, InhibitionParameters, VotingParameters, ReferenceParameters,
+    LegParameters, PostureParameters, TickParameters, GaitParameters, GaitChangeParameters,
+    GaitChoiceParameters, RobotFileParameters)
 """Parameter sets that the certificate is computed from; nodes that compute it declare all of
 them.
 """
@@ -221,53 +178,24 @@ PART_OF: dict[str, tuple[type[Parameters], ...]] = {
     'leg_transformation': (LegParameters,),
     INHIBITION: (InhibitionParameters, VotingParameters, VoteSourceParameters),
     'posture_control': (
-        PostureParameters, EstimationParameters, StateSourceParameters, ModeParameters,
-    ),
+        PostureParameters, EstimationParameters, StateSourceParameters, ModeParameters),
 }
 """Parameter sets of the part of the core that a node runs; others it declares for certificates."""
 
 VOTE_SOURCES = (
-    'footing_weight',
-    'collision_weight',
-    'tilt_weight',
-    'tilt_limit',
-    'silence_weight',
-)
+    'footing_weight', 'collision_weight', 'tilt_weight', 'tilt_limit', 'silence_weight')
 """Parameters that may change and that the inhibition alone has."""
 
 CHANGEABLE: dict[str, tuple[str, ...]] = {
     REFERENCE: (
-        'alpha_r',
-        'max_speed',
-        'max_lateral_speed',
-        'max_turn_rate',
-        'max_curve',
-        'cmd_vel_timeout',
-    ),
+        'alpha_r', 'max_speed', 'max_lateral_speed', 'max_turn_rate', 'max_curve',
+        'cmd_vel_timeout'),
     CANONICAL: (
-        'rho',
-        'coupling_gain',
-        'coupling_graph',
-        'cadence_scale',
-        'gait',
-        'gait_change_rate',
-        'auto_gait',
-        'auto_gaits',
-        'auto_speeds',
-        'auto_hysteresis',
-    ),
+        'rho', 'coupling_gain', 'coupling_graph', 'cadence_scale', 'gait', 'gait_change_rate',
+        'auto_gait', 'auto_gaits', 'auto_speeds', 'auto_hysteresis'),
     INHIBITION: (
-        'inhibition_gain',
-        'region_radius',
-        'inhibited_legs',
-        'capture_speed',
-        'auto_inhibit',
-        'auto_delay',
-        'vote_rule',
-        'vote_majority',
-        'vote_limit',
-        *UNCERTIFIED_VOTES,
-    ),
+        'inhibition_gain', 'region_radius', 'inhibited_legs', 'capture_speed', 'auto_inhibit',
+        'auto_delay', 'vote_rule', 'vote_majority', 'vote_limit', *UNCERTIFIED_VOTES),
 }
 """Parameters of the certified nodes that may change while they run, by the node that owns them;
 other nodes that declare them follow their owner.
@@ -288,6 +216,5 @@ def chosen_world(world: WorldParameters, robot: RobotParameters) -> World:
     if robot.physics != 'mujoco' and (world.world, world.world_friction) != ('flat', 0.0):
         raise ParameterError(
             f'world {world.world} needs physics: mujoco; with physics: {robot.physics} the body '
-            'rides level on its feet, and the only world is flat, without a friction of its own'
-        )
+            'rides level on its feet, and the only world is flat, without a friction of its own')
     return world.build()

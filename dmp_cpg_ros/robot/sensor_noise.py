@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
@@ -49,7 +49,7 @@ class SensorNoise:
         """
         noise = self._deviation * self._random.standard_normal(30)
         noise[:6] += self._bias
-        return updated(
+        return replace_unchecked(
             state, joint_position=state.joint_position + noise[6:18],
             joint_velocity=state.joint_velocity + noise[18:],
             acceleration_in_base=state.acceleration_in_base + noise[3:6],

@@ -77,8 +77,8 @@ class FreezingLoop(WalkingLoop):
             return super()._leg(i, state, x_dot, feedback, dt)
         leg, joints = self.legs[i].primitive, self.legs[i].joints
         position, zero = self.leg_states[i].leg.joints.position, np.zeros(3)
-        held = replace(self.leg_states[i].leg, joints=SpringState(position, zero))
-        self.leg_states[i] = replace(self.leg_states[i], leg=held)
+        held = self.leg_states[i].leg._replace(joints=SpringState(position, zero))
+        self.leg_states[i] = self.leg_states[i]._replace(leg=held)
         measured = None
         if leg.parameters.reading == 'torque':
             measured = SpringState(state.joint_position[joints],

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
-from functools import lru_cache
-from math import ceil, cos, hypot, isnan, nan, pi, sin
+from functools import lru_cache, partial
+from math import ceil, cos, hypot, isnan, log2, nan, pi, sin
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
 from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.robot_model.world_choice import WORLDS
@@ -199,13 +200,10 @@ def survived_pushes(case: PushCase, robot: str | None = None) -> PushOutcome:
 
 
 def _largest(run: Walk, angle: float, case: PushCase) -> float:
-    good, bad = 0.0, case.largest
-    if survives(run, angle, bad):
-        return bad
-    while bad - good > case.resolution * (1.0 + 1e-9):
-        middle = 0.5 * (good + bad)
-        good, bad = (middle, bad) if survives(run, angle, middle) else (good, middle)
-    return good
+    if survives(run, angle, case.largest):
+        return case.largest
+    halvings = ceil(log2(case.largest / case.resolution) - 1e-9)
+    return last_that_holds(partial(survives, run, angle), 0.0, case.largest, max(0, halvings))
 
 
 def survives(run: Walk, angle: float, speed_change: float) -> bool:

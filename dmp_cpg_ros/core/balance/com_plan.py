@@ -38,10 +38,6 @@ from math import cos, pi, sin
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.robot_model.state import LEGS
-
-LEFT, RIGHT = (
-    tuple(LEGS.index(leg) for leg in side) for side in (('fl', 'rl'), ('fr', 'rr')))
 
 
 class LateralPlan(NamedTuple):
@@ -69,10 +65,8 @@ STRAIGHT = LateralPlan(0.0, 0.0, 0.0)
 """Plan of a gait without single-side stance."""
 
 
-def lateral_plan(
-    cycle_position: Sequence[float], duty: float, omega: float, across: Sequence[float],
-    height: float,
-) -> LateralPlan:
+def lateral_plan(cycle_position: Sequence[float], duty: float, omega: float,
+                 across: Sequence[float], height: float) -> LateralPlan:
     """Lateral plan, from where its legs are in their cycles.
 
     Parameters
@@ -93,11 +87,11 @@ def lateral_plan(
     LateralPlan
     """
     along = quadrature = 0.0
-    for swinging, standing in ((RIGHT, LEFT), (LEFT, RIGHT)):
-        front, hind = (cycle_position[leg] for leg in swinging)
+    (fl, fr, rl, rr), (y_fl, y_fr, y_rl, y_rr) = cycle_position, across
+    for front, hind, standing in ((fr, rr, y_fl + y_rl), (fl, rl, y_fr + y_rr)):
         amplitude, middle = _both_swing(front, hind, 1.0 - duty)
         if amplitude != 0.0:
-            amplitude *= 0.5 * sum(across[leg] for leg in standing)
+            amplitude *= 0.5 * standing
             along += amplitude * cos(2.0 * pi * middle)
             quadrature += amplitude * sin(2.0 * pi * middle)
     if along == quadrature == 0.0:
@@ -118,9 +112,8 @@ def _both_swing(front: float, hind: float, swing: float) -> tuple[float, float]:
     return 2.0 / pi * (sin(pi * together) - sin(pi * opposite)), hind + 0.5 * apart
 
 
-def contact_weights(
-    cycle_position: Sequence[float], duty: float, activity: Sequence[float], transfer: float
-) -> list[float]:
+def contact_weights(cycle_position: Sequence[float], duty: float, activity: Sequence[float],
+                    transfer: float) -> list[float]:
     """Contact schedule weights: how much load each foot may take, a trapezoid over its stance.
 
     Parameters
@@ -142,5 +135,4 @@ def contact_weights(
     lift_off = 0.5 * (1.0 - duty)
     return [
         max(min(max((abs(position) - lift_off) / transfer, 0.0), 1.0), 1.0 - swings)
-        for position, swings in zip(cycle_position, activity, strict=True)
-    ]
+        for position, swings in zip(cycle_position, activity, strict=True)]

@@ -5,44 +5,30 @@
 The virtual model (:mod:`~dmp_cpg_ros.core.balance.virtual_model`) says which wrench the body
 needs, the stance feet share it, and the forces become joint torques τ_fb = −Jᵀ f. Swinging feet
 are placed so as to catch the body (:mod:`~dmp_cpg_ros.core.balance.footholds`), and a slow loop
-corrects velocity and heading (:mod:`~dmp_cpg_ros.core.balance.velocity_correction`).
+corrects velocity and heading (:class:`VelocityCorrection`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import pi
+from math import atan2, exp, hypot, isnan, pi
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.balance import com_plan
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
-from dmp_cpg_ros.core.balance.com_plan import (
-    SIDEWAYS,
-    STRAIGHT,
-    LateralPlan,
-    contact_weights,
-    lateral_plan,
-)
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.balance.velocity_correction import VelocityCorrection
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
 from dmp_cpg_ros.core.gait.contact_feedback import believed
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import (
-    Matrix,
-    Triple,
-    minus,
-    plus,
-    times,
-    transposed_times,
-    triple,
-)
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
@@ -51,7 +37,8 @@ from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
 
-Array = NDArray[np.float64]
+SLOWEST = 0.3
+"""Froude speed below which the limit of the correction shrinks no more."""
 
 LARGEST_LOAD = 2.0
 """Largest normal force of a fully loaded foot, in weights of the robot."""
@@ -94,8 +81,66 @@ class PostureFeedback:
             self.correction, float(self.foot_force[i]))
 
 
-@dataclass(frozen=True)
-class PostureState:
+class VelocityCorrection(NamedTuple):
+    """Integral velocity and heading correction, slow: added to the velocity of the standing feet.
+
+    Attributes
+    ----------
+    correction : tuple of float
+        Correction of the stance velocity, v_x and v_y [m/s].
+    heading_error : float
+        Commanded minus measured heading [rad].
+    yaw : float
+        Heading at the last tick [rad]; NaN before the first.
+    """
+
+    correction: tuple[float, float]
+    heading_error: float
+    yaw: float
+
+    def integrated(self, p: PostureParameters, leg_length: float, moving: float,
+                   quaternion: Sequence[float], velocity: Triple, r: Triple,
+                   dt: float) -> VelocityCorrection:
+        """Integrate the errors of velocity and heading while the legs move; forget them at rest.
+
+        Parameters
+        ----------
+        p : PostureParameters
+            Gains.
+        leg_length : float
+            Standing height of the hips [m].
+        moving : float
+            Mean activity of the legs.
+        quaternion : sequence of four floats
+            Orientation of the base, x, y, z, w.
+        velocity : tuple of float
+            Of the base in the levelled frame [m/s].
+        r : tuple of float
+            Reference v_x, v_y [m/s], γ [rad/s].
+        dt : float
+            [s]
+        """
+        R = vec3.rotation(quaternion)
+        yaw = atan2(R[1][0], R[0][0])
+        slowest = SLOWEST * (GRAVITY * leg_length) ** 0.5
+        limit = p.speed_correction_limit * max(hypot(r[0], r[1]), slowest)
+        gain = p.speed_integral * (GRAVITY / leg_length) ** 0.5 * moving * dt
+        kept = exp(-(1.0 - moving) * p.activity_rate * dt)
+        along, across = (
+            min(max(before + gain * (wanted - is_now), -limit), limit) * kept
+            for before, wanted, is_now in zip(self.correction, r[:2], velocity[:2], strict=True))
+        turn = 0.0 if isnan(self.yaw) else (yaw - self.yaw + pi) % (2.0 * pi) - pi
+        error = (self.heading_error + r[2] * dt - turn) * moving
+        return VelocityCorrection(
+            (along, across), min(max(error, -p.heading_limit), p.heading_limit), yaw)
+
+    def acting(self, p: PostureParameters, leg_length: float, moving: float) -> Triple:
+        """Correction of v_x, v_y [m/s], γ [rad/s] that the legs apply."""
+        turn = p.heading_gain * (GRAVITY / leg_length) ** 0.5 * self.heading_error
+        return moving * self.correction[0], moving * self.correction[1], moving * turn
+
+
+class PostureState(NamedTuple):
     """The controller's own state.
 
     Attributes
@@ -123,10 +168,8 @@ class PostureController:
         The robot's legs, where others ask them too.
     """
 
-    def __init__(
-        self, description: RobotDescription, parameters: PostureParameters,
-        legs: RobotLegs | None = None,
-    ) -> None:
+    def __init__(self, description: RobotDescription, parameters: PostureParameters,
+                 legs: RobotLegs | None = None) -> None:
         """Scale all parts by the robot's lengths, mass and inertia."""
         self.description, self.parameters = description, parameters
         self.legs = legs or RobotLegs(description)
@@ -137,22 +180,21 @@ class PostureController:
         self.placement = FootPlacement(self.kinematics, footholds, self.scale.leg_length)
         self._across: list[float] = footholds[:, 1].tolist()
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
-        self._com_in_base = triple(description.com_in_base.tolist())
-        self._torque_limit = [triple(leg.torque_limit.tolist()) for leg in description.legs]
+        self._com_in_base = vec3.triple(description.com_in_base.tolist())
+        self._torque_limit = [vec3.triple(leg.torque_limit.tolist()) for leg in description.legs]
         inertia = description.base_inertia.diagonal()
         # moments count as the accelerations that they cause at the length of a leg
-        self._importance = triple(
-            (description.mass * self.scale.leg_length / inertia).tolist())
+        importance = description.mass * self.scale.leg_length / inertia
+        self._importance = vec3.triple(importance.tolist())
 
     def initial_state(self) -> PostureState:
         """State of a robot that stands."""
         return PostureState(
             np.zeros(len(self.kinematics)), VelocityCorrection((0.0, 0.0), 0.0, float('nan')))
 
-    def step(
-        self, memory: PostureState, state: RobotState, gait: GaitInForce, x: Array, x_dot: Array,
-        r: Array, dt: float,
-    ) -> tuple[PostureState, PostureFeedback]:
+    def step(self, memory: PostureState, state: RobotState, gait: GaitInForce, x: Array,
+             x_dot: Array, r: Array, dt: float,
+             command: BodyCommand = STANDING) -> tuple[PostureState, PostureFeedback]:
         """Compute the feedback of one tick.
 
         Parameters
@@ -169,6 +211,8 @@ class PostureController:
             Reference v_x, v_y [m/s], γ [rad/s].
         dt : float
             Time since the last tick [s].
+        command : BodyCommand
+            What the body does.
 
         Returns
         -------
@@ -176,45 +220,36 @@ class PostureController:
         feedback : PostureFeedback
         """
         p, leg_length = self.parameters, self.scale.leg_length
-        reference = gait.limited(triple(r.tolist()), self.scale)
-        speed = self.scale.foot_speed(*reference)
-        omega, duty = gait.omega(speed, self.scale), gait.duty(speed, self.scale)
+        reference, omega, own_omegas, duty = gait.pace(r, self.scale)
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
-        activity = activities_step(
-            memory.activity, rates, gait.own_omegas(omega), p.activity_rate, dt)
+        activity = activities_step(memory.activity, rates, own_omegas, p.activity_rate, dt)
         swings = activity.tolist()
-        positions = [
-            gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
-        load = contact_weights(positions, duty, swings, p.load_transfer)
+        positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
+        load = com_plan.contact_weights(positions, duty, swings, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
-        velocity = times(R_ground_base, triple(state.base_velocity_in_base.tolist()))
-        rate = times(R_ground_base, triple(state.base_rate_in_base.tolist()))
+        velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))
+        rate = vec3.times(R_ground_base, vec3.triple(state.base_rate_in_base.tolist()))
         moving = sum(swings) / len(swings)
         integral = memory.integral.integrated(
             p, leg_length, moving, state.base_quaternion.tolist(), velocity, reference, dt)
         correction = integral.acting(p, leg_length, moving)
         sway = self._sway(positions, duty, omega, reference, moving)
         measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
-        planned = plus(reference, correction)
+        planned = vec3.plus(reference, correction)
         lean_x, lean_y = lean(upward, self.model.height)
         shift = [
             (along + p.slope_lean * lean_x, across + p.slope_lean * lean_y)
-            for along, across in self.placement.shift(p, measured, planned, pi * duty / omega)
-        ]
+            for along, across in self.placement.shift(p, measured, planned, pi * duty / omega)]
         raised = self.placement.raised(p, shift, R_ground_base)
         legs = self.legs.at(state.joint_position.tolist())
-        feet = [
-            times(R_ground_base, minus(foot, self._com_in_base)) for foot, _ in legs]
+        feet = [vec3.times(R_ground_base, vec3.minus(foot, self._com_in_base)) for foot, _ in legs]
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         return PostureState(activity, integral), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, sway.acceleration),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
             np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
-            np.array(correction),
-            measured=state.joint_position,
-            foot_force=believed(state.foot_force),
-        )
+            np.array(correction), command, state.joint_position, believed(state.foot_force))
 
     def _height(self, feet: list[Triple], load: list[float]) -> float:
         """Height of the centre of mass over the ground under the feet that carry [m]."""
@@ -224,43 +259,36 @@ class PostureController:
         carried = sum(share * z for share, z in zip(load, heights, strict=True))
         return self.foot_radius - carried / total
 
-    def _bounce(
-        self, gait: GaitInForce, positions: list[float], duty: float, omega: float, moving: float
-    ) -> Bounce:
+    def _bounce(self, gait: GaitInForce, positions: list[float], duty: float, omega: float,
+                moving: float) -> Bounce:
         """Planned bounce of the body: what the legs give way to, in the mean."""
         each = [gait.bounce(position, duty, omega) for position in positions]
-        if all(one is LEVEL for one in each):
+        if each[0] is LEVEL:  # wherever the legs are
             return LEVEL
         share = moving / len(each)
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
 
-    def _sway(
-        self, positions: list[float], duty: float, omega: float, reference: Triple, moving: float
-    ) -> LateralPlan:
+    def _sway(self, positions: list[float], duty: float, omega: float, reference: Triple,
+              moving: float) -> com_plan.LateralPlan:
         """Planned sway of the body; it fades with the legs' activity and with speed sideways."""
-        sway = lateral_plan(positions, duty, omega, self._across, self.model.height)
-        if sway is STRAIGHT:
-            return STRAIGHT
-        share = moving * max(0.0, 1.0 - abs(reference[1]) / self.scale.speed(SIDEWAYS))
-        return LateralPlan(*(share * value for value in sway))
+        sway = com_plan.lateral_plan(positions, duty, omega, self._across, self.model.height)
+        if sway is com_plan.STRAIGHT:
+            return com_plan.STRAIGHT
+        share = moving * max(0.0, 1.0 - abs(reference[1]) / self.scale.speed(com_plan.SIDEWAYS))
+        return com_plan.LateralPlan(*(share * value for value in sway))
 
-    def _torque(
-        self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
-        load: list[float], r: Triple, bounce: Bounce, sway_acceleration: float,
-    ) -> Array:
+    def _torque(self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
+                load: list[float], r: Triple, bounce: Bounce, sway_acceleration: float) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
-        force, moment = self.model.wrench(
-            self.parameters, body, r, bounce, sway_acceleration)
+        force, moment = self.model.wrench(self.parameters, body, r, bounce, sway_acceleration)
         forces = distribute(
             force, moment, feet, load, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
         torques: list[float] = []
         for on_foot, (_, J), limits in zip(forces, legs, self._torque_limit, strict=True):
-            a, b, c = transposed_times(J, transposed_times(body.R_ground_base, on_foot))
+            a, b, c = vec3.transposed_times(J, vec3.transposed_times(body.R_ground_base, on_foot))
             most_a, most_b, most_c = limits
             torques += (
-                min(max(-a, -most_a), most_a),
-                min(max(-b, -most_b), most_b),
-                min(max(-c, -most_c), most_c),
-            )
+                min(max(-a, -most_a), most_a), min(max(-b, -most_b), most_b),
+                min(max(-c, -most_c), most_c))
         return np.array(torques)

@@ -24,25 +24,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
+from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import (
-    Matrix,
-    Triple,
-    dot,
-    heading_frame,
-    rotation,
-    times,
-    transposed_times,
-    triple,
-)
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import RobotState
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 LARGEST_RAISE = 0.35
@@ -67,18 +55,16 @@ class FootPlacement:
         Standing height of the hips [m].
     """
 
-    def __init__(
-        self, kinematics: list[LegKinematics], footholds_in_base: Array, leg_length: float
-    ) -> None:
+    def __init__(self, kinematics: list[LegKinematics], footholds_in_base: Array,
+                 leg_length: float) -> None:
         """Keep places and lengths."""
-        self._footholds = [triple(foot) for foot in footholds_in_base.tolist()]
+        self._footholds = [vec3.triple(foot) for foot in footholds_in_base.tolist()]
         self._leg_length = leg_length
         self._straight = [leg.thigh_length + leg.shank_length for leg in kinematics]
         self._lateral = [leg.lateral_offset for leg in kinematics]
         self._depth = [
             float(leg.geometry.hip_in_base[2]) - height
-            for leg, (_, _, height) in zip(kinematics, self._footholds, strict=True)
-        ]
+            for leg, (_, _, height) in zip(kinematics, self._footholds, strict=True)]
 
     def over_feet(self, velocity: Triple) -> list[Pair]:
         """Velocity of the body over its feet, v + γ ẑ × p.
@@ -115,17 +101,15 @@ class FootPlacement:
         """
         reached = []
         for (x, y), straight, depth, lateral in zip(
-            down, self._straight, self._depth, self._lateral, strict=True
-        ):
+            down, self._straight, self._depth, self._lateral, strict=True):
             room = max((reach * straight) ** 2 - depth * depth, 1e-6)
             squared, outward = max(x * x + y * y, 1e-12), lateral * y
             share = min((sqrt(outward * outward + squared * room) - outward) / squared, 1.0)
             reached.append((x * share, y * share))
         return reached
 
-    def shift(
-        self, p: PostureParameters, measured: Triple, planned: Triple, half_stance: float
-    ) -> list[Pair]:
+    def shift(self, p: PostureParameters, measured: Triple, planned: Triple,
+              half_stance: float) -> list[Pair]:
         """Shift of the footholds.
 
         Parameters
@@ -143,21 +127,18 @@ class FootPlacement:
             [m]
         """
         capture = p.placement_gain * (self._leg_length / GRAVITY) ** 0.5
-        way = half_stance + capture
-        wanted, wished = self.over_feet(planned), []
-        for (x, y), (wanted_x, wanted_y) in zip(self.over_feet(measured), wanted, strict=True):
-            wished.append((way * x - capture * wanted_x, way * y - capture * wanted_y))
-        shift = []
-        for (x, y), (wanted_x, wanted_y), (_, place, _) in zip(
-            self.within_reach(wished, p.reach), wanted, self._footholds, strict=True
-        ):
-            y = _on_own_side(y, place)
-            shift.append((x - half_stance * wanted_x, y - half_stance * wanted_y))
-        return shift
+        way, wanted = half_stance + capture, self.over_feet(planned)
+        wished = [
+            (way * x - capture * planned_x, way * y - capture * planned_y)
+            for (x, y), (planned_x, planned_y) in zip(
+                self.over_feet(measured), wanted, strict=True)]
+        return [
+            (x - half_stance * planned_x, _on_own_side(y, place) - half_stance * planned_y)
+            for (x, y), (planned_x, planned_y), (_, place, _) in zip(
+                self.within_reach(wished, p.reach), wanted, self._footholds, strict=True)]
 
-    def raised(
-        self, p: PostureParameters, shift: Sequence[Pair], R_ground_base: Matrix
-    ) -> list[float]:
+    def raised(self, p: PostureParameters, shift: Sequence[Pair],
+               R_ground_base: Matrix) -> list[float]:
         """Change of the feet's height in the base that keeps them level over the ground.
 
         Parameters
@@ -177,14 +158,12 @@ class FootPlacement:
         upward, limit = R_ground_base[2], LARGEST_RAISE * self._leg_length
         gain, raised = p.levelling / max(upward[2], 0.3), []
         for (x, y, z), (more_x, more_y) in zip(self._footholds, shift, strict=True):
-            lost = z - dot((x + more_x, y + more_y, z), upward)
+            lost = z - vec3.dot((x + more_x, y + more_y, z), upward)
             raised.append(min(max(gain * lost, -limit), limit))
         return raised
 
-    def drift(
-        self, p: PostureParameters, measured: Triple, planned: Triple, activity: Sequence[float],
-        sway_velocity: float = 0.0,
-    ) -> list[Pair]:
+    def drift(self, p: PostureParameters, measured: Triple, planned: Triple,
+              activity: Sequence[float], sway_velocity: float = 0.0) -> list[Pair]:
         """Velocity that standing feet add to their paths so as to go along with the ground.
 
         Without it the joint drive would hold the body to its planned velocity, with a force that
@@ -237,18 +216,18 @@ def ground_from_base(state: RobotState, following: float = 1.0) -> tuple[Matrix,
     upward_in_ground : tuple of float
         Direction away from gravity.
     """
-    R_world_base = rotation(state.base_quaternion.tolist())
+    R_world_base = vec3.rotation(state.base_quaternion.tolist())
     normal, vertical = state.ground_normal_in_world, R_world_base[2]
     if normal is None or following == 0.0:
-        return heading_frame(vertical), (0.0, 0.0, 1.0)
+        return vec3.heading_frame(vertical), (0.0, 0.0, 1.0)
     x, y, z = normal.tolist()
     x, y = x / z, y / z
     squared = x * x + y * y
     share = following * squared / (squared + SLIGHT**2)
     length = sqrt(share * share * squared + 1.0)
     leaning = (share * x / length, share * y / length, 1.0 / length)
-    R_ground_base = heading_frame(transposed_times(R_world_base, leaning))
-    return R_ground_base, times(R_ground_base, vertical)
+    R_ground_base = vec3.heading_frame(vec3.transposed_times(R_world_base, leaning))
+    return R_ground_base, vec3.times(R_ground_base, vertical)
 
 
 def lean(upward_in_ground: Triple, height: float) -> tuple[float, float]:

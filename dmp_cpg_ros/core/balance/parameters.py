@@ -19,107 +19,47 @@ class PostureParameters(Parameters):
     """Gains of virtual model, force distribution, foot placement and speed keeping."""
 
     height_stiffness: float = parameter(
-        2.3, 'virtual spring of the height, per mass, in g/l', minimum=0.0, maximum=100.0
-    )
+        2.3, 'virtual spring of the height, per mass, in g/l', 0.0, 100.0)
     height_damping: float = parameter(
-        2.0, 'virtual damper of the height, per mass, in sqrt(g/l)', minimum=0.0, maximum=100.0
-    )
+        2.0, 'virtual damper of the height, per mass, in sqrt(g/l)', 0.0, 100.0)
     attitude_stiffness: float = parameter(
-        4.3,
-        'virtual spring of roll and pitch, per inertia, in g/l',
-        minimum=0.0,
-        maximum=100.0,
-    )
+        4.3, 'virtual spring of roll and pitch, per inertia, in g/l', 0.0, 100.0)
     attitude_damping: float = parameter(
-        2.5,
-        'virtual damper of roll and pitch, per inertia, in sqrt(g/l)',
-        minimum=0.0,
-        maximum=100.0,
-    )
+        2.5, 'virtual damper of roll and pitch, per inertia, in sqrt(g/l)', 0.0, 100.0)
     velocity_gain: float = parameter(
-        0.7,
-        'force per mass and error of horizontal velocity, in sqrt(g/l)',
-        minimum=0.0,
-        maximum=100.0,
-    )
+        0.7, 'force per mass and error of horizontal velocity, in sqrt(g/l)', 0.0, 100.0)
     yaw_rate_gain: float = parameter(
-        1.35,
-        'moment per inertia and error of the turn rate, in sqrt(g/l)',
-        minimum=0.0,
-        maximum=100.0,
-    )
+        1.35, 'moment per inertia and error of the turn rate, in sqrt(g/l)', 0.0, 100.0)
     friction: float = parameter(
-        0.45,
-        'coefficient of the friction cones of the stance forces',
-        minimum=0.05,
-        maximum=2.0,
-    )
+        0.45, 'coefficient of the friction cones of the stance forces', 0.05, 2.0)
     load_transfer: float = parameter(
-        0.08,
-        'fraction of the cycle over which the load of a foot rises after touchdown and falls '
-        'before lift-off',
-        minimum=0.001,
-        maximum=0.3,
-    )
+        0.08, 'fraction of the cycle over which the load of a foot rises after touchdown and '
+        'falls before lift-off', 0.001, 0.3)
     placement_gain: float = parameter(
-        0.7,
-        'foot placement per error of the velocity over the foot, in sqrt(l/g)',
-        minimum=0.0,
-        maximum=10.0,
-    )
+        0.7, 'foot placement per error of the velocity over the foot, in sqrt(l/g)', 0.0, 10.0)
     slope_following: float = parameter(
-        1.0,
-        "fraction of the ground's estimated slope that the body follows; 0: the body stays level",
-        minimum=0.0,
-        maximum=1.0,
-    )
+        1.0, "fraction of the ground's estimated slope that the body follows; 0: the body stays "
+        'level', 0.0, 1.0)
     slope_lean: float = parameter(
-        1.0,
-        'fraction of the downhill foothold shift that puts the body over its feet',
-        minimum=0.0,
-        maximum=1.5,
-    )
+        1.0, 'fraction of the downhill foothold shift that puts the body over its feet', 0.0, 1.5)
     reach: float = parameter(
-        0.95,
-        'largest distance of a foothold from its hip, as a fraction of the straight leg',
-        minimum=0.1,
-        maximum=1.0,
-    )
+        0.95, 'largest distance of a foothold from its hip, as a fraction of the straight leg',
+        0.1, 1.0)
     yielding: float = parameter(
-        0.5,
-        'fraction of the velocity error that is added to the velocity of the standing feet',
-        minimum=0.0,
-        maximum=1.0,
-    )
+        0.5, 'fraction of the velocity error that is added to the velocity of the standing feet',
+        0.0, 1.0)
     levelling: float = parameter(
-        1.0,
-        'fraction of the tilt that the height of swinging feet compensates',
-        minimum=0.0,
-        maximum=1.0,
-    )
+        1.0, 'fraction of the tilt that the height of swinging feet compensates', 0.0, 1.0)
     speed_integral: float = parameter(
-        0.135,
-        'rate at which the stance velocity is corrected by the velocity error, in sqrt(g/l)',
-        minimum=0.0,
-        maximum=10.0,
-    )
+        0.135, 'rate at which the stance velocity is corrected by the velocity error, in '
+        'sqrt(g/l)', 0.0, 10.0)
     speed_correction_limit: float = parameter(
-        0.2,
-        'largest correction of the stance velocity, as a fraction of '
-        'the speed, at least of 0.3 sqrt(g l)',
-        minimum=0.0,
-        maximum=1.0,
-    )
+        0.2, 'largest correction of the stance velocity, as a fraction of the speed, at least of '
+        '0.3 sqrt(g l)', 0.0, 1.0)
     heading_gain: float = parameter(
-        0.25, 'turn rate per error of heading, in sqrt(g/l)', minimum=0.0, maximum=20.0
-    )
+        0.25, 'turn rate per error of heading, in sqrt(g/l)', 0.0, 20.0)
     heading_limit: float = parameter(
-        0.3, 'limit of the integrated heading error', unit='rad', minimum=0.0, maximum=1.5
-    )
+        0.3, 'limit of the integrated heading error', 0.0, 1.5, unit='rad')
     activity_rate: float = parameter(
-        12.0,
-        'rate at which the planned body motion fades when the phase stops',
-        unit='1/s',
-        minimum=0.1,
-        maximum=1e3,
-    )
+        12.0, 'rate at which the planned body motion fades when the phase stops', 0.1, 1e3,
+        unit='1/s')

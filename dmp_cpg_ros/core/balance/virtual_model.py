@@ -23,8 +23,8 @@ of which λ is eliminated: three equations are left, with the feet's second mome
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import sqrt
+from typing import NamedTuple
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
@@ -40,8 +40,7 @@ feet well posed.
 EQUAL = (1.0, 1.0, 1.0)
 
 
-@dataclass(frozen=True)
-class BodyMotion:
+class BodyMotion(NamedTuple):
     """What the virtual model takes of the body, in the frame of the ground.
 
     Attributes
@@ -80,10 +79,8 @@ class VirtualModel:
         self._inertia = triple(description.base_inertia.diagonal().tolist())
         self.height = description.stance_height + float(description.com_in_base[2])
 
-    def wrench(
-        self, p: PostureParameters, body: BodyMotion, r: Triple, bounce: Bounce = LEVEL,
-        sway_acceleration: float = 0.0,
-    ) -> tuple[Triple, Triple]:
+    def wrench(self, p: PostureParameters, body: BodyMotion, r: Triple, bounce: Bounce = LEVEL,
+               sway_acceleration: float = 0.0) -> tuple[Triple, Triple]:
         """Force [N] and moment [N m] about the centre of mass in the frame of the ground.
 
         Parameters
@@ -110,8 +107,7 @@ class VirtualModel:
         lift = (
             squared * p.height_stiffness * (self.height + bounce.height - body.height)
             + rate * p.height_damping * (bounce.velocity - body.velocity[2])
-            + bounce.acceleration
-        )
+            + bounce.acceleration)
         stiffness, damping = squared * p.attitude_stiffness, rate * p.attitude_damping
         mass, (up_x, up_y, up_z) = self._mass, body.upward_in_ground
         i_x, i_y, i_z = self._inertia
@@ -119,20 +115,15 @@ class VirtualModel:
             (
                 mass * (push * (r[0] - body.velocity[0]) + GRAVITY * up_x),
                 mass * (push * (r[1] - body.velocity[1]) + sway_acceleration + GRAVITY * up_y),
-                mass * (lift + GRAVITY * up_z),
-            ),
+                mass * (lift + GRAVITY * up_z)),
             (
                 -i_x * (stiffness * roll + damping * body.rate[0]),
                 -i_y * (stiffness * pitch + damping * body.rate[1]),
-                i_z * rate * p.yaw_rate_gain * (r[2] - body.rate[2]),
-            ),
-        )
+                i_z * rate * p.yaw_rate_gain * (r[2] - body.rate[2])))
 
 
-def distribute(
-    force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequence[float], friction: float,
-    largest: float, importance: Triple = EQUAL,
-) -> list[Triple]:
+def distribute(force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequence[float],
+               friction: float, largest: float, importance: Triple = EQUAL) -> list[Triple]:
     """Forces of the ground on the feet.
 
     Parameters
@@ -173,10 +164,8 @@ def distribute(
     return forces
 
 
-def _multipliers(
-    force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequence[float], total: float,
-    importance: Triple,
-) -> tuple[Triple, Triple]:
+def _multipliers(force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequence[float],
+                 total: float, importance: Triple) -> tuple[Triple, Triple]:
     """λ and κ of the module's text."""
     damping = REGULARISATION * max(total / len(feet), 1e-9)
     c_x = c_y = c_z = 0.0
@@ -203,5 +192,4 @@ def _multipliers(
     return (
         ((force[0] - total * x) / inertia, (force[1] - total * y) / inertia,
          (force[2] - total * z) / inertia),
-        turn,
-    )
+        turn)

@@ -12,12 +12,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import phase_rotation
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 
-Array = NDArray[np.float64]
 Edges = tuple[tuple[int, int], ...]
 
 
@@ -55,18 +54,19 @@ class CouplingGraph:
             raise ParameterError(
                 f'{len(self.edges)} edges and {self.size} nodes need gains '
                 f'({len(self.edges)}, 2, 2) and phases ({self.size},), '
-                f'not {self.gains.shape} and {self.phases.shape}'
-            )
+                f'not {self.gains.shape} and {self.phases.shape}')
         if not (np.all(np.isfinite(self.gains)) and np.all(np.isfinite(self.phases))):
             raise ParameterError('coupling gains and phase offsets must be finite')
-        _check_edges(self.edges, self.size)
+        for i, j in self.edges:
+            if not (0 <= i < self.size and 0 <= j < self.size and i != j):
+                raise ParameterError(
+                    f'edge ({i}, {j}) is not between two of the nodes 0 to {self.size - 1}')
         symmetric = 0.5 * (self.gains + np.swapaxes(self.gains, 1, 2))
         for edge, smallest in zip(self.edges, np.linalg.eigvalsh(symmetric)[:, 0], strict=True):
             if smallest <= 0.0:
                 raise ParameterError(
                     f'gain of edge {edge} must have a positive definite symmetric part; '
-                    f'its smallest eigenvalue is {smallest:.4g}'
-                )
+                    f'its smallest eigenvalue is {smallest:.4g}')
 
     def coupling_matrix(self) -> Array:
         """Matrix −L with ẋ = … − L x in the original coordinates (offsets included).
@@ -76,8 +76,7 @@ class CouplingGraph:
         ndarray (2N, 2N)
         """
         return self._block_matrix(
-            self.gains, lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j]))
-        )
+            self.gains, lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j])))
 
     def block_laplacian(self) -> Array:
         """Block Laplacian L in the co-rotated coordinates, where locked states are equal.
@@ -90,15 +89,12 @@ class CouplingGraph:
             + b S, such as k I.
         """
         turns = [phase_rotation(float(phi)) for phi in self.phases]
-        turned = np.array(
-            [
-                turns[i].T @ gain @ turns[i]
-                for (i, _), gain in zip(self.edges, self.gains, strict=True)
-            ]
-        )
-        return -self._block_matrix(turned.reshape(-1, 2, 2), lambda i, j: np.eye(2))
+        turned = [turns[i].T @ gain @ turns[i]
+                  for (i, _), gain in zip(self.edges, self.gains, strict=True)]
+        return -self._block_matrix(turned, lambda i, j: np.eye(2))
 
-    def _block_matrix(self, gains: Array, seen_from: Callable[[int, int], Array]) -> Array:
+    def _block_matrix(self, gains: Iterable[Array], seen_from: Callable[[int, int], Array]
+                      ) -> Array:
         matrix = np.zeros((2 * self.size, 2 * self.size))
         for (i, j), gain in zip(self.edges, gains, strict=True):
             matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] -= gain
@@ -106,9 +102,8 @@ class CouplingGraph:
         return matrix
 
 
-def graph_from_edges(
-    size: int, edges: Edges, gain: float | Array, phases: Array | None = None,
-) -> CouplingGraph:
+def graph_from_edges(size: int, edges: Edges, gain: float | Array,
+                     phases: Array | None = None) -> CouplingGraph:
     """Graph in which every edge has the same gain.
 
     Parameters
@@ -129,8 +124,7 @@ def graph_from_edges(
     K = gain * np.eye(2) if np.ndim(gain) == 0 else np.asarray(gain, dtype=float)
     gains = np.broadcast_to(K, (len(edges), 2, 2)).copy()
     return CouplingGraph(
-        size, edges, gains, np.zeros(size) if phases is None else np.asarray(phases, float)
-    )
+        size, edges, gains, np.zeros(size) if phases is None else np.asarray(phases, float))
 
 
 def topology(name: str, size: int) -> Edges:
@@ -156,14 +150,5 @@ def topology(name: str, size: int) -> Edges:
         return tuple((j, i) for i, j in following + [(size - 1, 0)])
     if name not in undirected:
         raise ParameterError(
-            f"topology '{name}' is not known; valid are {', '.join(undirected)}, directed_ring"
-        )
+            f"topology '{name}' is not known; valid are {', '.join(undirected)}, directed_ring")
     return tuple(edge for i, j in undirected[name] for edge in ((i, j), (j, i)))
-
-
-def _check_edges(edges: Iterable[tuple[int, int]], size: int) -> None:
-    for i, j in edges:
-        if not (0 <= i < size and 0 <= j < size and i != j):
-            raise ParameterError(
-                f'edge ({i}, {j}) is not between two of the nodes 0 to {size - 1}'
-            )

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import phase_generator
 from dmp_cpg_ros.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 
 class Oscillators(Protocol):
@@ -87,14 +85,15 @@ class AndronovHopf:
         ndarray (..., 2)
             ẋ [1/s].
         """
-        if np.iscomplexobj(x):  # of a derivative by complex steps
-            growth = self.rho * (self.radius**2 - np.sum(x * x, axis=-1))
-            turned = x @ phase_generator().T
-            return np.asarray(np.asarray(omega)[..., None] * turned + growth[..., None] * x)
+        squared = x * x
+        at_origin = self.rho * self.radius**2
+        damping = self.rho * (squared[..., 0] + squared[..., 1])
+        if x.dtype.kind == 'c':  # a step of a derivative: x₁ and x₂ are no parts of one number
+            turning = np.asarray(omega)[..., None] * (x @ phase_generator().T)
+            return np.asarray(turning + (at_origin - damping)[..., None] * x)
         z = np.ascontiguousarray(x).view(complex)[..., 0]
-        linear = self.rho * self.radius**2 - 1j * omega
-        rate = (linear - self.rho * (z.real * z.real + z.imag * z.imag)) * z
-        return np.ravel(rate).view(float).reshape(x.shape)
+        rate = (at_origin - 1j * omega - damping) * z
+        return rate.ravel().view(float).reshape(x.shape)
 
     def jacobian(self, x: Array, omega: float | Array) -> Array:
         """Jacobian A = ∂f/∂x = ω S + ρ (r² − |x|²) I − 2ρ x xᵀ.
@@ -114,5 +113,4 @@ class AndronovHopf:
         return (
             np.asarray(omega)[..., None, None] * phase_generator()
             + growth[..., None, None] * np.eye(2)
-            - 2.0 * np.asarray(self.rho)[..., None, None] * x[..., :, None] * x[..., None, :]
-        )
+            - 2.0 * np.asarray(self.rho)[..., None, None] * x[..., :, None] * x[..., None, :])

@@ -10,51 +10,30 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class InhibitionParameters(Parameters):
     """Parameters of the inhibition g(x_i): gain, region, legs, and when it is armed."""
 
-    inhibition_gain: float = parameter(
-        400.0, 'gain k_inh of the inhibition', unit='1/s', minimum=0.0, maximum=1e5
-    )
+    inhibition_gain: float = parameter(400.0, 'gain k_inh of the inhibition', 0.0, 1e5, unit='1/s')
     region_radius: float = parameter(
-        0.3,
-        'radius r0 of the region C in which inhibition is switched on',
-        minimum=1e-3,
-        maximum=2.0,
-    )
+        0.3, 'radius r0 of the region C in which inhibition is switched on', 1e-3, 2.0)
     inhibited_legs: tuple[str, ...] = parameter(
-        ('fl',), 'legs whose oscillators are inhibited', choices=LEGS
-    )
+        ('fl',), 'legs whose oscillators are inhibited', choices=LEGS)
     capture_speed: float = parameter(
-        0.1,
-        'reference foot speed below which inhibition is armed',
-        unit='m/s',
-        minimum=0.0,
-        maximum=10.0,
-    )
+        0.1, 'reference foot speed below which inhibition is armed', 0.0, 10.0, unit='m/s')
     start_inhibited: bool = parameter(
-        True, 'whether the gait starts at rest and waits to be resumed'
-    )
+        True, 'whether the gait starts at rest and waits to be resumed')
     auto_inhibit: bool = parameter(
-        True, 'whether a zero command stops the gait and a new command resumes it'
-    )
+        True, 'whether a zero command stops the gait and a new command resumes it')
     auto_delay: float = parameter(
-        1.0,
-        'time of zero command after which auto_inhibit stops the gait',
-        unit='s',
-        minimum=0.0,
-        maximum=60.0,
-    )
+        1.0, 'time of zero command after which auto_inhibit stops the gait', 0.0, 60.0, unit='s')
 
     def __post_init__(self) -> None:
         """Validate; at least one leg, none twice."""
@@ -62,15 +41,13 @@ class InhibitionParameters(Parameters):
         if not self.inhibited_legs or len(set(self.inhibited_legs)) != len(self.inhibited_legs):
             raise ParameterError(
                 f'inhibited_legs = {list(self.inhibited_legs)} must name one or more of '
-                f'{", ".join(LEGS)}, none twice'
-            )
+                f'{", ".join(LEGS)}, none twice')
 
     @cached_property
     def armed_gains(self) -> Array:
         """Gains α_i of the four legs when inhibition is armed, ndarray (4,) [1/s]."""
         return np.array(
-            [self.inhibition_gain if leg in self.inhibited_legs else 0.0 for leg in LEGS]
-        )
+            [self.inhibition_gain if leg in self.inhibited_legs else 0.0 for leg in LEGS])
 
 
 @dataclass(frozen=True)
@@ -125,5 +102,4 @@ def initial_inhibition(parameters: InhibitionParameters) -> Inhibition:
     """Inhibition before the first request: armed when the gait starts at rest."""
     stopped = parameters.start_inhibited
     return Inhibition(
-        stopped, parameters.armed_gains * float(stopped), parameters.region_radius, stopped
-    )
+        stopped, parameters.armed_gains * float(stopped), parameters.region_radius, stopped)

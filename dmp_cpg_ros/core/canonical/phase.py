@@ -12,9 +12,9 @@ from __future__ import annotations
 from math import atan2
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 
 def phase(x: ArrayLike) -> Array:
@@ -86,8 +86,7 @@ def scalar_phase_rates(x: Array, x_dot: Array) -> list[float]:
     """As :func:`phase_rate` of a few states (N, 2), without arithmetic on arrays."""
     return [
         scalar_phase_rate(x_1, x_2, x_1_dot, x_2_dot)
-        for (x_1, x_2), (x_1_dot, x_2_dot) in zip(x.tolist(), x_dot.tolist(), strict=True)
-    ]
+        for (x_1, x_2), (x_1_dot, x_2_dot) in zip(x.tolist(), x_dot.tolist(), strict=True)]
 
 
 def phase_rotation(phi: float) -> Array:

@@ -9,17 +9,15 @@ with α_i = 0 except where inhibition is switched on.
 
 from __future__ import annotations
 
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
-
-Array = NDArray[np.float64]
 
 MOST_KEPT = 64
 """Sets of gains for which matrices are kept."""
@@ -42,17 +40,15 @@ class CanonicalSystem:
         x_{i,d}, where inhibition pulls each node; the paper's [1, 0] scaled to the radius without.
     """
 
-    def __init__(
-        self, graph: CouplingGraph, oscillators: Oscillators, target: Array | None = None,
-    ) -> None:
+    def __init__(self, graph: CouplingGraph, oscillators: Oscillators,
+                 target: Array | None = None) -> None:
         """Collect the constant matrices."""
         self.graph, self.oscillators = graph, oscillators
         self.radius = self._one_per_node('radius')
         self.target = (
             np.stack([self.radius, np.zeros(graph.size)], axis=1)
             if target is None
-            else np.asarray(target, dtype=float)
-        )
+            else np.asarray(target, dtype=float))
         self._coupling = graph.coupling_matrix()
         self._steps: dict[tuple[bytes, float], ExponentialStep] = {}
         self._linear: dict[bytes, tuple[Array, Array]] = {}
@@ -69,8 +65,7 @@ class CanonicalSystem:
         if not isinstance(self.oscillators, AndronovHopf):
             raise ParameterError(
                 f'no bounds are known of {type(self.oscillators).__name__}; they are of '
-                'AndronovHopf'
-            )
+                'AndronovHopf')
         return self._one_per_node('rho')
 
     def _one_per_node(self, name: str) -> Array:
@@ -78,8 +73,7 @@ class CanonicalSystem:
         if np.shape(values) not in ((), (self.graph.size,)):
             raise ParameterError(
                 f'{self.graph.size} nodes need one {name} or {self.graph.size}, not '
-                f'{np.size(values)}'
-            )
+                f'{np.size(values)}')
         return np.broadcast_to(np.asarray(values, dtype=float), self.graph.size)
 
     def linear_part(self, gains: Array) -> tuple[Array, Array]:
@@ -161,4 +155,5 @@ class CanonicalSystem:
             if len(self._steps) > MOST_KEPT:
                 self._steps.clear()
             step = self._steps[key] = ExponentialStep(*self.linear_part(gains), dt)
-        return step(x, partial(self.oscillators.field, omega=omega))
+        field = self.oscillators.field
+        return step(x, lambda at: field(at, omega))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH, free_synchronisation
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import locked
-from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 
 Array = NDArray[np.float64]
 
@@ -130,10 +130,11 @@ def _judged(before: PhaseLock, now: PhaseLock, epsilon: float, steady: float) ->
     """Decide the level: an alarm stays until the error is within the steady bound again."""
     beyond = now.error > now.bound + _ROUNDING
     if before.level == LOCKED:
-        return updated(now, level=DISTURBED, envelope=epsilon) if beyond else now
+        return replace_unchecked(now, level=DISTURBED, envelope=epsilon) if beyond else now
     if now.error <= steady:
         return now
-    return updated(now, bound=steady, level=LOST if before.level == LOST or beyond else DISTURBED)
+    level = LOST if before.level == LOST or beyond else DISTURBED
+    return replace_unchecked(now, bound=steady, level=level)
 
 
 def _moved(change: Array) -> float:

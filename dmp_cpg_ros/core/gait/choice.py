@@ -13,14 +13,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -29,20 +27,13 @@ class GaitChoiceParameters(Parameters):
 
     auto_gait: bool = parameter(False, 'whether the gait is chosen by the reference speed')
     auto_gaits: tuple[str, ...] = parameter(
-        ('walk', 'trot'), 'gaits that auto_gait chooses among, from slow to fast'
-    )
+        ('walk', 'trot'), 'gaits that auto_gait chooses among, from slow to fast')
     auto_speeds: tuple[float, ...] = parameter(
-        (0.3,),
-        'dimensionless foot speeds u / sqrt(g l) at which auto_gait changes to the next gait',
-        minimum=0.0,
-        maximum=10.0,
-    )
+        (0.3,), 'dimensionless foot speeds u / sqrt(g l) at which auto_gait changes to the next '
+        'gait', 0.0, 10.0)
     auto_hysteresis: float = parameter(
-        0.05,
-        'width of the band around each of auto_speeds in which auto_gait keeps the gait',
-        minimum=0.0,
-        maximum=2.0,
-    )
+        0.05, 'width of the band around each of auto_speeds in which auto_gait keeps the gait',
+        0.0, 2.0)
 
     def __post_init__(self) -> None:
         """Validate; one speed between every two gaits, and bands that do not overlap."""
@@ -50,20 +41,17 @@ class GaitChoiceParameters(Parameters):
         if len(self.auto_speeds) != len(self.auto_gaits) - 1:
             raise ParameterError(
                 f'auto_speeds = {list(self.auto_speeds)} must hold one speed between every two of '
-                f'auto_gaits = {list(self.auto_gaits)}'
-            )
+                f'auto_gaits = {list(self.auto_gaits)}')
         if len(set(self.auto_gaits)) != len(self.auto_gaits):
             raise ParameterError(f'auto_gaits = {list(self.auto_gaits)} must not repeat a gait')
         if np.any(np.diff(self.auto_speeds) <= self.auto_hysteresis):
             raise ParameterError(
                 f'auto_speeds = {list(self.auto_speeds)} must increase by more than '
-                f'auto_hysteresis = {self.auto_hysteresis:g}'
-            )
+                f'auto_hysteresis = {self.auto_hysteresis:g}')
 
 
-def highest_speed(
-    parameters: GaitChoiceParameters, name: str, named: Callable[[str], Gait],
-) -> float:
+def highest_speed(parameters: GaitChoiceParameters, name: str,
+                  named: Callable[[str], Gait]) -> float:
     """Dimensionless foot speed up to which commands are followed.
 
     Parameters

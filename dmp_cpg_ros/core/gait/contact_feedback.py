@@ -37,12 +37,11 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.sensor_readings import LARGEST_FORCE
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 PUNCTUAL = 0.02
 """Fraction of the cycle by which a touchdown may be early or late without any feedback: a foot
@@ -87,10 +86,9 @@ class ContactState:
     released: float
 
 
-def contact_feedback(
-    state: ContactState, force: Array, quarter: float, limits: ContactLimits | None,
-    network: GaitNetwork, x: Array, r: Array, inhibition: Inhibition, dt: float,
-) -> tuple[ContactState, Array]:
+def contact_feedback(state: ContactState, force: Array, quarter: float,
+                     limits: ContactLimits | None, network: GaitNetwork, x: Array, r: Array,
+                     inhibition: Inhibition, dt: float) -> tuple[ContactState, Array]:
     """Frequency offsets of one tick from the contacts of the feet.
 
     Parameters

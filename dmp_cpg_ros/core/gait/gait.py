@@ -14,20 +14,18 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups
 from dmp_cpg_ros.core.gait.speed_limit import within_limit
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 LATERAL_WEIGHT = 2.0
 """Weight of speed across the body in the speed by which a gait chooses its cadence."""
@@ -62,8 +60,28 @@ class BodyScale:
         across = LATERAL_WEIGHT * v_y
         return float(
             (v_x * v_x + across * across) ** 0.5
-            + LATERAL_WEIGHT * abs(gamma) * self.hip_radius
-        )
+            + LATERAL_WEIGHT * abs(gamma) * self.hip_radius)
+
+
+class Pace(NamedTuple):
+    """What a gait makes of a reference.
+
+    Attributes
+    ----------
+    velocity : tuple of float
+        The reference within the gait's limit, v_x, v_y [m/s], γ [rad/s].
+    omega : float
+        Angular frequency ω of the gait [rad/s].
+    own_omegas : list of four floats
+        Frequencies with which the legs go through their cycles [rad/s].
+    duty : float
+        Duty factor β.
+    """
+
+    velocity: Triple
+    omega: float
+    own_omegas: list[float]
+    duty: float
 
 
 class CycleOfLegs:
@@ -76,10 +94,58 @@ class CycleOfLegs:
         their mid-swing as can be.
     highest_speed : float
         Dimensionless foot speed that is never exceeded.
+    phases : ndarray (4,)
+        Locked oscillator phases relative to fl [rad].
+    moving_phases : ndarray (4,) or None
+        The same while gaits change, which moves them.
+    rest_rate : float
+        Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]; 0, other than
+        while gaits change.
     """
 
     rest: float
     highest_speed: float
+    phases: Array
+    moving_phases: Array | None = None
+    rest_rate: float = 0.0
+    _paced: tuple[tuple[float, ...], Pace] | None = None
+
+    def omega(self, foot_speed: float, scale: BodyScale) -> float:
+        """Angular frequency ω of the oscillators at a foot speed as from
+        :meth:`BodyScale.foot_speed` [rad/s].
+        """
+        raise NotImplementedError
+
+    def duty(self, foot_speed: float, scale: BodyScale) -> float:
+        """Duty factor β at a foot speed [m/s]."""
+        raise NotImplementedError
+
+    def own_omegas(self, omega: float) -> list[float]:
+        """Frequencies with which the legs go through their cycles when the gait's is ω: the
+        same, other than while gaits change [rad/s].
+        """
+        return [omega] * len(LEGS)
+
+    def oscillator_omegas(self, omega: float) -> float | Array:
+        """Frequencies of the oscillators when the gait's is ω: the same, other than while gaits
+        change [rad/s].
+        """
+        return omega
+
+    def pace(self, r: Array, scale: BodyScale) -> Pace:
+        """What the gait makes of a reference (v_x, v_y, γ), ndarray (3,); the last answer is
+        kept, for the body and its legs ask in turn.
+        """
+        v_x, v_y, gamma = r.tolist()
+        asked = (v_x, v_y, gamma, scale.leg_length, scale.hip_radius)
+        if self._paced is None or self._paced[0] != asked:
+            velocity = self.limited((v_x, v_y, gamma), scale)
+            speed = scale.foot_speed(*velocity)
+            omega, duty = self.omega(speed, scale), self.duty(speed, scale)
+            pace = Pace(velocity, omega, self.own_omegas(omega), duty)
+            vars(self)['_paced'] = (asked, pace)
+            return pace
+        return self._paced[1]
 
     def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
         """Velocity (v_x, v_y, γ) that the gait does of one that is asked for [m/s], [rad/s], see
@@ -87,8 +153,16 @@ class CycleOfLegs:
         """
         return limited(velocity, scale, self.highest_speed)
 
+    def cycle_position(self, phi: Array | float) -> Array:
+        """Where legs are in their cycle at phases φ (...) [rad]: 0 at mid-swing, in [−1/2, 1/2).
+
+        The phase φ = 0 of oscillator fl, where inhibition holds it, is the moment at which all
+        legs are farthest from mid-swing.
+        """
+        return wrapped(np.asarray(phi) + 2.0 * np.pi * self.rest) / (2.0 * np.pi)
+
     def scalar_cycle_position(self, phi: float) -> float:
-        """Where one leg is in its cycle at a phase φ [rad]: 0 at mid-swing, in [−1/2, 1/2)."""
+        """As :meth:`cycle_position` of one leg, without arrays."""
         return (phi / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
 
 
@@ -121,41 +195,36 @@ class Gait(CycleOfLegs):
     duty_factor: Array
     highest_speed: float = inf
     rest: float = field(init=False)
+    phases: Array = field(init=False, repr=False, compare=False)
     groups: int = field(init=False)
     cadence_scale: float = field(init=False, default=1.0)
-    _tables: tuple[list[float], list[float], list[float]] = field(
-        init=False, repr=False, compare=False
-    )
+    _tables: tuple[list[float], ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Validate and find the rest phase."""
-        if not self.name or any(sign.isspace() or sign == '>' for sign in self.name):
-            raise ParameterError(f"gait '{self.name}': a name must be one word without '>'")
-        if self.lag.shape != (len(LEGS),) or not np.all((self.lag >= 0.0) & (self.lag < 1.0)):
-            raise ParameterError(
-                f"gait '{self.name}': lag needs four fractions in [0, 1), not {self.lag}"
-            )
-        if not len(self.speed) == len(self.cadence) == len(self.duty_factor) > 0:
-            raise ParameterError(
-                f"gait '{self.name}': speed, cadence and duty_factor must have equal lengths"
-            )
-        if np.any(np.diff(self.speed) <= 0.0) or not np.all(np.isfinite(self.speed)):
-            raise ParameterError(f"gait '{self.name}': speed must increase")
-        if not np.all((self.duty_factor > 0.0) & (self.duty_factor < 1.0)):
-            raise ParameterError(f"gait '{self.name}': duty_factor must lie in (0, 1)")
-        if not np.all((self.cadence > 0.0) & np.isfinite(self.cadence)):
-            raise ParameterError(f"gait '{self.name}': cadence must be positive")
-        if not self.highest_speed >= max(float(self.speed[-1]), 1e-3):
-            raise ParameterError(
-                f"gait '{self.name}': highest_speed must be positive and not below the last of "
-                f'speed, {self.speed[-1]:g}, not {self.highest_speed:g}')
-        object.__setattr__(self, 'rest', _rest_phase(self.lag))
-        object.__setattr__(self, 'groups', stance_groups(self.lag))
-        object.__setattr__(
-            self,
-            '_tables',
-            tuple(table.tolist() for table in (self.speed, self.cadence, self.duty_factor)),
-        )
+        tables = (self.speed, self.cadence, self.duty_factor)
+        lag, fastest = self.lag, float(self.speed.max(initial=0.0))
+        for holds, rule in (
+            (self.name and not any(sign.isspace() or sign == '>' for sign in self.name),
+             "a name must be one word without '>'"),
+            (lag.shape == (len(LEGS),) and np.all((lag >= 0.0) & (lag < 1.0)),
+             f'lag needs four fractions in [0, 1), not {lag}'),
+            (len(self.speed) == len(self.cadence) == len(self.duty_factor) > 0,
+             'speed, cadence and duty_factor must have equal lengths'),
+            (np.all(np.diff(self.speed) > 0.0) and np.all(np.isfinite(self.speed)),
+             'speed must increase'),
+            (np.all((self.duty_factor > 0.0) & (self.duty_factor < 1.0)),
+             'duty_factor must lie in (0, 1)'),
+            (np.all((self.cadence > 0.0) & np.isfinite(self.cadence)),
+             'cadence must be positive'),
+            (self.highest_speed >= max(fastest, 1e-3),
+             f'highest_speed must be positive and not below the last of speed, {fastest:g}, not '
+             f'{self.highest_speed:g}')):
+            if not holds:
+                raise ParameterError(f"gait '{self.name}': {rule}")
+        vars(self).update(
+            rest=_rest_phase(lag), phases=-2.0 * np.pi * lag, groups=stance_groups(lag),
+            _tables=tuple(table.tolist() for table in tables))
 
     @classmethod
     def from_mapping(cls, name: str, values: Mapping[str, Any]) -> Gait:
@@ -191,24 +260,11 @@ class Gait(CycleOfLegs):
         """
         if cadence_scale == 1.0:
             return self
-        scaled = copy(self)
-        cadence = self.cadence * cadence_scale
-        object.__setattr__(scaled, 'cadence', cadence)
-        object.__setattr__(scaled, 'cadence_scale', self.cadence_scale * cadence_scale)
-        object.__setattr__(
-            scaled, '_tables', (self._tables[0], cadence.tolist(), self._tables[2])
-        )
+        scaled, cadence = copy(self), self.cadence * cadence_scale
+        vars(scaled).update(
+            cadence=cadence, cadence_scale=self.cadence_scale * cadence_scale, _paced=None,
+            _tables=(self._tables[0], cadence.tolist(), self._tables[2]))
         return scaled
-
-    @property
-    def phases(self) -> Array:
-        """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
-        return -2.0 * np.pi * self.lag
-
-    @property
-    def moving_phases(self) -> None:
-        """Offsets that move: none, other than while gaits change."""
-        return None
 
     def following(self, omega: float, change_rate: float, pauses: bool, dt: float
                   ) -> tuple[Gait, float]:
@@ -217,46 +273,18 @@ class Gait(CycleOfLegs):
         """
         return self, 0.0
 
-    def oscillator_omegas(self, omega: float) -> float:
-        """Frequency of the oscillators when the gait's is ω: the same [rad/s]."""
-        return omega
-
-    @property
-    def rest_rate(self) -> float:
-        """Rate of the rest phase: 0, other than while gaits change [rad/s]."""
-        return 0.0
-
-    def own_omegas(self, omega: float) -> list[float]:
-        """Frequencies with which the legs go through their cycles when the gait's is ω: the same
-        [rad/s].
-        """
-        return [omega] * len(LEGS)
-
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
-        """Angular frequency ω of the oscillators at a foot speed [rad/s].
-
-        Parameters
-        ----------
-        foot_speed : float
-            As from :meth:`BodyScale.foot_speed` [m/s].
-        scale : BodyScale
-            The robot's lengths.
+        """Angular frequency ω of the oscillators at a foot speed, as from
+        :meth:`BodyScale.foot_speed` [m/s], in [rad/s].
         """
         root = (GRAVITY / scale.leg_length) ** 0.5
-        return (
-            2.0
-            * np.pi
-            * root
-            * _interpolated(
-                foot_speed / (root * scale.leg_length), self._tables[0], self._tables[1]
-            )
-        )
+        speed = foot_speed / (root * scale.leg_length)
+        return 2.0 * np.pi * root * _interpolated(speed, self._tables[0], self._tables[1])
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed."""
         return _interpolated(
-            foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self._tables[0], self._tables[2]
-        )
+            foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self._tables[0], self._tables[2])
 
     def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
         """How the body is planned to rise and fall, see
@@ -264,23 +292,9 @@ class Gait(CycleOfLegs):
         """
         return planned_bounce(cycle_position, self.groups, duty, omega)
 
-    def cycle_position(self, phi: Array | float) -> Array:
-        """Where legs are in their cycle: 0 at mid-swing, in [−1/2, 1/2).
 
-        The phase φ = 0 of oscillator fl, where inhibition holds it, is the moment at which all
-        legs are farthest from mid-swing.
-
-        Parameters
-        ----------
-        phi : ndarray (...) or float
-            Oscillator phases [rad].
-        """
-        return wrapped(np.asarray(phi) + 2.0 * np.pi * self.rest) / (2.0 * np.pi)
-
-
-def limited(
-    velocity: Triple, scale: BodyScale, highest_speed: float, largest_curve: float = inf,
-) -> Triple:
+def limited(velocity: Triple, scale: BodyScale, highest_speed: float,
+            largest_curve: float = inf) -> Triple:
     """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
     share of g, that goes with it [m/s], [rad/s].
     """

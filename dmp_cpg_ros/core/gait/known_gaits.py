@@ -95,8 +95,7 @@ class KnownGaits:
     def named(self, name: str) -> Gait:
         """Gait of a name; raises ParameterError with the valid names."""
         if name not in self.gaits:
-            raise ParameterError(
-                f"there is no gait '{name}'; valid are {', '.join(self.gaits)}")
+            raise ParameterError(f"there is no gait '{name}'; valid are {', '.join(self.gaits)}")
         return self.gaits[name]
 
     def _gait_of(self, shares: GaitShares) -> GaitInForce:

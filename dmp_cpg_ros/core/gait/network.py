@@ -15,23 +15,20 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from math import atan2, ceil, cos, sin
+from math import atan2, ceil, cos, pi, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
-from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned, wrapped
+from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned
 from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
-from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 LONGEST_STEP = 0.005
 """Longest time step of the oscillators [s]."""
@@ -41,43 +38,24 @@ LONGEST_STEP = 0.005
 class CanonicalParameters(Parameters):
     """Parameters of the coupled canonical oscillators."""
 
-    rho: float = parameter(
-        8.0, 'attraction rho to the limit cycle', unit='1/s', minimum=0.1, maximum=1e3
-    )
-    radius: float = parameter(1.0, 'radius r of the limit cycle', minimum=0.01, maximum=100.0)
-    coupling_gain: float = parameter(
-        100.0, 'gain k of every coupling', unit='1/s', minimum=0.0, maximum=1e4
-    )
+    rho: float = parameter(8.0, 'attraction rho to the limit cycle', 0.1, 1e3, unit='1/s')
+    radius: float = parameter(1.0, 'radius r of the limit cycle', 0.01, 100.0)
+    coupling_gain: float = parameter(100.0, 'gain k of every coupling', 0.0, 1e4, unit='1/s')
     coupling_graph: str = parameter(
-        'all_to_all',
-        'coupling graph of the legs',
-        choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'),
-    )
-    cadence_scale: float = parameter(
-        1.0, "factor on the gait's cadence at every speed", minimum=0.25, maximum=4.0
-    )
+        'all_to_all', 'coupling graph of the legs',
+        choices=('all_to_all', 'ring', 'path', 'star', 'directed_ring'))
+    cadence_scale: float = parameter(1.0, "factor on the gait's cadence at every speed", 0.25, 4.0)
     contact_feedback: bool = parameter(
-        False, 'whether early and late touchdown shift the phase of the legs'
-    )
+        False, 'whether early and late touchdown shift the phase of the legs')
     contact_gain: float = parameter(
-        20.0,
-        'frequency offset per phase by which a touchdown is early or late',
-        unit='1/s',
-        minimum=0.0,
-        maximum=1e3,
-    )
+        20.0, 'frequency offset per phase by which a touchdown is early or late', 0.0, 1e3,
+        unit='1/s')
     contact_hold: float = parameter(
-        0.5,
-        'largest decrease of the cadence by late feet, as a fraction of the cadence',
-        minimum=0.0,
-        maximum=0.9,
-    )
+        0.5, 'largest decrease of the cadence by late feet, as a fraction of the cadence',
+        0.0, 0.9)
     margin_share: float = parameter(
-        0.5,
-        'fraction of the margin for unequal leg frequencies that contact feedback may use',
-        minimum=0.0,
-        maximum=0.95,
-    )
+        0.5, 'fraction of the margin for unequal leg frequencies that contact feedback may use',
+        0.0, 0.95)
 
 
     @property
@@ -97,17 +75,9 @@ def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalS
     phases : ndarray (4,)
         Locked phases relative to fl [rad].
     """
-    graph = graph_from_edges(
-        len(LEGS),
-        topology(parameters.coupling_graph, len(LEGS)),
-        parameters.coupling_gain,
-        phases,
-    )
-    return CanonicalSystem(
-        graph,
-        parameters.oscillators,
-        state_at(phases, parameters.radius),
-    )
+    p, edges = parameters, topology(parameters.coupling_graph, len(LEGS))
+    graph = graph_from_edges(len(LEGS), edges, p.coupling_gain, phases)
+    return CanonicalSystem(graph, p.oscillators, state_at(phases, p.radius))
 
 
 class GaitNetwork:
@@ -130,15 +100,11 @@ class GaitNetwork:
         With the cadence that acts: everything that asks a gait for ω must ask this one.
     """
 
-    gait: GaitInForce
-
-    def __init__(
-        self, parameters: CanonicalParameters, gait: GaitInForce, scale: BodyScale,
-        change_rate: float = GaitChangeParameters.gait_change_rate,
-    ) -> None:
+    def __init__(self, parameters: CanonicalParameters, gait: GaitInForce, scale: BodyScale,
+                 change_rate: float = GaitChangeParameters.gait_change_rate) -> None:
         """Keep the parts."""
         self.parameters, self.scale, self.change_rate = parameters, scale, change_rate
-        self.gait = gait.scaled(parameters.cadence_scale)
+        self.gait: GaitInForce = gait.scaled(parameters.cadence_scale)
         self._systems: dict[bytes, CanonicalSystem] = {}
 
     def of(self, gait: GaitInForce) -> GaitNetwork:
@@ -185,15 +151,14 @@ class GaitNetwork:
     @property
     def highest_speed(self) -> float:
         """Foot speed at which the gait in force is held [m/s]."""
-        return self.gait.highest_speed * (GRAVITY * self.scale.leg_length) ** 0.5
+        return self.scale.speed(self.gait.highest_speed)
 
     def omega(self, r: Array) -> float:
         """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""
         return self.gait.omega(self.scale.foot_speed(*r.tolist()), self.scale)
 
-    def advance(
-        self, x: Array, r: Array, inhibition: Inhibition, dt: float, feedback: Array | float = 0.0,
-    ) -> tuple[GaitNetwork, Array]:
+    def advance(self, x: Array, r: Array, inhibition: Inhibition, dt: float,
+                feedback: Array | float = 0.0) -> tuple[GaitNetwork, Array]:
         """Advance the states and, while gaits change, the blend.
 
         After a gap in the robot's states the time is made up in parts of at most
@@ -232,15 +197,13 @@ class GaitNetwork:
         y = system.step(y, omega + gained / dt + feedback, gains, dt)
         return self.of(gait), _turned(y, None if moving is None else gait.phases)
 
-    def step(
-        self, x: Array, r: Array, inhibition: Inhibition, dt: float, feedback: Array | float = 0.0,
-    ) -> Array:
+    def step(self, x: Array, r: Array, inhibition: Inhibition, dt: float,
+             feedback: Array | float = 0.0) -> Array:
         """Advance the states (4, 2) as :meth:`advance`."""
         return self.advance(x, r, inhibition, dt, feedback)[1]
 
-    def rate(
-        self, x: Array, r: Array, inhibition: Inhibition, feedback: Array | float = 0.0,
-    ) -> Array:
+    def rate(self, x: Array, r: Array, inhibition: Inhibition,
+             feedback: Array | float = 0.0) -> Array:
         """Rate of the states, ẋ (4, 2) [1/s], with feedback as in :meth:`advance`: that of the
         held blend and what moves its offsets.
         """
@@ -256,9 +219,8 @@ class GaitNetwork:
         """
         return state_at(phi + self.gait.phases, self.parameters.radius)
 
-    def rest_state(
-        self, inhibition: Inhibition, tick: float = 0.004, duration: float = 8.0,
-    ) -> Array:
+    def rest_state(self, inhibition: Inhibition, tick: float = 0.004,
+                   duration: float = 8.0) -> Array:
         """Equilibrium (4, 2) that is reached from the locked state under inhibition at zero
         reference.
         """
@@ -295,10 +257,9 @@ class GaitNetwork:
         places = self.gait.phases.tolist()
         relative = [
             scalar_phase(x_1, x_2) - place
-            for (x_1, x_2), place in zip(x.tolist(), places, strict=True)
-        ]
+            for (x_1, x_2), place in zip(x.tolist(), places, strict=True)]
         mean = atan2(sum(map(sin, relative)), sum(map(cos, relative)))
-        return wrapped(np.array(relative) - mean)
+        return np.array([(angle - mean + pi) % (2.0 * pi) - pi for angle in relative])
 
 
 def _turned(x: Array, phases: Array | None) -> Array:

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from math import copysign
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import (
     Inhibition,
@@ -31,20 +30,14 @@ from dmp_cpg_ros.core.canonical.inhibition import (
     initial_inhibition,
 )
 from dmp_cpg_ros.core.canonical.phase import turned
+from dmp_cpg_ros.core.gait import contact_feedback as contacts
 from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, chosen_gait
-from dmp_cpg_ros.core.gait.contact_feedback import (
-    ContactLimits,
-    ContactState,
-    contact_feedback,
-    initial_contact_state,
-)
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
-from dmp_cpg_ros.core.maths.updated import updated
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 
 CADENCE_RATE = 0.5
 """Rate at which the factor on the cadence moves to a new value [1/s].
@@ -91,7 +84,7 @@ class CanonicalState:
     cadence_scale: float
     x: Array
     x_dot: Array
-    contact: ContactState
+    contact: contacts.ContactState
 
     @property
     def leading_to(self) -> Gait:
@@ -118,11 +111,10 @@ class RunningGait:
         Force on each foot of the standing robot, for contact feedback [N].
     """
 
-    def __init__(
-        self, parameters: CanonicalParameters, scale: BodyScale, gaits: KnownGaits,
-        change: GaitChangeParameters | None = None, choice: GaitChoiceParameters | None = None,
-        quarter: float = float('nan'),
-    ) -> None:
+    def __init__(self, parameters: CanonicalParameters, scale: BodyScale, gaits: KnownGaits,
+                 change: GaitChangeParameters | None = None,
+                 choice: GaitChoiceParameters | None = None,
+                 quarter: float = float('nan')) -> None:
         """Keep the parts; networks are built when they are needed."""
         self.parameters, self.scale, self.gaits, self.quarter = parameters, scale, gaits, quarter
         self.choice = choice or GaitChoiceParameters()
@@ -130,10 +122,8 @@ class RunningGait:
             parameters, next(iter(gaits.gaits.values())), scale,
             (change or GaitChangeParameters()).gait_change_rate)
 
-    def with_parameters(
-        self, parameters: CanonicalParameters, change: GaitChangeParameters,
-        choice: GaitChoiceParameters,
-    ) -> RunningGait:
+    def with_parameters(self, parameters: CanonicalParameters, change: GaitChangeParameters,
+                        choice: GaitChoiceParameters) -> RunningGait:
         """Return the block with other parameters; from the next step on they act."""
         return RunningGait(parameters, self.scale, self.gaits, change, choice, self.quarter)
 
@@ -156,7 +146,7 @@ class RunningGait:
         network = self.network(gait.scaled(factor))
         x = network.rest_state(acting) if inhibition.start_inhibited else network.locked_state()
         return CanonicalState(network.gait, gait, factor, x, np.zeros_like(x),
-                              initial_contact_state())
+                              contacts.initial_contact_state())
 
     def cadence_rate(self, state: CanonicalState) -> float:
         """Rate of the factor on the cadence [1/s]."""
@@ -165,12 +155,11 @@ class RunningGait:
 
     def want(self, state: CanonicalState, name: str) -> CanonicalState:
         """Ask for a gait; raises ParameterError with the valid names."""
-        return updated(state, wanted=self.gaits.named(name))
+        return replace_unchecked(state, wanted=self.gaits.named(name))
 
-    def step(
-        self, state: CanonicalState, r: Array, inhibition: Inhibition, dt: float,
-        foot_force: Array | None = None, limits: ContactLimits | None = None,
-    ) -> CanonicalState:
+    def step(self, state: CanonicalState, r: Array, inhibition: Inhibition, dt: float,
+             foot_force: Array | None = None,
+             limits: contacts.ContactLimits | None = None) -> CanonicalState:
         """Advance by one tick.
 
         Parameters
@@ -192,13 +181,15 @@ class RunningGait:
         -------
         CanonicalState
         """
-        name = chosen_gait(self.choice, state.wanted.name, r, self.scale)
-        wanted = state.wanted if name == state.wanted.name else self.gaits.named(name)
+        wanted = state.wanted
+        if self.choice.auto_gait:
+            wanted = self.gaits.named(chosen_gait(self.choice, wanted.name, r, self.scale))
         gait, cadence_scale = self._at_cadence(state, dt)
         network, x = self._begin_change(self.network(gait), state.x, r, wanted, inhibition)
-        contact, feedback = state.contact, 0.0  # type: tuple[ContactState, Array | float]
+        contact = state.contact
+        feedback: Array | float = 0.0
         if self.parameters.contact_feedback and foot_force is not None:
-            contact, feedback = contact_feedback(
+            contact, feedback = contacts.contact_feedback(
                 contact, foot_force, self.quarter, limits, network, x, r, inhibition, dt)
         if dt > 0.0:
             network, x = network.advance(x, r, inhibition, dt, feedback)

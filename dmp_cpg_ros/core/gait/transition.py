@@ -22,24 +22,33 @@ weight w = s²(3 − 2s) blends offsets, rest phase, cadence and duty factor. n 
 cycles for which no leg's frequency differs from ω by more than the fraction ``gait_change_rate``.
 While a stop is requested ṡ goes to 0 and the blend stays as it is; at rest the new gait takes
 force at once (:mod:`~dmp_cpg_ros.core.gait.running`).
+
+**The arcs.** Leg i is at the position o_i = rest − lag_i of its cycle when oscillator fl has phase
+0. From one gait to another it moves by the arc a_i ≡ o_i' − o_i (mod 1). Only differences matter:
+a common arc is a faster or slower cycle for all. The rule, in this order:
+
+1. the smallest spread max a − min a, so that the legs' frequencies differ least,
+2. the fewest legs in swing at once: the least mean square of their number over all phases and all
+   blends between the gaits,
+3. the least total movement Σ |a_i − middle|,
+4. a leg moves forward in its cycle rather than backward, the front legs first.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import product
 from math import exp
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.arcs import arcs_between
 from dmp_cpg_ros.core.gait.com_height import Bounce
 from dmp_cpg_ros.core.gait.gait import BodyScale, CycleOfLegs, Gait
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-
-Array = NDArray[np.float64]
 
 STEEPEST = 1.5
 """Largest slope of the weight w(s)."""
@@ -50,6 +59,9 @@ SHORTEST = 1.0
 SETTLING_RATE = 12.0
 """Rate of the filter through which a transition starts, pauses and goes on [1/s]."""
 
+ROUNDING = 1e-9
+"""Differences of the costs of arcs below this are ties."""
+
 STANDING = 0.02
 """A transition that pauses stands still below this fraction of its usual rate."""
 
@@ -59,12 +71,8 @@ class GaitChangeParameters(Parameters):
     """How gaits change."""
 
     gait_change_rate: float = parameter(
-        0.25,
-        "largest change of a leg's frequency during a change of gait, as a fraction of the "
-        "gait's frequency",
-        minimum=0.01,
-        maximum=0.6,
-    )
+        0.25, "largest change of a leg's frequency during a change of gait, as a fraction of the "
+        "gait's frequency", 0.01, 0.6)
 
 
 @dataclass(frozen=True)
@@ -97,9 +105,7 @@ class GaitTransition:
         arcs = arcs_between(before.rest - before.lag, after.rest - after.lag, *middle)
         rest_arc = (after.rest - before.rest + 0.5) % 1.0 - 0.5
         moves = arcs - arcs[0] + round(float(before.lag[0] - after.lag[0]), 12)
-        object.__setattr__(self, 'arcs', arcs)
-        object.__setattr__(self, 'rest_arc', rest_arc)
-        object.__setattr__(self, 'offset_arcs', moves)
+        vars(self).update(arcs=arcs, rest_arc=rest_arc, offset_arcs=moves)
 
     @property
     def common_arc(self) -> float:
@@ -155,14 +161,15 @@ class BlendedGait(CycleOfLegs):
         if not (0.0 <= s <= 1.0 and 0.0 <= self.rate < float('inf')):
             raise ParameterError(
                 f'a blend needs a share in [0, 1] and a rate that is not negative, not {s!r} and '
-                f'{self.rate!r}'
-            )
-        transition, weight = self.transition, s * s * (3.0 - 2.0 * s)
-        object.__setattr__(self, 'weight', weight)
-        object.__setattr__(self, 'turning', 2.0 * np.pi * 6.0 * s * (1.0 - s) * self.rate)
-        object.__setattr__(self, 'rest', transition.before.rest + weight * transition.rest_arc)
-        object.__setattr__(self, 'highest_speed', blended_limit(
-            transition.before.highest_speed, transition.after.highest_speed, weight))
+                f'{self.rate!r}')
+        way, weight = self.transition, s * s * (3.0 - 2.0 * s)
+        turning = 2.0 * np.pi * 6.0 * s * (1.0 - s) * self.rate
+        phases = way.before.phases + (2.0 * np.pi * weight) * way.offset_arcs
+        vars(self).update(
+            weight=weight, turning=turning, rest=way.before.rest + weight * way.rest_arc,
+            highest_speed=blended_limit(
+                way.before.highest_speed, way.after.highest_speed, weight),
+            phases=phases, moving_phases=phases, rest_rate=turning * way.rest_arc)
 
     @property
     def name(self) -> str:
@@ -172,17 +179,6 @@ class BlendedGait(CycleOfLegs):
     def scaled(self, cadence_scale: float) -> BlendedGait:
         """Return this blend with this factor on its cadences."""
         return replace(self, cadence_scale=cadence_scale)
-
-    @property
-    def phases(self) -> Array:
-        """Locked oscillator phases relative to fl, ndarray (4,) [rad]."""
-        transition = self.transition
-        return transition.before.phases + (2.0 * np.pi * self.weight) * transition.offset_arcs
-
-    @property
-    def moving_phases(self) -> Array:
-        """Offsets that move: the present :attr:`phases`."""
-        return self.phases
 
     def following(self, omega: float, change_rate: float, pauses: bool, dt: float
                   ) -> tuple[GaitInForce, float]:
@@ -214,8 +210,7 @@ class BlendedGait(CycleOfLegs):
         share = self.share + rate * dt
         following: GaitInForce = (
             transition.after.scaled(self.cadence_scale) if share >= 1.0
-            else replace(self, share=share, rate=rate)
-        )
+            else replace(self, share=share, rate=rate))
         weight = following.weight if isinstance(following, BlendedGait) else 1.0
         return following, 2.0 * np.pi * transition.common_arc * (weight - self.weight)
 
@@ -226,29 +221,23 @@ class BlendedGait(CycleOfLegs):
         omega = omega + self.turning * self.transition.common_arc
         return omega + self.turning * self.transition.offset_arcs
 
-    @property
-    def rest_rate(self) -> float:
-        """Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]."""
-        return self.turning * self.transition.rest_arc
-
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω at a foot speed, as :meth:`Gait.omega` [rad/s]."""
         foot_speed = min(foot_speed, scale.speed(self.highest_speed))
+        before, after = self.transition.before, self.transition.after
         return self.cadence_scale * self._blended(
-            self.transition.before.omega(foot_speed, scale),
-            self.transition.after.omega(foot_speed, scale),
-        )
+            before.omega(foot_speed, scale), after.omega(foot_speed, scale))
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed, as :meth:`Gait.duty`."""
         foot_speed = min(foot_speed, scale.speed(self.highest_speed))
-        return self._blended(
-            self.transition.before.duty(foot_speed, scale),
-            self.transition.after.duty(foot_speed, scale),
-        )
+        before, after = self.transition.before, self.transition.after
+        return self._blended(before.duty(foot_speed, scale), after.duty(foot_speed, scale))
 
     def own_omegas(self, omega: float) -> list[float]:
-        """Frequencies with which the legs go through their cycles when the gait's is ω [rad/s]."""
+        """Frequencies with which the legs go through their cycles, as
+        :meth:`Gait.own_omegas` [rad/s].
+        """
         return [omega + self.turning * arc for arc in self.transition.arcs.tolist()]
 
     def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
@@ -257,13 +246,69 @@ class BlendedGait(CycleOfLegs):
         return before.bounce(cycle_position, duty, omega).mixed(
             after.bounce(cycle_position, duty, omega), self.weight)
 
-    def cycle_position(self, phi: Array | float) -> Array:
-        """Where legs are in their cycle, as :meth:`Gait.cycle_position`."""
-        return (np.asarray(phi) / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
-
     def _blended(self, before: float, after: float) -> float:
         return before + self.weight * (after - before)
 
 
 GaitInForce = Gait | BlendedGait
 """What phases are read in."""
+
+
+def arcs_between(places: Array, new_places: Array, duty: float, new_duty: float) -> Array:
+    """Arcs of the four legs by the rule above.
+
+    Parameters
+    ----------
+    places, new_places : ndarray (4,)
+        o_i of both gaits, in cycles.
+    duty, new_duty : float
+        Duty factors of both, for the second criterion.
+
+    Returns
+    -------
+    ndarray (4,)
+        a_i in cycles; the largest and the smallest are equally far from 0, so that the mean
+        frequency of the two is that of the gait.
+    """
+    direct = wrapped(2.0 * np.pi * (new_places - places)) / (2.0 * np.pi)
+    best, least = direct, (float('inf'),)
+    for turns in product((0.0, 1.0, -1.0), repeat=len(direct) - 1):
+        arcs = direct + np.array((0.0, *turns))
+        arcs -= 0.5 * (arcs.max() + arcs.min())
+        cost = (float(np.ptp(arcs)), crowding(places, arcs, duty, new_duty),
+                float(np.abs(arcs).sum()), *(-arcs).tolist())
+        if _less(cost, least):
+            best, least = arcs, cost
+    return best
+
+
+def crowding(places: Array, arcs: Array, duty: float, new_duty: float, grid: int = 48) -> float:
+    """Mean square of the number of legs in swing, over all phases and all blends.
+
+    Parameters
+    ----------
+    places, arcs : ndarray (4,)
+        o_i at the beginning and a_i, in cycles.
+    duty, new_duty : float
+        Duty factors at the beginning and at the end.
+    grid : int
+        Number of blends and of phases that the mean is taken over.
+
+    Returns
+    -------
+    float
+    """
+    weight = (np.arange(grid) + 0.5) / grid
+    phases = np.arange(grid) / grid
+    at = phases[:, None, None] + places + weight[:, None] * arcs
+    from_mid_swing = np.abs((at + 0.5) % 1.0 - 0.5)
+    swing = 0.5 * (1.0 - duty - weight * (new_duty - duty))
+    return float(np.mean(np.sum(from_mid_swing < swing[:, None], axis=-1) ** 2.0))
+
+
+def _less(cost: tuple[float, ...], least: tuple[float, ...]) -> bool:
+    """Compare costs in order; a later one decides only where the earlier ones are equal."""
+    for one, other in zip(cost, least, strict=False):
+        if abs(one - other) > ROUNDING:
+            return one < other
+    return False

@@ -28,7 +28,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState, RunningGait
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
 from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
-from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import activities_step
@@ -186,7 +186,7 @@ class GaitSupervisor:
         A service call that asks for a start ends a stop by votes too, once nobody votes any more.
         """
         voted = state.voted and (stop or automatic or state.tally.alive)
-        return self._turned(updated(state, asked=stop, automatic=automatic, voted=voted))
+        return self._turned(replace_unchecked(state, asked=stop, automatic=automatic, voted=voted))
 
     def step(self, state: SupervisorState, time_ns: int, network: GaitNetwork, x: Array,
              x_dot: Array, r: Array, command: tuple[float, float, float],
@@ -216,7 +216,7 @@ class GaitSupervisor:
         omega, more = gait.omega(speed, network.scale), gait.rest_rate
         activity = activities_step(state.activity, [rate + more for rate in rates],
                                    gait.own_omegas(omega), self.activity_rate, dt)
-        state = updated(state, time_ns=time_ns, activity=activity)
+        state = replace_unchecked(state, time_ns=time_ns, activity=activity)
         if body_mode != 'standing':
             state = self._barred(state, body_mode)
         elif self.parameters.auto_inhibit:
@@ -230,10 +230,10 @@ class GaitSupervisor:
         """Stop after a time of zero command, and start at a command."""
         if commanded:
             if state.idle_ns >= 0:
-                state = updated(state, idle_ns=-1)
+                state = replace_unchecked(state, idle_ns=-1)
             return self.request(state, False, True) if state.asked and state.automatic else state
         if state.idle_ns < 0:
-            state = updated(state, idle_ns=state.time_ns)
+            state = replace_unchecked(state, idle_ns=state.time_ns)
         waited = (state.time_ns - state.idle_ns) * 1e-9
         if not state.asked and waited >= self.parameters.auto_delay:
             return self.request(state, True, True)
@@ -242,15 +242,15 @@ class GaitSupervisor:
     def _voted(self, state: SupervisorState, tally: Tally) -> SupervisorState:
         """Stop when votes overcome the threshold; keep what holds until it is released."""
         if tally is not state.tally:
-            state = updated(state, tally=tally)
+            state = replace_unchecked(state, tally=tally)
         if tally.stops and not state.voted:
-            return self._turned(updated(state, voted=True, vote_gains=tally.gains))
+            return self._turned(replace_unchecked(state, voted=True, vote_gains=tally.gains))
         if not state.voted:
             return state
         if not tally.alive and self.voting.vote_resume:
-            return self._turned(updated(state, voted=False))
+            return self._turned(replace_unchecked(state, voted=False))
         if self.voting.vote_rule == SUM and np.any(tally.gains > state.vote_gains):
-            return updated(state, vote_gains=np.maximum(tally.gains, state.vote_gains))
+            return replace_unchecked(state, vote_gains=np.maximum(tally.gains, state.vote_gains))
         return state
 
     @staticmethod
@@ -259,7 +259,7 @@ class GaitSupervisor:
         stop = state.asked or state.voted
         if stop == state.requested:
             return state
-        return updated(state, state='waiting' if stop else 'releasing', requested=stop,
+        return replace_unchecked(state, state='waiting' if stop else 'releasing', requested=stop,
                        request_ns=state.time_ns, armed=False, measured_s=float('nan'), idle_ns=-1)
 
     def _barred(self, state: SupervisorState, body_mode: str) -> SupervisorState:
@@ -267,7 +267,7 @@ class GaitSupervisor:
         automatic = body_mode not in FALLEN_MODES
         if not state.asked:
             return self.request(state, True, automatic)
-        return updated(state, automatic=state.automatic and automatic, idle_ns=-1)
+        return replace_unchecked(state, automatic=state.automatic and automatic, idle_ns=-1)
 
     def _stopping(self, state: SupervisorState, network: GaitNetwork, x: Array,
                   rates: list[float], speed: float) -> SupervisorState:
@@ -277,11 +277,12 @@ class GaitSupervisor:
         armed = (state.armed and inside) or (
             speed <= self.parameters.capture_speed and self.in_places(network, x))
         if not (armed and inside):
-            return updated(state, armed=armed, state='waiting')
+            return replace_unchecked(state, armed=armed, state='waiting')
         if (max(map(abs, rates)) > REST_PHASE_RATE or speed > REST_SPEED
                 or max(state.activity.tolist()) > REST_ACTIVITY):
-            return updated(state, armed=armed, state='captured')
-        return updated(state, armed=armed, state='at_rest', measured_s=self._measured(state))
+            return replace_unchecked(state, armed=armed, state='captured')
+        return replace_unchecked(state, armed=armed, state='at_rest',
+                                 measured_s=self._measured(state))
 
     def in_places(self, network: GaitNetwork, x: Array) -> bool:
         """Whether legs and radii are as close to their places as capture takes for granted."""
@@ -295,7 +296,7 @@ class GaitSupervisor:
         now, measured_s = 'walking' if in_step and speed > REST_SPEED else 'free', state.measured_s
         if now == state.state and isfinite(measured_s):
             return state
-        return updated(state, state=now, measured_s=self._measured(state))
+        return replace_unchecked(state, state=now, measured_s=self._measured(state))
 
     @staticmethod
     def _measured(state: SupervisorState) -> float:

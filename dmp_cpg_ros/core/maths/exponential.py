@@ -13,9 +13,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 
 def phi_functions(M: Array, highest: int = 3) -> list[Array]:

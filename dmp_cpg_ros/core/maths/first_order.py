@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 
 @dataclass(frozen=True)
@@ -43,8 +42,7 @@ class FirstOrderFilter:
         """Validate."""
         if not (np.isfinite(self.rate) and self.rate > 0.0):
             raise ParameterError(
-                f'filter rate = {self.rate!r} 1/s must be a positive finite number'
-            )
+                f'filter rate = {self.rate!r} 1/s must be a positive finite number')
 
     def at(self, value: ArrayLike, command: ArrayLike, elapsed: ArrayLike) -> Array:
         """Filtered value some time after the start of a step.

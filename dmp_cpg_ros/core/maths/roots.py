@@ -7,8 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 
-def last_that_holds(holds: Callable[[float], bool], low: float, high: float,
-                    rounds: int) -> float:
+def last_that_holds(holds: Callable[[float], bool], low: float, high: float, rounds: int) -> float:
     """Largest value between one that holds and one that does not, to (high − low)/2^rounds.
 
     Parameters

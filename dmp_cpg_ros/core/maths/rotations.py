@@ -7,9 +7,8 @@ from __future__ import annotations
 from math import asin, atan2, cos, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 
 def turned(quaternion: Array, rotation_vector: Array) -> Array:

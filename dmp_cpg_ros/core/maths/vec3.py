@@ -78,8 +78,7 @@ def inverse(M: Matrix) -> Matrix:
     return (
         (A * scale, (c * h - b * i) * scale, (b * f - c * e) * scale),
         (B * scale, (a * i - c * g) * scale, (c * d - a * f) * scale),
-        (C * scale, (b * g - a * h) * scale, (a * e - b * d) * scale),
-    )
+        (C * scale, (b * g - a * h) * scale, (a * e - b * d) * scale))
 
 
 def rotation(quaternion: Sequence[float]) -> Matrix:
@@ -88,8 +87,7 @@ def rotation(quaternion: Sequence[float]) -> Matrix:
     return (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
         (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
-        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-    )
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))
 
 
 def upward(quaternion: Sequence[float]) -> Triple:

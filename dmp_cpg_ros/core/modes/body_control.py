@@ -18,7 +18,6 @@ from dmp_cpg_ros.core.balance.controller import (
     PostureState,
 )
 from dmp_cpg_ros.core.gait.transition import GaitInForce
-from dmp_cpg_ros.core.maths.updated import updated
 from dmp_cpg_ros.core.modes.manager import ModeManager, ModeParameters, ModeState
 from dmp_cpg_ros.core.modes.requests import ModeAnswer, request
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -109,5 +108,6 @@ class BodyControl:
         if mode.mode not in BALANCED:
             return (BodyState(mode, self.posture.initial_state()),
                     self.modes.feedback(mode, measured))
-        balance, feedback = self.posture.step(state.balance, measured, gait, x, x_dot, r, dt)
-        return BodyState(mode, balance), updated(feedback, command=self.modes.command(mode))
+        balance, feedback = self.posture.step(
+            state.balance, measured, gait, x, x_dot, r, dt, self.modes.command(mode))
+        return BodyState(mode, balance), feedback

@@ -16,6 +16,7 @@ Ijspeert et al. 2013).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,8 +149,7 @@ class LegMotion:
             command.movement, primitive, movement.duration, replace(state, x=command.x))
 
 
-@dataclass(frozen=True)
-class LegControlState:
+class LegControlState(NamedTuple):
     """State of the leg block.
 
     Attributes

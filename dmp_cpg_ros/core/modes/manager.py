@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.balance.body_command import BALANCED, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase_rate
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE, REST_SPEED
-from dmp_cpg_ros.core.maths.updated import updated
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.modes import falls
 from dmp_cpg_ros.core.modes.motion_library import SIDES, Movements, phase_at, unit_movement
 from dmp_cpg_ros.core.parameters import parameter
@@ -173,7 +173,8 @@ class ModeManager:
         fall, sign = state.fall, ''
         if state.mode not in ('damped', 'recovering'):
             fall, sign = self._detector.step(fall, condition, time_ns, state.mode in BALANCED)
-        state = updated(state, time_ns=time_ns, condition=condition, begun_ns=begun, fall=fall)
+        state = replace_unchecked(
+            state, time_ns=time_ns, condition=condition, begun_ns=begun, fall=fall)
         if sign:
             return _enter_now(state, 'damped', f'fell at {time_ns * 1e-9:.3f} s: {sign}')
         if state.mode == 'stopping':

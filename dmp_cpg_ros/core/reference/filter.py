@@ -15,53 +15,34 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.gait import BodyScale, limited
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.parameters import Parameters, parameter
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class ReferenceParameters(Parameters):
     """Parameters of the reference system."""
 
-    alpha_r: float = parameter(
-        3.0, 'rate of the reference filters', unit='1/s', minimum=0.05, maximum=50.0
-    )
+    alpha_r: float = parameter(3.0, 'rate of the reference filters', 0.05, 50.0, unit='1/s')
     max_speed: float = parameter(
-        3.5, 'largest forward speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
-    )
+        3.5, 'largest forward speed that is accepted', 0.0, 10.0, unit='m/s')
     max_lateral_speed: float = parameter(
-        0.6, 'largest sideways speed that is accepted', unit='m/s', minimum=0.0, maximum=10.0
-    )
+        0.6, 'largest sideways speed that is accepted', 0.0, 10.0, unit='m/s')
     max_turn_rate: float = parameter(
-        2.2, 'largest turn rate that is accepted', unit='rad/s', minimum=0.0, maximum=10.0
-    )
+        2.2, 'largest turn rate that is accepted', 0.0, 10.0, unit='rad/s')
     max_curve: float = parameter(
-        0.3,
-        'largest acceleration towards the centre of a curve, at low speed',
-        unit='g',
-        minimum=0.01,
-        maximum=10.0,
-    )
+        0.3, 'largest acceleration towards the centre of a curve, at low speed', 0.01, 10.0,
+        unit='g')
     max_acceleration: float = parameter(
-        4.0,
-        'largest acceleration of the reference, except when braking to rest',
-        unit='m/s^2',
-        minimum=0.1,
-        maximum=1e3,
-    )
+        4.0, 'largest acceleration of the reference, except when braking to rest', 0.1, 1e3,
+        unit='m/s^2')
     cmd_vel_timeout: float = parameter(
-        0.5,
-        'time without cmd_vel after which the command is zero; 0: never',
-        unit='s',
-        minimum=0.0,
-        maximum=3600.0,
-    )
+        0.5, 'time without cmd_vel after which the command is zero; 0: never', 0.0, 3600.0,
+        unit='s')
 
 
 class CommandGate:
@@ -79,16 +60,13 @@ class CommandGate:
         :func:`~dmp_cpg_ros.core.gait.choice.highest_speed`.
     """
 
-    def __init__(
-        self, parameters: ReferenceParameters, scale: BodyScale | None = None,
-        highest_speed: float = inf,
-    ) -> None:
+    def __init__(self, parameters: ReferenceParameters, scale: BodyScale | None = None,
+                 highest_speed: float = inf) -> None:
         """Start with a zero command."""
         self._scale = scale
         self.follow(parameters, highest_speed)
         self._command: tuple[float, float, float] = (0.0, 0.0, 0.0)
-        self._received_ns: int | None = None
-        self._fresh = False
+        self._received_ns, self._fresh = 0, False
 
     def follow(self, parameters: ReferenceParameters, highest_speed: float) -> None:
         """Take new limits; they hold for the next command, that of the gait at once."""
@@ -109,31 +87,24 @@ class CommandGate:
         """
         if not np.all(np.isfinite((v_x, v_y, gamma))):
             raise DataError(
-                f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite'
-            )
+                f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite')
         p = self.parameters
-        self._command = (
-            _limited(v_x, p.max_speed),
-            _limited(v_y, p.max_lateral_speed),
-            _limited(gamma, p.max_turn_rate),
-        )
-        self._fresh = True
+        limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
+        v_x, v_y, gamma = (min(max(float(value), -limit), limit) for value, limit in zip(
+            (v_x, v_y, gamma), limits, strict=True))
+        self._command, self._fresh = (v_x, v_y, gamma), True
 
     def at(self, time_ns: int) -> tuple[float, float, float]:
         """Command that acts at a time on the robot's clock [ns]: (v_x, v_y, γ)."""
         if self._fresh:
             self._fresh, self._received_ns = False, time_ns
-        if self._received_ns is None:
-            return 0.0, 0.0, 0.0
-        if time_ns < self._received_ns:
-            self._received_ns = time_ns
+        self._received_ns = min(self._received_ns, time_ns)
         timeout = self.parameters.cmd_vel_timeout
         if timeout > 0.0 and (time_ns - self._received_ns) * 1e-9 > timeout:
             return 0.0, 0.0, 0.0
         if self._scale is None:
             return self._command
-        return limited(
-            self._command, self._scale, self.highest_speed, self.parameters.max_curve)
+        return limited(self._command, self._scale, self.highest_speed, self.parameters.max_curve)
 
 
 class ReferenceSystem:
@@ -141,7 +112,7 @@ class ReferenceSystem:
 
     def __init__(self, parameters: ReferenceParameters) -> None:
         """Keep the parameters."""
-        self.parameters = parameters
+        self.parameters, self._filter = parameters, FirstOrderFilter(parameters.alpha_r)
 
     def step(self, r: Array, r_ext: Array, dt: float) -> Array:
         """Advance: r(t + dt) = r_ext + (r − r_ext) exp(−α_r dt), less where v changes too fast.
@@ -159,17 +130,15 @@ class ReferenceSystem:
         -------
         ndarray (3,)
         """
-        plain = FirstOrderFilter(self.parameters.alpha_r)
-        following = plain.step(r, r_ext, dt)
-        change, most = following[:2] - r[:2], self.parameters.max_acceleration * dt
-        if change @ change <= most * most:
+        kept = self._filter.kept(dt)
+        following = r_ext + (r - r_ext) * kept
+        most = self.parameters.max_acceleration * dt
+        change_x, change_y, _ = (following - r).tolist()
+        if change_x * change_x + change_y * change_y <= most * most:
             return following
+        change = following[:2] - r[:2]
         if following[:2] @ following[:2] <= r[:2] @ r[:2]:
-            most = max(most, float(1.0 - plain.kept(dt)) * float(np.sqrt(r[:2] @ r[:2])))
+            most = max(most, float(1.0 - kept) * float(np.sqrt(r[:2] @ r[:2])))
         if change @ change > most * most * (1.0 + 1e-12):
             following[:2] = r[:2] + change * (most / float(np.sqrt(change @ change)))
         return following
-
-
-def _limited(value: float, limit: float) -> float:
-    return min(max(float(value), -limit), limit)

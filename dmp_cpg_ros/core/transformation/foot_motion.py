@@ -21,9 +21,8 @@ from dmp_cpg_ros.core.transformation.foot_path import FootPath
 class FootMotion(Protocol):
     """Motion of one foot in the base."""
 
-    def step(
-        self, state: Any, path: FootPath, cycle_position: float, rate: float, dt: float
-    ) -> tuple[Any, Triple, Triple]:
+    def step(self, state: Any, path: FootPath, cycle_position: float, rate: float,
+             dt: float) -> tuple[Any, Triple, Triple]:
         """Advance to the time at which the inputs hold.
 
         Parameters
@@ -62,9 +61,8 @@ class Motion(Protocol):
 class HermiteMotion:
     """The foot path itself."""
 
-    def step(
-        self, state: None, path: FootPath, cycle_position: float, rate: float, dt: float
-    ) -> tuple[None, Triple, Triple]:
+    def step(self, state: None, path: FootPath, cycle_position: float, rate: float,
+             dt: float) -> tuple[None, Triple, Triple]:
         """Foot on its path, as :meth:`FootMotion.step`."""
         foot, slope = path.at(cycle_position)
         return None, foot, moved((0.0, 0.0, 0.0), slope, rate / (2.0 * pi))

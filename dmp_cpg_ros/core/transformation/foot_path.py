@@ -17,16 +17,14 @@ through a first-order filter as the paper uses for amplitudes (:func:`activity_s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import cos, exp, sin
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
-
-Array = NDArray[np.float64]
 
 LIFTING, LOWERING = 0.35, 0.5
 """Shares of the swing in which the foot rises and comes down. It rises sooner, so that it is clear
@@ -34,8 +32,7 @@ of the ground before it is moved along it.
 """
 
 
-@dataclass(frozen=True)
-class FootPath:
+class FootPath(NamedTuple):
     """Path of one foot for a held reference.
 
     Attributes
@@ -82,8 +79,7 @@ class FootPath:
         height = self.foothold_in_base[2]
         if abs(cycle_position) >= 0.5 * swing:
             from_mid_stance = (
-                cycle_position - 0.5 if cycle_position > 0.0 else cycle_position + 0.5
-            )
+                cycle_position - 0.5 if cycle_position > 0.0 else cycle_position + 0.5)
             x, y, x_dot, y_dot = self.stance(from_mid_stance * period)
             return (x, y, height), (x_dot * period, y_dot * period, 0.0)
         half_stance = 0.5 * self.duty * period
@@ -95,8 +91,7 @@ class FootPath:
         bump, bump_slope = swing_height(s)
         return (
             (x, y, height + self.clearance * bump),
-            (x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing),
-        )
+            (x_slope / swing, y_slope / swing, self.clearance * bump_slope / swing))
 
     def swung(self, cycle_position: float) -> float:
         """Share of the swing that has passed; outside of [0, 1] in stance."""
@@ -117,11 +112,8 @@ class FootPath:
         y = c * y0 - s * x0 - along * self.v_y + across * self.v_x
         share_x, share_y = self.rolling
         return (
-            x0 + share_x * (x - x0),
-            y0 + share_y * (y - y0),
-            share_x * (-self.v_x + self.gamma * y),
-            share_y * (-self.v_y - self.gamma * x),
-        )
+            x0 + share_x * (x - x0), y0 + share_y * (y - y0),
+            share_x * (-self.v_x + self.gamma * y), share_y * (-self.v_y - self.gamma * x))
 
 
 def swing_height(s: float) -> tuple[float, float]:
@@ -145,9 +137,8 @@ def swing_height(s: float) -> tuple[float, float]:
     return u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) * scale
 
 
-def activity_step(
-    activity: float, phase_rate: float, omega: float, rate: float, dt: float
-) -> float:
+def activity_step(activity: float, phase_rate: float, omega: float, rate: float,
+                  dt: float) -> float:
     """Advance ȧ = rate · (sat(φ̇/ω) − a) exactly for a held phase rate.
 
     Parameters
@@ -171,18 +162,11 @@ def activity_step(
     return wanted + (activity - wanted) * exp(-rate * dt)
 
 
-def activities_step(
-    activities: Array,
-    phase_rates: list[float],
-    omegas: list[float],
-    rate: float,
-    dt: float,
-) -> Array:
+def activities_step(activities: Array, phase_rates: list[float], omegas: list[float], rate: float,
+                    dt: float) -> Array:
     """As :func:`activity_step` for a few legs, (n,), without arithmetic on arrays."""
     kept, after = exp(-rate * dt), []
-    for activity, phase_rate, omega in zip(
-        activities.tolist(), phase_rates, omegas, strict=True
-    ):
+    for activity, phase_rate, omega in zip(activities.tolist(), phase_rates, omegas, strict=True):
         wanted = min(max(phase_rate / omega, 0.0), 1.0)
         after.append(wanted + (activity - wanted) * kept)
     return np.array(after)
@@ -213,8 +197,7 @@ def rolling_share(kinematics: LegKinematics, foothold_in_base: Array) -> tuple[f
     roll_per_y = turning[0, 1]
     return (
         float(1.0 / (1.0 - geometry.foot_radius * pitch_per_x)),
-        float(1.0 / (1.0 + geometry.foot_radius * roll_per_y)),
-    )
+        float(1.0 / (1.0 + geometry.foot_radius * roll_per_y)))
 
 
 def _hermite(s: float, p0: float, p1: float, m0: float, m1: float) -> tuple[float, float]:
@@ -224,9 +207,7 @@ def _hermite(s: float, p0: float, p1: float, m0: float, m1: float) -> tuple[floa
         (2.0 * s3 - 3.0 * s2 + 1.0) * p0
         + (s3 - 2.0 * s2 + s) * m0
         + (3.0 * s2 - 2.0 * s3) * p1
-        + (s3 - s2) * m1
-    )
+        + (s3 - s2) * m1)
     slope = (
-        6.0 * (s2 - s) * (p0 - p1) + (3.0 * s2 - 4.0 * s + 1.0) * m0 + (3.0 * s2 - 2.0 * s) * m1
-    )
+        6.0 * (s2 - s) * (p0 - p1) + (3.0 * s2 - 4.0 * s + 1.0) * m0 + (3.0 * s2 - 2.0 * s) * m1)
     return value, slope

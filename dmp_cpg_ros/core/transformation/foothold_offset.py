@@ -35,9 +35,8 @@ class OffsetRates:
     yielding: float
     levelling: float
 
-    def in_swing(
-        self, shift: Triple, wanted: Triple, height: float, activity: float, dt: float
-    ) -> Triple:
+    def in_swing(self, shift: Triple, wanted: Triple, height: float, activity: float,
+                 dt: float) -> Triple:
         """Rate of the shift of a swinging foot.
 
         Parameters
@@ -60,10 +59,8 @@ class OffsetRates:
         (x, y, z), (wanted_x, wanted_y, wanted_z) = shift, wanted
         return (wanted_x - x) * share, (wanted_y - y) * share, (wanted_z - z) * share
 
-    def in_stance(
-        self, shift: Triple, drift: tuple[float, float], away: tuple[float, float],
-        activity: float, dt: float,
-    ) -> Triple:
+    def in_stance(self, shift: Triple, drift: tuple[float, float], away: tuple[float, float],
+                  activity: float, dt: float) -> Triple:
         """Rate of the shift of a standing foot.
 
         Parameters

@@ -24,18 +24,16 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput, RhythmicPrimitive, RhythmicState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
-
-Array = NDArray[np.float64]
 
 MOTION_NAMES = tuple(f'{leg}_{part}' for leg in LEGS for part in ('stride', 'side', 'lift'))
 """Names of a motion's degrees of freedom, in order."""
@@ -97,8 +95,7 @@ class LearnedMotion:
         if primitive.names != MOTION_NAMES:
             raise DataError(
                 f'a motion has the degrees of freedom {", ".join(MOTION_NAMES)}, not '
-                f'{", ".join(primitive.names) or "nameless ones"}'
-            )
+                f'{", ".join(primitive.names) or "nameless ones"}')
         cycle = primitive.centre + primitive.on_cycle(np.linspace(-pi, pi, 200))[0]
         for name, column, most in zip(MOTION_NAMES, cycle.T, LARGEST * len(LEGS), strict=True):
             if not np.abs(column).max() <= most:
@@ -113,8 +110,7 @@ class LearnedMotion:
     def of_leg(self, leg: str, description: RobotDescription) -> LearnedFoot:
         """Motion of one foot, scaled to a robot."""
         dofs = slice(3 * LEGS.index(leg), 3 * LEGS.index(leg) + 3)
-        return LearnedFoot(
-            self.primitive.part(dofs), self.clearance, description.stance_height)
+        return LearnedFoot(self.primitive.part(dofs), self.clearance, description.stance_height)
 
 
 class LearnedFoot:
@@ -129,18 +125,15 @@ class LearnedFoot:
         The swing is scaled to the height that the path asks.
     """
 
-    def __init__(
-        self, primitive: RhythmicPrimitive, clearance: float, stance_height: float
-    ) -> None:
+    def __init__(self, primitive: RhythmicPrimitive, clearance: float,
+                 stance_height: float) -> None:
         """Keep."""
         self._primitive, self._height = primitive, stance_height
         self._full = clearance * stance_height
         self._held = RhythmicInput(primitive.centre)
 
-    def step(
-        self, state: PlayedFoot | None, path: FootPath, cycle_position: float, rate: float,
-        dt: float,
-    ) -> tuple[PlayedFoot, Triple, Triple]:
+    def step(self, state: PlayedFoot | None, path: FootPath, cycle_position: float, rate: float,
+             dt: float) -> tuple[PlayedFoot, Triple, Triple]:
         """Foot at the present phase, as :meth:`FootMotion.step`."""
         psi, stretch = warped(cycle_position, path.duty)
         began, on = (psi, 0.0) if state is None else (
@@ -169,8 +162,7 @@ class LearnedFoot:
             PlayedFoot(began, played),
             (x, y + height * side, path.foothold_in_base[2] + height * lift),
             (x_dot * slower * cycle, y_dot * slower * cycle + height * side_rate,
-             height * lift_rate),
-        )
+             height * lift_rate))
 
     def _per_radian(self, played: RhythmicState) -> list[float]:
         """Derivatives by ψ [1/rad]."""
@@ -208,10 +200,9 @@ class FootSamples:
     foot: Array
 
 
-def learn_motion(
-    feet: Sequence[Sequence[FootSamples]], stance_height: float, bases: int = 25,
-    stiffness: float = 6400.0, damping: float = 160.0,
-) -> tuple[RhythmicPrimitive, Array]:
+def learn_motion(feet: Sequence[Sequence[FootSamples]], stance_height: float, bases: int = 25,
+                 stiffness: float = 6400.0,
+                 damping: float = 160.0) -> tuple[RhythmicPrimitive, Array]:
     """Learn one primitive for all feet.
 
     Parameters

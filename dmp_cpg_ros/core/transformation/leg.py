@@ -9,21 +9,22 @@ Jacobian.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rate
 from dmp_cpg_ros.core.gait.contact_feedback import LOADED, quarter_weight
 from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, minus, moved, pair, plus, triple
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.transformation import stumble as reflex
 from dmp_cpg_ros.core.transformation.foot_motion import FootMotion, HermiteMotion, Motion
 from dmp_cpg_ros.core.transformation.foot_path import (
     FootPath,
@@ -32,14 +33,6 @@ from dmp_cpg_ros.core.transformation.foot_path import (
     swing_height,
 )
 from dmp_cpg_ros.core.transformation.foothold_offset import OffsetRates
-from dmp_cpg_ros.core.transformation.stumble import (
-    Stumble,
-    compliant_offset_rate,
-    stumble_step,
-    swing_progress,
-)
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -47,46 +40,35 @@ class LegParameters(Parameters):
     """Parameters of a leg's transformation systems."""
 
     stiffness: float = parameter(
-        6400.0, 'stiffness k of the transformation system', unit='1/s^2', minimum=1.0, maximum=1e6
-    )
+        6400.0, 'stiffness k of the transformation system', 1.0, 1e6, unit='1/s^2')
     damping: float = parameter(
-        160.0, 'damping b of the transformation system', unit='1/s', minimum=0.1, maximum=1e4
-    )
+        160.0, 'damping b of the transformation system', 0.1, 1e4, unit='1/s')
     reading: str = parameter(
-        'kinematic',
-        'whether the joint follows the primitive or receives its torque',
-        choices=('kinematic', 'torque'),
-    )
+        'kinematic', 'whether the joint follows the primitive or receives its torque',
+        choices=('kinematic', 'torque'))
     clearance: float = parameter(
-        0.2, 'height of the swing as a fraction of the standing height', minimum=0.0, maximum=0.6
-    )
+        0.2, 'height of the swing as a fraction of the standing height', 0.0, 0.6)
     motion: str = parameter(
-        '', 'file of a learned motion of the feet, scaled to the clearance; empty: the foot path'
-    )
+        '', 'file of a learned motion of the feet, scaled to the clearance; empty: the foot path')
     activity_rate: float = parameter(
-        12.0, 'rate at which the swing height follows the phase speed', unit='1/s', minimum=0.1,
-        maximum=1e3)
+        12.0, 'rate at which the swing height follows the phase speed', 0.1, 1e3, unit='1/s')
     placement_rate: float = parameter(
-        40.0, 'rate at which a swinging foot follows its placement shift', unit='1/s', minimum=0.1,
-        maximum=1e3)
+        40.0, 'rate at which a swinging foot follows its placement shift', 0.1, 1e3, unit='1/s')
     yielding_rate: float = parameter(
         20.0, 'rate at which the target of a standing foot approaches the measured foot position',
-        unit='1/s', minimum=0.0, maximum=1e3)
+        0.0, 1e3, unit='1/s')
     levelling_rate: float = parameter(
         10.0, 'rate at which a standing foot returns the height that compensated the tilt',
-        unit='1/s', minimum=0.1, maximum=1e3)
+        0.1, 1e3, unit='1/s')
     stumble_lift: float = parameter(
-        0.13,
-        'additional height of a swinging foot that meets an obstacle, as a fraction of the '
-        'standing height; 0: no reflex', minimum=0.0, maximum=0.4)
+        0.13, 'additional height of a swinging foot that meets an obstacle, as a fraction of the '
+        'standing height; 0: no reflex', 0.0, 0.4)
     stumble_lag: float = parameter(
-        0.035,
-        'distance from its target at which a swinging foot at rest has met an obstacle, as a '
-        'fraction of the standing height', minimum=0.005, maximum=1.0)
+        0.035, 'distance from its target at which a swinging foot at rest has met an obstacle, as '
+        'a fraction of the standing height', 0.005, 1.0)
 
 
-@dataclass(frozen=True)
-class LegState:
+class LegState(NamedTuple):
     """State of one leg's primitive.
 
     Attributes
@@ -106,12 +88,11 @@ class LegState:
     joints: SpringState
     activity: float
     shift_in_base: Array
-    stumble: Stumble = Stumble()
+    stumble: reflex.Stumble = reflex.Stumble()
     motion: Any = None
 
 
-@dataclass(frozen=True)
-class LegFeedback:
+class LegFeedback(NamedTuple):
     """The part of the body's feedback that one leg's path takes.
 
     Attributes
@@ -151,10 +132,8 @@ class LegPrimitive:
         :class:`~dmp_cpg_ros.core.transformation.foot_path.FootPath` itself without.
     """
 
-    def __init__(
-        self, leg: str, description: RobotDescription, parameters: LegParameters,
-        motion: Motion | None = None,
-    ) -> None:
+    def __init__(self, leg: str, description: RobotDescription, parameters: LegParameters,
+                 motion: Motion | None = None) -> None:
         """Derive foothold and scale from the description."""
         self._motion: FootMotion = (
             HermiteMotion() if motion is None else motion.of_leg(leg, description))
@@ -171,7 +150,7 @@ class LegPrimitive:
         self.stumble_lift = parameters.stumble_lift * description.stance_height
         self.stumble_lag = parameters.stumble_lag * description.stance_height
         self.touch_force = LOADED * quarter_weight(description)
-        self.inertia = np.asarray(geometry.rotor_inertia, dtype=float)
+        self._inertia = [float(J) for J in geometry.rotor_inertia]
         self.transformation = SpringDamper(
             np.full(3, parameters.stiffness), np.full(3, parameters.damping))
 
@@ -180,16 +159,8 @@ class LegPrimitive:
         q = self.kinematics.inverse(self.foothold_in_base)
         return LegState(SpringState(q, np.zeros(3)), 0.0, np.zeros(3))
 
-    def step(
-        self,
-        state: LegState,
-        gait: GaitInForce,
-        x: Array,
-        x_dot: Array,
-        r: Array,
-        feedback: LegFeedback,
-        dt: float,
-    ) -> tuple[LegState, Array, Array]:
+    def step(self, state: LegState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
+             feedback: LegFeedback, dt: float) -> tuple[LegState, Array, Array]:
         """Advance the leg to the time at which the inputs hold.
 
         Parameters
@@ -214,64 +185,60 @@ class LegPrimitive:
             g_θ [rad] and g_θ̇ [rad/s].
         """
         p = self.parameters
-        v_x, v_y, gamma = gait.limited(r.tolist(), self.scale)
-        speed = self.scale.foot_speed(v_x, v_y, gamma)
-        duty = gait.duty(speed, self.scale)
-        omega = gait.own_omegas(gait.omega(speed, self.scale))[self.place]
+        reference, _, own_omegas, duty = gait.pace(r, self.scale)
+        omega = own_omegas[self.place]
         x_1, x_2 = x.tolist()
         rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
-        path = self._path((v_x, v_y, gamma), omega, duty, activity, state.stumble, feedback)
-        motion, foot, path_velocity = self._motion.step(
-            state.motion, path, position, rate, dt)
+        path = self._path(reference, omega, duty, activity, state.stumble, feedback)
+        motion, foot, path_velocity = self._motion.step(state.motion, path, position, rate, dt)
+        offset = triple(state.shift_in_base.tolist())
         offset_rate, stumble = self._offset_rate(
-            state, activity, path, position, path_velocity, feedback, dt)
-        offset = moved(triple(state.shift_in_base.tolist()), offset_rate, dt)
+            state, offset, activity, path, position, path_velocity, feedback, dt)
+        offset = moved(offset, offset_rate, dt)
         bounce = gait.bounce(position, duty, omega)
-        foot = plus(plus(foot, offset), (0.0, 0.0, stumble.height - activity * bounce.height))
-        velocity = plus(plus(offset_rate, path_velocity), (0.0, 0.0, stumble.rate))
-        velocity = moved(velocity, (0.0, 0.0, -activity * bounce.velocity), rate / omega)
-        goal, goal_velocity = self._goal(foot, velocity)
+        p_x, p_y, p_z = plus(foot, offset)
+        v_x, v_y, v_z = plus(offset_rate, path_velocity)
+        goal, goal_velocity = self._goal(
+            (p_x, p_y, p_z + (stumble.height - activity * bounce.height)),
+            (v_x, v_y, v_z + stumble.rate - activity * bounce.velocity * (rate / omega)))
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, np.array(offset), stumble, motion), goal, goal_velocity
 
-    def _path(
-        self, reference: Triple, omega: float, duty: float, activity: float, stumble: Stumble,
-        feedback: LegFeedback,
-    ) -> FootPath:
+    def _path(self, reference: Triple, omega: float, duty: float, activity: float,
+              stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
         """Path of the foot for the corrected reference, higher after a stumble."""
         v_x, v_y, gamma = plus(reference, triple(feedback.correction.tolist()))
         clearance = self.clearance + (self.stumble_lift if stumble.post_stumble else 0.0)
         return FootPath(
             self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
 
-    def _offset_rate(
-        self, state: LegState, activity: float, path: FootPath, position: float,
-        path_velocity: Triple, feedback: LegFeedback, dt: float,
-    ) -> tuple[Triple, Stumble]:
+    def _offset_rate(self, state: LegState, offset: Triple, activity: float, path: FootPath,
+                     position: float, path_velocity: Triple, feedback: LegFeedback,
+                     dt: float) -> tuple[Triple, reflex.Stumble]:
         """Rate of the foothold offset [m/s]: placement and stumbling reflex in swing, following
         the ground in stance.
         """
         if dt <= 0.0:
             return (0.0, 0.0, 0.0), state.stumble
-        offset, swung = triple(state.shift_in_base.tolist()), path.swung(position)
+        swung = path.swung(position)
         measured = self.kinematics.foot(feedback.joint_position)
         target = self.kinematics.foot(state.joints.position)
         away = minus(measured, target)
+        lift, lag = self.stumble_lift, self.stumble_lag
         if abs(position) >= 0.5 * (1.0 - path.duty):
-            stumble = stumble_step(state.stumble, None, self.stumble_lift, self.stumble_lag, dt)
+            stumble = reflex.stumble_step(state.stumble, None, lift, lag, dt)
             drift = pair(feedback.drift_in_base.tolist())
             return self.offset_rates.in_stance(offset, drift, away[:2], activity, dt), stumble
         progress = None
-        if self.stumble_lift:
+        if lift:
             touches = feedback.foot_force > self.touch_force
-            progress = swing_progress(path, swung, measured, target, touches)
-        lift = activity * self.stumble_lift
-        stumble = stumble_step(state.stumble, progress, lift, self.stumble_lag, dt)
+            progress = reflex.swing_progress(path, swung, measured, target, touches)
+        stumble = reflex.stumble_step(state.stumble, progress, activity * lift, lag, dt)
         placement, (height, _) = triple(feedback.shift_in_base.tolist()), swing_height(swung)
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
-        return compliant_offset_rate(stumble, rate, path_velocity, away), stumble
+        return reflex.compliant_offset_rate(stumble, rate, path_velocity, away), stumble
 
     def _goal(self, foot: Triple, velocity: Triple) -> tuple[Array, Array]:
         """g_θ [rad] and g_θ̇ [rad/s] of a foot in the base."""
@@ -279,14 +246,8 @@ class LegPrimitive:
         _, jacobian = self.kinematics.foot_and_jacobian(angles)
         return np.array(angles), np.array(_joint_velocity(jacobian, velocity))
 
-    def targets(
-        self,
-        state: LegState,
-        goal: Array,
-        goal_velocity: Array,
-        feedback: Array,
-        measured: SpringState | None = None,
-    ) -> JointTargets:
+    def targets(self, state: LegState, goal: Array, goal_velocity: Array, feedback: Array,
+                measured: SpringState | None = None) -> JointTargets:
         """Joint targets of the parameters' reading.
 
         Parameters
@@ -304,13 +265,13 @@ class LegPrimitive:
         -------
         JointTargets
         """
-        joints = state.joints if measured is None else measured
-        acceleration = self.transformation.acceleration(
-            joints.position, joints.velocity - goal_velocity, goal, np.zeros(3)
-        )
-        return JointTargets(
-            joints.position, joints.velocity, self.inertia * acceleration + feedback
-        )
+        joints, p = state.joints if measured is None else measured, self.parameters
+        effort = [
+            J * (p.stiffness * (g - y) - p.damping * (y_dot - g_dot)) + tau
+            for J, y, y_dot, g, g_dot, tau in zip(
+                self._inertia, joints.position.tolist(), joints.velocity.tolist(), goal.tolist(),
+                goal_velocity.tolist(), feedback.tolist(), strict=True)]
+        return JointTargets(joints.position, joints.velocity, np.array(effort))
 
 
 def body_scale(description: RobotDescription) -> BodyScale:
@@ -346,5 +307,4 @@ def _joint_velocity(J: Matrix, velocity: Triple) -> Triple:
     return (
         (x * minor_0 + b * (f * z - y * i) + c * (y * h - e * z)) * inverse,
         (a * (y * i - f * z) + x * minor_1 + c * (d * z - y * g)) * inverse,
-        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse,
-    )
+        (a * (e * z - y * h) + b * (y * g - d * z) + x * minor_2) * inverse)

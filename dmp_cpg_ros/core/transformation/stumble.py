@@ -22,8 +22,8 @@ body up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import exp, hypot, pi
+from typing import NamedTuple
 
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.transformation.foot_path import LOWERING, FootPath
@@ -73,8 +73,7 @@ POST_STUMBLE_SWINGS = 2
 """Swings after a stumble in which the foot steps higher from the start."""
 
 
-@dataclass(frozen=True)
-class SwingProgress:
+class SwingProgress(NamedTuple):
     """How far a swinging foot has come, along the direction in which the body moves over it.
 
     Attributes
@@ -104,9 +103,8 @@ class SwingProgress:
     touches: bool = False
 
 
-def swing_progress(
-    path: FootPath, swung: float, foot: Triple, target: Triple, touches: bool = False
-) -> SwingProgress | None:
+def swing_progress(path: FootPath, swung: float, foot: Triple, target: Triple,
+                   touches: bool = False) -> SwingProgress | None:
     """Swing progress of a foot; None where the body hardly moves over it.
 
     Parameters
@@ -127,20 +125,12 @@ def swing_progress(
         return None
     along, across, swing = along / body_speed, across / body_speed, 1.0 - path.duty
     return SwingProgress(
-        swung,
-        along * foot[0] + across * foot[1],
-        foot[2],
-        along * target[0] + across * target[1],
-        target[2],
-        body_speed,
-        body_speed / swing,
-        path.clearance * path.omega / (2.0 * pi * swing * LOWERING),
-        touches,
-    )
+        swung, along * foot[0] + across * foot[1], foot[2], along * target[0] + across * target[1],
+        target[2], body_speed, body_speed / swing,
+        path.clearance * path.omega / (2.0 * pi * swing * LOWERING), touches)
 
 
-@dataclass(frozen=True)
-class Stumble:
+class Stumble(NamedTuple):
     """State of the stumbling reflex of one foot.
 
     Attributes
@@ -177,9 +167,8 @@ class Stumble:
     sinking: float = 0.0
 
 
-def stumble_step(
-    before: Stumble, progress: SwingProgress | None, lift: float, threshold: float, dt: float
-) -> Stumble:
+def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, threshold: float,
+                 dt: float) -> Stumble:
     """Advance the reflex of one foot.
 
     Parameters
@@ -217,13 +206,11 @@ def stumble_step(
         and FEELING[0] < progress.swung < FEELING[1]
         and speed < STANDSTILL * progress.swing_speed
         and progress.target_place - progress.place > max(
-            threshold + late * max(0.0, progress.target_place - last.target_place), 2.0 * above)
-    )
+            threshold + late * max(0.0, progress.target_place - last.target_place), 2.0 * above))
     landed = before.landed or (
         progress.swung > (TOUCHED if progress.touches else TOUCHING)
         and sinking < SETTLED * progress.sinking_speed
-        and above > threshold + late * max(0.0, last.target_level - progress.target_level)
-    )
+        and above > threshold + late * max(0.0, last.target_level - progress.target_level))
     height, up = before.height, before.up or before.height >= RISEN * lift
     if tripped and not landed and (not up or progress.swung < HIGH):
         height = lift + (height - lift) * exp(-QUICKNESS * dt)
@@ -245,9 +232,8 @@ def _in_stance(before: Stumble, lift: float, dt: float) -> Stumble:
     return Stumble(post_stumble=post_stumble, height=height, rate=(height - before.height) / dt)
 
 
-def compliant_offset_rate(
-    stumble: Stumble, offset_rate: Triple, velocity: Triple, away: Triple
-) -> Triple:
+def compliant_offset_rate(stumble: Stumble, offset_rate: Triple, velocity: Triple,
+                          away: Triple) -> Triple:
     """Rate of the foothold offset of a swinging foot's path [m/s].
 
     Parameters

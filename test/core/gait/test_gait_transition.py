@@ -19,12 +19,17 @@ from dmp_cpg_ros.core.canonical.phase import phase, phase_rate, turned, wrapped
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.gait.arcs import arcs_between, crowding
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork, network_system
 from dmp_cpg_ros.core.gait.running import RunningGait
-from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitTransition
+from dmp_cpg_ros.core.gait.transition import (
+    BlendedGait,
+    GaitChangeParameters,
+    GaitTransition,
+    arcs_between,
+    crowding,
+)
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.layouts import canonical_rows, gait_rows, read_gait_rows
 

@@ -55,7 +55,7 @@ def test_a_foot_repeats_what_it_was_shown(motion):
        duty=st.floats(0.4, 0.8))
 def test_a_standing_foot_moves_against_the_body_at_every_speed_and_in_curves(
         motion, v, gamma, omega, duty):
-    path = dataclasses.replace(PATH, v_x=v, gamma=gamma, omega=omega, duty=duty)
+    path = PATH._replace(v_x=v, gamma=gamma, omega=omega, duty=duty)
     c, place, velocity = played(motion, path)
     standing = np.abs(c[:, 0]) > 0.5 * (1.0 - duty) + 0.08  # past the bases' blur at its ends
     since = (c[:, 0] - np.copysign(0.5, c[:, 0])) * 2.0 * np.pi / omega
@@ -69,7 +69,7 @@ def test_a_standing_foot_moves_against_the_body_at_every_speed_and_in_curves(
 @settings(max_examples=15)
 @given(v=st.floats(-0.5, 1.0), omega=st.floats(8.0, 16.0), duty=st.floats(0.4, 0.8))
 def test_velocities_are_the_rates_of_the_places(motion, v, omega, duty):
-    path = dataclasses.replace(PATH, v_x=v, omega=omega, duty=duty)
+    path = PATH._replace(v_x=v, omega=omega, duty=duty)
     _, place, velocity = played(motion, path)
     rates = np.diff(place, axis=0) / TICK
     middle = 0.5 * (velocity[1:] + velocity[:-1])
@@ -84,7 +84,7 @@ def late(share):
 def test_another_demonstration_is_another_motion(motion):
     other = drawn_motion(PATH, HEIGHT, late)
     assert other.clearance == pytest.approx(0.35, rel=0.05)
-    path = dataclasses.replace(PATH, clearance=other.clearance * HEIGHT)
+    path = PATH._replace(clearance=other.clearance * HEIGHT)
     c, place, _ = played(other, path)
     shares = np.array([path.swung(float(at)) for at in c[:, 0]])
     height = place[:, 2] - PATH.foothold_in_base[2]
@@ -112,7 +112,7 @@ def test_a_foot_whose_phase_stops_comes_to_stand(motion, stop):
     for k in range(150):
         c = (stop + (k - 149) * 0.008 + 0.5) % 1.0 - 0.5
         state, _, _ = foot.step(state, PATH, c, 12.0, TICK)
-    rest = dataclasses.replace(PATH, v_x=0.0, clearance=0.0)
+    rest = PATH._replace(v_x=0.0, clearance=0.0)
     for _ in range(100):
         state, place, velocity = foot.step(state, rest, stop, 0.0, TICK)
     np.testing.assert_allclose(place, PATH.foothold_in_base, atol=1e-12)
