@@ -12,12 +12,12 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+from scipy.sparse import coo_array
 
-from dmp_cpg_ros.core.canonical.graph import CouplingGraph
+from dmp_cpg_ros.core.canonical.graph import Array, CouplingGraph
+from dmp_cpg_ros.core.canonical.phase import phase_rotation
 from dmp_cpg_ros.core.errors import ParameterError
-
-Array = NDArray[np.float64]
 
 
 class Coupling(Protocol):
@@ -48,8 +48,7 @@ class Coupling(Protocol):
 class EdgeCoupling:
     """Σ_j K_ij (R(φ_ij) x_j − x_i) over a list of edges (paper eq. coupledDMPs and Section 5).
 
-    A real matrix acts on z = x₁ + i x₂ as p z + q z̄, with q = 0 when it commutes with rotations:
-    edges are one or two products, and a sum over each node's own stretch of the list.
+    A sparse matrix with two blocks for each edge.
 
     Parameters
     ----------
@@ -60,44 +59,26 @@ class EdgeCoupling:
     state_size = 2
 
     def __init__(self, graph: CouplingGraph) -> None:
-        """Sort the edges by the node that they act on."""
         self.count = graph.size
-        pairs = np.array(graph.edges, dtype=np.intp).reshape(-1, 2)
-        order = np.argsort(pairs[:, 0], kind='stable')
-        to, self._from = pairs[order].T
-        self._nodes, self._starts = np.unique(to, return_index=True)
-        offset = graph.phases[to] - graph.phases[self._from]
-        p, q = _complex_form(graph.gains[order])
-        # R(φ) turns the phase on, which is clockwise: z → exp(−iφ) z
-        self._p, q_seen = p * np.exp(-1j * offset), q * np.exp(1j * offset)
-        self._own_p, self._own_q = self._summed(p), self._summed(q)
-        self._q = q_seen if np.any(q != 0.0) else None
-        size = np.abs(p) + np.abs(q)
-        incoming = self._summed(size).real
-        self.bound = float((np.abs(self._own_p) + np.abs(self._own_q) + incoming).max(initial=0.0))
-        self.turned = bool(np.any(np.abs(np.exp(1j * offset) - 1.0) > 1e-12))
-        self.symmetric = _is_symmetric(to, self._from, self._p, q_seen, self.count) and bool(
-            np.all(np.abs(self._own_p.imag) <= 1e-12 * max(self.bound, 1.0)))
+        to, of = np.array(graph.edges, dtype=np.intp).reshape(-1, 2).T
+        offsets = (graph.phases[to] - graph.phases[of]).tolist()
+        turns = np.array([phase_rotation(phi) for phi in offsets]).reshape(-1, 2, 2)
+        blocks = np.concatenate([graph.gains @ turns, -graph.gains])
+        rows, columns = (np.broadcast_to(2 * nodes[:, None, None] + within, blocks.shape).ravel()
+                         for nodes, within in ((np.concatenate([to, to]), [[0], [1]]),
+                                               (np.concatenate([of, to]), [[0, 1]])))
+        self._matrix = coo_array(
+            (blocks.ravel(), (rows, columns)), (2 * self.count, 2 * self.count)).tocsr()
+        self._matrix.eliminate_zeros()
+        norms = np.linalg.norm(graph.gains, 2, axis=(1, 2))
+        self.bound = 2.0 * float(np.bincount(to, norms, self.count).max(initial=0.0))
+        self.turned = bool(np.any(np.abs(turns - np.eye(2)) > 1e-12))
+        skew = abs(self._matrix - self._matrix.T)
+        self.symmetric = bool(skew.max() <= 1e-12 * max(self.bound, 1.0))
 
     def __call__(self, x: Array) -> Array:
         """Rates, ndarray (N, 2) → (N, 2)."""
-        z = np.ascontiguousarray(x).view(complex)[:, 0]
-        seen = z[self._from]
-        along = self._p * seen
-        if self._q is None:
-            rate = self._summed(along) - self._own_p * z
-        else:
-            along += self._q * seen.conj()
-            rate = self._summed(along) - self._own_p * z - self._own_q * z.conj()
-        return rate.view(float).reshape(x.shape)
-
-    def _summed(self, along_edges: NDArray[np.generic]) -> NDArray[np.complex128]:
-        total = np.zeros(self.count, dtype=complex)
-        if len(self._nodes) == self.count:
-            np.add.reduceat(along_edges, self._starts, out=total)
-        elif len(self._nodes):
-            total[self._nodes] = np.add.reduceat(along_edges, self._starts)
-        return total
+        return np.asarray(self._matrix @ x.ravel()).reshape(x.shape)
 
 
 class MeanFieldCoupling:
@@ -124,94 +105,49 @@ class MeanFieldCoupling:
     symmetric = True
 
     def __init__(self, count: int, gain: float, phases: ArrayLike | None = None) -> None:
-        """Turn the phases into complex factors."""
         if not (np.isfinite(gain) and gain > 0.0):
             raise ParameterError(f'gain = {gain!r} 1/s must be finite and greater than 0')
         places = np.zeros(count) if phases is None else np.asarray(phases, dtype=float)
         if places.shape != (count,) or not np.all(np.isfinite(places)):
             raise ParameterError(f'phases must be {count} finite numbers')
-        self.count, self.bound = count, gain * count
-        self._pull = gain * count
-        self._turn = None if not places.any() else np.exp(-1j * places)
-        self.turned = self._turn is not None
-        self._gain = gain
+        self.count, self.bound, self._gain = count, gain * count, gain
+        self.turned, self._turn = bool(places.any()), np.exp(-1j * places)
 
     def __call__(self, x: Array) -> Array:
         """Rates, ndarray (N, 2) → (N, 2)."""
         z = np.ascontiguousarray(x).view(complex)[:, 0]
-        if self._turn is None:
-            rate = self._gain * z.sum() - self._pull * z
-        else:
-            rate = (self._gain * np.vdot(self._turn, z)) * self._turn - self._pull * z
+        rate = (self._gain * np.vdot(self._turn, z)) * self._turn - self.bound * z
         return rate.view(float).reshape(x.shape)
 
 
-def _complex_form(matrices: Array) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Numbers p, q with (B x as complex) = p z + q z̄, for real matrices B (E, 2, 2)."""
-    a, b, c, d = matrices.reshape(-1, 4).T
-    return 0.5 * ((a + d) + 1j * (c - b)), 0.5 * ((a - d) + 1j * (c + b))
-
-
-def _is_symmetric(to: NDArray[np.intp], seen: NDArray[np.intp], p: NDArray[np.complex128],
-                  q: NDArray[np.complex128], count: int) -> bool:
-    """Whether every edge has its reverse with the transposed matrix (p̄ and q)."""
-    forwards, backwards = to * count + seen, seen * count + to
-    a, b = np.argsort(forwards), np.argsort(backwards)
-    return bool(np.array_equal(forwards[a], backwards[b])
-                and len(np.unique(forwards)) == len(forwards)
-                and np.allclose(p[a], p[b].conj(), rtol=1e-12, atol=0.0)
-                and np.allclose(q[a], q[b], rtol=1e-12, atol=1e-300))
-
-
-class PhaseEdgeCoupling:
-    """Sine coupling over a list of edges.
-
-    Parameters
-    ----------
-    graph : CouplingGraph
-        Couplings with gains K = k I.
-
-    Raises
-    ------
-    ParameterError
-        If a gain is not a multiple of the identity.
-    """
+class _OnTheCircle:
+    """Sine coupling: a coupling of states along the unit circle."""
 
     state_size = 1
+
+    def __init__(self, of: EdgeCoupling | MeanFieldCoupling, bound: float) -> None:
+        self._of, self.bound = of, bound
+        self.count, self.symmetric, self.turned = of.count, of.symmetric, of.turned
+
+    def __call__(self, x: Array) -> Array:
+        """Rates, ndarray (N, 1) → (N, 1) [rad/s]."""
+        z = np.exp(-1j * x[:, 0])
+        rate = self._of(z.view(float).reshape(-1, 2)).view(complex)[:, 0]
+        return -(z.conj() * rate).imag[:, None]
+
+
+class PhaseEdgeCoupling(_OnTheCircle):
+    """Sine coupling over the edges of a CouplingGraph; ParameterError unless its K = k I."""
 
     def __init__(self, graph: CouplingGraph) -> None:
-        """Take the edges as they act on points of the unit circle."""
-        scalars = graph.gains[:, 0, 0]
-        if not np.array_equal(graph.gains, scalars[:, None, None] * np.eye(2)):
+        if not np.array_equal(graph.gains, graph.gains[:, :1, :1] * np.eye(2)):
             raise ParameterError('phase oscillators need gains K = k I')
-        self._on_circle = EdgeCoupling(graph)
-        self.count, self.bound = graph.size, self._on_circle.bound
-        self.symmetric, self.turned = self._on_circle.symmetric, self._on_circle.turned
-
-    def __call__(self, x: Array) -> Array:
-        """Rates, ndarray (N, 1) → (N, 1) [rad/s]."""
-        return _along_the_circle(self._on_circle, x)
+        super().__init__(of := EdgeCoupling(graph), of.bound)
 
 
-class PhaseMeanFieldCoupling:
+class PhaseMeanFieldCoupling(_OnTheCircle):
     """All-to-all sine coupling with one gain; parameters as of MeanFieldCoupling."""
 
-    state_size = 1
-    symmetric = True
-
     def __init__(self, count: int, gain: float, phases: ArrayLike | None = None) -> None:
-        """Take the mean field of points of the unit circle."""
-        self._on_circle = MeanFieldCoupling(count, gain, phases)
         # of Σ k sin(θ_j − θ_i) the Jacobian's norm is at most twice the largest row sum
-        self.count, self.bound = count, 2.0 * self._on_circle.bound
-        self.turned = self._on_circle.turned
-
-    def __call__(self, x: Array) -> Array:
-        """Rates, ndarray (N, 1) → (N, 1) [rad/s]."""
-        return _along_the_circle(self._on_circle, x)
-
-
-def _along_the_circle(coupling: EdgeCoupling | MeanFieldCoupling, x: Array) -> Array:
-    z = np.exp(-1j * x[:, 0])
-    rate = coupling(z.view(float).reshape(-1, 2)).view(complex)[:, 0]
-    return -(z.conj() * rate).imag[:, None]
+        super().__init__(of := MeanFieldCoupling(count, gain, phases), 2.0 * of.bound)

@@ -10,72 +10,32 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import root
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.jacobians import complex_step_jacobian, difference_jacobian
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.paper.jacobians import Array, complex_step_jacobian, difference_jacobian
 
 _SMALLEST_PIECE = 2.0**-20
 
 
 class Diffeomorphism(ABC):
-    """A smooth map of ℝⁿ with a smooth inverse."""
+    """A smooth map of ℝⁿ with a smooth inverse; points and velocities are ndarray (n,)."""
 
     @abstractmethod
     def forward(self, y: Array) -> Array:
-        """T(y).
-
-        Parameters
-        ----------
-        y : ndarray (n,)
-
-        Returns
-        -------
-        ndarray (n,)
-        """
+        """T(y)."""
 
     @abstractmethod
     def jacobian(self, y: Array) -> Array:
-        """J = ∂T/∂y.
-
-        Parameters
-        ----------
-        y : ndarray (n,)
-
-        Returns
-        -------
-        ndarray (n, n)
-        """
+        """J = ∂T/∂y, ndarray (n, n)."""
 
     @abstractmethod
     def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
-        """T⁻¹(y').
-
-        Parameters
-        ----------
-        y_prime : ndarray (n,)
-        guess : ndarray (n,), optional
-            A point near the answer; maps with a closed inverse do not need it.
-
-        Returns
-        -------
-        ndarray (n,)
-        """
+        """T⁻¹(y'); maps without a closed inverse search from the guess, a point near it."""
 
     def velocity(self, y: Array, y_dot: Array) -> Array:
-        """Velocity of the image, J(y) ẏ.
-
-        Parameters
-        ----------
-        y, y_dot : ndarray (n,)
-
-        Returns
-        -------
-        ndarray (n,)
-        """
+        """Velocity of the image, J(y) ẏ."""
         return self.jacobian(y) @ y_dot
 
 
@@ -102,11 +62,9 @@ class FunctionDiffeomorphism(Diffeomorphism):
     derivative: Literal['difference', 'complex'] = 'difference'
 
     def __post_init__(self) -> None:
-        """Validate."""
         if self.derivative not in ('difference', 'complex'):
             raise ParameterError(
-                f"derivative must be 'difference' or 'complex', not {self.derivative!r}"
-            )
+                f"derivative must be 'difference' or 'complex', not {self.derivative!r}")
 
     def forward(self, y: Array) -> Array:
         """T(y)."""
@@ -114,23 +72,18 @@ class FunctionDiffeomorphism(Diffeomorphism):
 
     def jacobian(self, y: Array) -> Array:
         """J(y), given or numerical."""
-        y = np.asarray(y, dtype=float)
         if self.jacobian_function is not None:
-            return np.asarray(self.jacobian_function(y), dtype=float)
-        return (
-            complex_step_jacobian(self.function, y)
-            if self.derivative == 'complex'
-            else difference_jacobian(self.function, y)
-        )
+            return np.asarray(self.jacobian_function(np.asarray(y, dtype=float)), dtype=float)
+        numerical = complex_step_jacobian if self.derivative == 'complex' else difference_jacobian
+        return numerical(self.function, y)
 
     def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
         """T⁻¹(y'), given or by Newton's method (:func:`newton_inverse`)."""
         y_prime = np.asarray(y_prime, dtype=float)
         if self.inverse_function is not None:
             return np.asarray(self.inverse_function(y_prime), dtype=float)
-        return newton_inverse(
-            self.forward, self.jacobian, y_prime, y_prime if guess is None else guess
-        )
+        start = y_prime if guess is None else guess
+        return newton_inverse(self.forward, self.jacobian, y_prime, start)
 
 
 @dataclass(frozen=True)
@@ -159,10 +112,10 @@ class Composition(Diffeomorphism):
 
     def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
         """T⁻¹(y'), part by part."""
-        guesses: list[Array | None] = [guess]
+        guesses = [guess]
         for part in self.parts[:-1]:
-            last = guesses[-1]
-            guesses.append(None if last is None else part.forward(last))
+            guess = None if guess is None else part.forward(guess)
+            guesses.append(guess)
         for part, near in zip(reversed(self.parts), reversed(guesses), strict=True):
             y_prime = part.inverse(y_prime, near)
         return y_prime
@@ -183,9 +136,7 @@ class TangentLift(Diffeomorphism):
     def forward(self, y: Array) -> Array:
         """(T(y), J v)."""
         position, velocity = np.split(np.asarray(y, dtype=float), 2)
-        return np.concatenate(
-            [self.base.forward(position), self.base.velocity(position, velocity)]
-        )
+        return np.append(self.base.forward(position), self.base.velocity(position, velocity))
 
     def jacobian(self, y: Array) -> Array:
         """[[J, 0], [∂(J v)/∂y, J]]; the lower left block by differences of J along v."""
@@ -198,13 +149,72 @@ class TangentLift(Diffeomorphism):
         """(T⁻¹(y'), J⁻¹ v')."""
         position, velocity = np.split(np.asarray(y_prime, dtype=float), 2)
         y = self.base.inverse(position, None if guess is None else np.split(guess, 2)[0])
-        return np.concatenate([y, np.linalg.solve(self.base.jacobian(y), velocity)])
+        return np.append(y, np.linalg.solve(self.base.jacobian(y), velocity))
 
 
-def newton_inverse(
-    forward: Callable[[Array], Array], jacobian: Callable[[Array], Array], y_prime: Array,
-    guess: Array,
-) -> Array:
+@dataclass(frozen=True, eq=False)
+class Homogeneous(Diffeomorphism):
+    """T(y) = s R y + y_T with s > 0 and R ∈ SO(n); maps many points (m, n) at once, too.
+
+    Attributes
+    ----------
+    scale : float
+        s.
+    rotation : ndarray (n, n)
+        R.
+    translation : ndarray (n,)
+        y_T.
+
+    Raises
+    ------
+    ParameterError
+        If s is not positive, R is not a rotation or the sizes differ.
+    """
+
+    scale: float
+    rotation: Array
+    translation: Array
+
+    def __post_init__(self) -> None:
+        R, shift = np.array(self.rotation, float), np.atleast_1d(np.array(self.translation, float))
+        if R.shape != (len(shift), len(shift)):
+            raise ParameterError(
+                f'rotation and translation must fit; shapes are {R.shape} and {shift.shape}')
+        if not (np.isfinite(self.scale) and self.scale > 0.0 and np.all(np.isfinite(shift))):
+            raise ParameterError(
+                f'scale = {self.scale!r} must be positive and finite, the translation finite')
+        if not (np.allclose(R @ R.T, np.eye(len(R)), atol=1e-9) and np.linalg.det(R) > 0.0):
+            raise ParameterError(
+                'rotation must be orthogonal with determinant 1 (R Rᵀ = I, det R = 1)')
+        object.__setattr__(self, 'rotation', R)
+        object.__setattr__(self, 'translation', shift)
+
+    @classmethod
+    def of(cls, dofs: int, scale: float = 1.0, rotation: ArrayLike | None = None,
+           translation: ArrayLike | None = None) -> Homogeneous:
+        """Map of n degrees of freedom in which what is not given does nothing."""
+        return cls(scale, np.asarray(np.eye(dofs) if rotation is None else rotation),
+                   np.asarray(np.zeros(dofs) if translation is None else translation))
+
+    def forward(self, y: Array) -> Array:
+        """T(y)."""
+        return self.direction(y) + self.translation
+
+    def jacobian(self, y: Array) -> Array:
+        """J = s R."""
+        return self.scale * self.rotation
+
+    def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
+        """T⁻¹(y') = Rᵀ(y' − y_T)/s."""
+        return (y_prime - self.translation) @ self.rotation / self.scale
+
+    def direction(self, v: Array) -> Array:
+        """J v, for velocities and forces."""
+        return self.scale * (v @ self.rotation.T)
+
+
+def newton_inverse(forward: Callable[[Array], Array], jacobian: Callable[[Array], Array],
+                   y_prime: Array, guess: Array) -> Array:
     """Solve T(y) = y' by SciPy's root finder along the segment from T(guess) to y'.
 
     The whole way is tried first; where the root finder fails, it is halved. For a diffeomorphism

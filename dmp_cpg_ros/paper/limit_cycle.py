@@ -13,18 +13,17 @@ from dataclasses import dataclass, field
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import newton
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase, state_at
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning.period import fourier_series
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.paper.diffeomorphism import Diffeomorphism
+from dmp_cpg_ros.paper.diffeomorphism import Array, Diffeomorphism
 
-Array = NDArray[np.float64]
-
-_GRID = 512
+_GRID = 2.0 * np.pi * np.arange(513) / 512
 _LEAST_SLOPE = 0.02
 
 
@@ -78,28 +77,23 @@ class ClosedCurveDiffeomorphism(Diffeomorphism):
     _angles: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Validate and complete the plane to a basis of ℝⁿ."""
+        """Complete the plane to a basis of ℝⁿ, and tabulate the angles of the curve over φ."""
         n = self.series.shape[1]
         if self.plane.shape != (2, n) or not np.allclose(
-            self.plane @ self.plane.T, np.eye(2), atol=1e-9
-        ):
+                self.plane @ self.plane.T, np.eye(2), atol=1e-9):
             raise ParameterError(f'plane must be two orthonormal rows of length {n}')
         slope = _winding(self.series, self.plane)
         if slope < _LEAST_SLOPE:
             raise ParameterError(
                 'the projection of the curve must wind once around its centre with its angle '
-                f'always in one direction; the least normalised slope is {slope:.3g}'
-            )
-        complement = np.linalg.svd(self.plane)[2][2:]
-        grid = 2.0 * np.pi * np.arange(_GRID + 1) / _GRID
-        angles = np.unwrap(np.arctan2(*(self._from_centre(grid) @ self.plane.T).T[::-1]))
-        object.__setattr__(self, '_complement', complement)
+                f'always in one direction; the least normalised slope is {slope:.3g}')
+        object.__setattr__(self, '_complement', np.linalg.svd(self.plane)[2][2:])
+        angles = np.unwrap(np.angle(_projected(self.series, self.plane, _GRID)))
         object.__setattr__(self, '_angles', angles)
 
     @classmethod
-    def through(
-        cls, demonstration: Demonstration, period: float, harmonics: int = 8
-    ) -> ClosedCurveDiffeomorphism:
+    def through(cls, demonstration: Demonstration, period: float, harmonics: int = 8
+                ) -> ClosedCurveDiffeomorphism:
         """Diffeomorphism whose curve is a recorded rhythm, in the plane that suits it best.
 
         Parameters
@@ -124,118 +118,82 @@ class ClosedCurveDiffeomorphism(Diffeomorphism):
             raise DataError('a closed curve needs at least 2 degrees of freedom')
         times = demonstration.times - demonstration.times[0]
         series = fourier_series(times, demonstration.positions, 2.0 * np.pi / period, harmonics)
-        planes = _planes(series)
-        best = max(planes, key=lambda plane: _winding(series, plane))
+        best = max(_planes(series), key=lambda plane: _winding(series, plane))
         if _winding(series, best) < _LEAST_SLOPE:
             raise DataError(
                 'the curve winds around its centre monotonically in none of the planes that '
-                'were tried (fundamental, principal, coordinate planes)'
-            )
+                'were tried (fundamental, principal, coordinate planes)')
         return cls(series, best)
 
     def curve(self, phi: Array) -> Array:
-        """Points of the curve.
-
-        Parameters
-        ----------
-        phi : ndarray (m,)
-            [rad]
-
-        Returns
-        -------
-        ndarray (m, n)
-        """
-        return self.series[0].real + self._from_centre(phi)
+        """Points of the curve at phases [rad], ndarray (m,) → (m, n)."""
+        return self.series[0].real + _from_centre(self.series, phi)
 
     def forward(self, y: Array) -> Array:
         """T(x)."""
-        radius = float(np.hypot(y[0], y[1]))
-        outward = self._from_centre(np.atleast_1d(phase(y[:2])))[0]
-        return self.series[0].real + radius * outward + y[2:] @ self._complement
+        outward = np.hypot(y[0], y[1]) * _from_centre(self.series, phase(y[:2]))
+        return self.series[0].real + outward + y[2:] @ self._complement
 
     def jacobian(self, y: Array) -> Array:
         """J(x); not defined at x₁ = x₂ = 0."""
-        radius, phi = float(np.hypot(y[0], y[1])), phase(y[:2])
-        # ∂R/∂(x₁, x₂)
-        along = state_at(phi)
-        # R ∂φ/∂(x₁, x₂)
-        across = state_at(phi + 0.5 * np.pi)
-        d, slope = self._from_centre(np.atleast_1d(phi))[0], self._slope(np.atleast_1d(phi))[0]
-        if radius == 0.0:
+        if not np.any(y[:2]):
             raise ParameterError('the Jacobian is not defined at the centre x1 = x2 = 0')
+        phi = phase(y[:2])
+        d, slope = _from_centre(self.series, phi), _from_centre(self.series, phi, 1)
+        along, across = state_at(phi), state_at(phi + 0.5 * np.pi)  # ∂R/∂(x₁, x₂), R ∂φ/∂(x₁, x₂)
         return np.hstack([np.outer(d, along) + np.outer(slope, across), self._complement.T])
 
     def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
         """T⁻¹(y'): the phase from the angle in the plane, then radius and the rest."""
         offset = y_prime - self.series[0].real
-        flat = self.plane @ offset
-        if not np.any(flat):
-            return np.concatenate([np.zeros(2), self._complement @ offset])
-        phi = self._phase_of(float(np.arctan2(flat[1], flat[0])))
-        d = self._from_centre(np.array([phi]))[0]
-        radius = float(np.hypot(*flat) / np.hypot(*(self.plane @ d)))
-        return np.concatenate([state_at(phi, radius), self._complement @ (offset - radius * d)])
+        seen = complex(*(self.plane @ offset))
+        if seen == 0.0:
+            return np.append(np.zeros(2), self._complement @ offset)
+        phi = self._phase_of(seen)
+        radius = abs(seen / _projected(self.series, self.plane, phi))
+        return np.append(state_at(phi, radius), self._complement @ (
+            offset - radius * _from_centre(self.series, phi)))
 
-    def _phase_of(self, angle: float) -> float:
-        """Phase at which the projected curve has a given angle: table, then Newton's method."""
-        angles, turn = self._angles, self._angles[-1] - self._angles[0]
-        angle = angles[0] + np.sign(turn) * ((np.sign(turn) * (angle - angles[0])) % (2.0 * np.pi))
-        phi = float(
-            np.interp(
-                np.sign(turn) * angle,
-                np.sign(turn) * angles,
-                2.0 * np.pi * np.arange(_GRID + 1) / _GRID,
-            )
-        )
-        wanted = np.array([np.cos(angle), np.sin(angle)])
-        for _ in range(8):
-            p, q = (
-                self.plane @ self._from_centre(np.array([phi]))[0],
-                self.plane @ self._slope(np.array([phi]))[0],
-            )
-            step = -(wanted[0] * p[1] - wanted[1] * p[0]) / (wanted[0] * q[1] - wanted[1] * q[0])
-            phi += step
-            if abs(step) < 1e-15:
-                break
-        return phi
+    def _phase_of(self, seen: complex) -> float:
+        """Phase at which the curve is in a direction of the plane: table, then Newton's method."""
+        turn = np.sign(self._angles[-1] - self._angles[0])
+        ahead = turn * (np.angle(seen) - self._angles[0]) % (2.0 * np.pi)
+        start = np.interp(ahead, turn * (self._angles - self._angles[0]), _GRID)
 
-    def _from_centre(self, phi: Array) -> Array:
-        return _evaluate(self.series, phi, 0)
+        def beside(phi: float, order: int = 0) -> float:
+            return float((_projected(self.series, self.plane, phi, order) / seen).imag)
 
-    def _slope(self, phi: Array) -> Array:
-        return _evaluate(self.series, phi, 1)
+        return float(newton(beside, start, lambda phi: beside(phi, 1), tol=1e-14, disp=False))
 
 
-def _evaluate(series: Array, phi: Array, order: int) -> Array:
-    """Derivative of the curve without its mean, (m, n)."""
+def _from_centre(series: Array, phi: ArrayLike, order: int = 0) -> Array:
+    """Derivative of the curve without its mean, (..., n)."""
     orders = np.arange(1, len(series))
-    return (
-        np.exp(1j * np.outer(phi, orders)) @ (series[1:] * (1j * orders[:, None]) ** order)
-    ).real
+    waves = np.exp(1j * np.multiply.outer(phi, orders))
+    return np.asarray((waves @ (series[1:] * (1j * orders[:, None]) ** order)).real)
+
+
+def _projected(series: Array, plane: Array, phi: ArrayLike, order: int = 0
+               ) -> NDArray[np.complex128]:
+    """The same in the plane, as complex numbers (...)."""
+    return np.asarray(_from_centre(series, phi, order) @ (plane[0] + 1j * plane[1]))
 
 
 def _winding(series: Array, plane: Array) -> float:
     """Least sine between projected radius and tangent; negative if it does not wind once."""
-    phi = 2.0 * np.pi * np.arange(_GRID) / _GRID
-    p, q = _evaluate(series, phi, 0) @ plane.T, _evaluate(series, phi, 1) @ plane.T
-    cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
-    size = np.hypot(*p.T) * np.hypot(*q.T)
+    p, q = (_projected(series, plane, _GRID, order) for order in (0, 1))
+    size = np.abs(p) * np.abs(q)
     if not np.all(size > 0.0):
         return -1.0
-    turns = np.sum(
-        np.angle(
-            np.exp(1j * np.diff(np.arctan2(p[:, 1], p[:, 0]), append=np.arctan2(p[0, 1], p[0, 0])))
-        )
-    )
+    turns = np.sum(np.angle(p[1:] / p[:-1]))
     once = abs(abs(turns) - 2.0 * np.pi) < 0.1
-    return float(np.min(np.sign(turns) * cross / size)) if once else -1.0
+    return float(np.min(np.sign(turns) * (p.conj() * q).imag / size)) if once else -1.0
 
 
 def _planes(series: Array) -> list[Array]:
     """Planes that are tried: of the fundamental, of principal components, of coordinates."""
-    n = series.shape[1]
     planes = [np.linalg.svd(np.stack([series[1].real, series[1].imag]), full_matrices=False)[2]]
     components = np.linalg.svd(np.vstack([series[1:].real, series[1:].imag]))[2]
-    for basis in (components, np.eye(n)):
-        planes.extend(basis[list(pair)] for pair in combinations(range(n), 2))
+    for basis in (components, np.eye(series.shape[1])):
+        planes.extend(basis[list(pair)] for pair in combinations(range(len(basis)), 2))
     return planes

@@ -12,24 +12,23 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED, Finding
 from dmp_cpg_ros.core.contraction.region import Box, Region
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.jacobians import Field, numerical_jacobian
+from dmp_cpg_ros.paper.jacobians import Array, Field, numerical_jacobian
 from dmp_cpg_ros.paper.matrix_measure import interval_measure, matrix_measure
 
-Array = NDArray[np.float64]
-Metric = Callable[[Array], Array]
+Matrix = Callable[[Array], Array]
 
 _TOLERANCE = 1e-3
 
 
-def sampled_contraction(jacobian: Callable[[Array], Array], region: Region, norm: float = 2,
-                        Theta: ArrayLike | None = None, count: int = 1000,
-                        seed: int = 0) -> Finding:
+def sampled_contraction(jacobian: Matrix, region: Region, norm: float = 2,
+                        Theta: ArrayLike | None = None, count: int = 1000, seed: int = 0
+                        ) -> Finding:
     """Contraction in a norm under a constant change of coordinates, at sampled points.
 
     Parameters
@@ -60,9 +59,9 @@ def sampled_contraction(jacobian: Callable[[Array], Array], region: Region, norm
         f'(at x = {np.round(points[worst], 6).tolist()}); nothing is known between them'))
 
 
-def sampled_transverse_contraction(field: Field, region: Region, metric: Metric | None = None,
-                                   jacobian: Callable[[Array], Array] | None = None,
-                                   count: int = 1000, seed: int = 0) -> Finding:
+def sampled_transverse_contraction(field: Field, region: Region, metric: Matrix | None = None,
+                                   jacobian: Matrix | None = None, count: int = 1000,
+                                   seed: int = 0) -> Finding:
     """Transverse contraction (eq. trans_condition) under a metric M(x), at sampled points.
 
     Parameters
@@ -95,9 +94,8 @@ def sampled_transverse_contraction(field: Field, region: Region, metric: Metric 
             raise ParameterError(f'x = {x.tolist()} is an equilibrium; a region of transverse '
                                  'contraction to an orbit must leave equilibria out')
         A = numerical_jacobian(field, x) if jacobian is None else jacobian(x)
-        M, M_dot = _metric_and_rate(metric, x, f)
-        rates.append(_transverse_rate(f, A, M, M_dot))
-    rate = float(min(rates))
+        rates.append(_transverse_rate(x, f, A, metric or (lambda x: np.eye(x.size))))
+    rate = min(rates)
     return Finding(rate, SAMPLED, count, (
         f'at {count} sampled points transverse displacements shrink at {rate:.6g} 1/s or more; '
         'nothing is known between them'))
@@ -126,36 +124,33 @@ def proved_contraction(jacobian: Callable[[Interval], Interval], box: Box, norm:
         Grade ``proved``: the rate is a true lower bound, within 0.1 % of the best of this norm
         when the budget sufficed.
     """
-    w = np.ones(np.asarray(box.lower).size) if weights is None else np.asarray(weights, float)
+    enclosure = jacobian
+    if weights is not None:
+        w = np.asarray(weights, dtype=float)
+        if np.any(w <= 0.0):
+            raise ParameterError(f'weights {w.tolist()} must all be positive')
+        ratios = Interval.of(w[:, None]) / Interval.of(w[None, :])
+
+        def enclosure(boxes: Interval) -> Interval:
+            return jacobian(boxes) * ratios
+
     boxes = box.as_interval()
     bound, attained, evaluations = -np.inf, -np.inf, 0
     while True:
         evaluations += len(boxes.lower)
-        upper = interval_measure(_weighted(jacobian(boxes), w), norm)
-        middle = Interval.of(boxes.middle)
-        attained = max(attained, float(interval_measure(_weighted(jacobian(middle), w),
-                                                        norm).max()))
+        upper = interval_measure(enclosure(boxes), norm)
+        at_points = interval_measure(enclosure(Interval.of(boxes.middle)), norm)
+        attained = max(attained, float(at_points.max()))
         undecided = upper > attained + _TOLERANCE * max(1.0, abs(attained))
-        if np.any(~undecided):
-            bound = max(bound, float(upper[~undecided].max()))
-        if not np.any(undecided):
-            break
         if evaluations + 2 * np.count_nonzero(undecided) > budget:
-            bound = max(bound, float(upper.max()))
+            undecided[:] = False
+        bound = max(bound, float(upper[~undecided].max(initial=-np.inf)))
+        if not np.any(undecided):
             break
         boxes = _split(boxes[undecided])
     return Finding(-bound, PROVED, evaluations, (
         f'on the whole box the matrix measure is at most {bound:.6g} 1/s, by interval bounds on '
         f'{evaluations} boxes'))
-
-
-def _weighted(A: Interval, w: Array) -> Interval:
-    """Intervals of W A W⁻¹."""
-    if np.all(w == 1.0):
-        return A
-    if np.any(w <= 0.0):
-        raise ParameterError(f'weights {w.tolist()} must all be positive')
-    return A * (Interval.of(w[:, None]) / Interval.of(w[None, :]))
 
 
 def _split(boxes: Interval) -> Interval:
@@ -168,16 +163,10 @@ def _split(boxes: Interval) -> Interval:
     return Interval(np.concatenate([boxes.lower, lower]), np.concatenate([upper, boxes.upper]))
 
 
-def _metric_and_rate(metric: Metric | None, x: Array, f: Array) -> tuple[Array, Array]:
-    """M(x) and Ṁ = ∂M/∂x · f, the latter by a central difference along the flow."""
-    if metric is None:
-        return np.eye(x.size), np.zeros((x.size, x.size))
-    step = 1e-5 * max(1.0, float(np.linalg.norm(x))) / float(np.linalg.norm(f))
-    return metric(x), (metric(x + step * f) - metric(x - step * f)) / (2.0 * step)
-
-
-def _transverse_rate(f: Array, A: Array, M: Array, M_dot: Array) -> float:
+def _transverse_rate(x: Array, f: Array, A: Array, metric: Matrix) -> float:
     """Smallest λ with δᵀ(Ṁ + AᵀM + MA + 2λM)δ ≤ 0 for all δ with fᵀMδ = 0."""
+    step = 1e-5 * max(1.0, float(np.linalg.norm(x))) / float(np.linalg.norm(f))
+    M, M_dot = metric(x), (metric(x + step * f) - metric(x - step * f)) / (2.0 * step)
     transverse = np.linalg.svd((M @ f)[None])[2][1:].T                       # (n, n-1)
     W = transverse.T @ (M_dot + A.T @ M + M @ A) @ transverse
     half = np.linalg.inv(np.linalg.cholesky(transverse.T @ M @ transverse))

@@ -16,15 +16,21 @@ from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.states import DiscreteInput
-from dmp_cpg_ros.paper.algebra import slowed, summed, transformed
-from dmp_cpg_ros.paper.daughters import Daughter, DaughterSum, transported_metric
+from dmp_cpg_ros.paper.daughters import (
+    Daughter,
+    DaughterSum,
+    slowed,
+    summed,
+    transformed,
+    transported_metric,
+)
 from dmp_cpg_ros.paper.diffeomorphism import (
     Composition,
     FunctionDiffeomorphism,
+    Homogeneous,
     TangentLift,
     newton_inverse,
 )
-from dmp_cpg_ros.paper.homogeneous import Homogeneous
 from dmp_cpg_ros.paper.jacobians import difference_jacobian
 from dmp_cpg_ros.paper.limit_cycle import ClosedCurveDiffeomorphism, canonical_field
 
