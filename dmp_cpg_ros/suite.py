@@ -15,8 +15,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
-from dmp_cpg_ros.core.robot_model.world import World
-from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
 from dmp_cpg_ros.core.suite_parameters import (
     PART_OF,
     GaitParameters,

@@ -24,8 +24,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.world import World
-from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
 from dmp_cpg_ros.suite import load_gait, load_gaits
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.suite_parameters import (
     CANONICAL,
     INHIBITION,

@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import rclpy
 from geometry_msgs.msg import TwistStamped
-from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
@@ -33,21 +32,14 @@ from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.transformation.leg import LegFeedback
+from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
-from dmp_cpg_ros.nodes.messages.conversions import (
-    PostureFeedbackReader,
-    PostureFeedbackWriter,
-    ReferenceWriter,
-    read_reference,
-)
-from dmp_cpg_ros.paper.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
+from dmp_cpg_ros.paper.coupling import Array, Coupling, EdgeCoupling, MeanFieldCoupling
 from dmp_cpg_ros.paper.network import OscillatorNetwork
 from dmp_cpg_ros.paper.oscillators import HopfOscillators
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.output import parser_of, write_results
 from dmp_cpg_ros.suite import load_suite
-
-Array = NDArray[np.float64]
 
 TICK, OMEGA, GAIN = 0.004, 9.0, 100.0
 """Tick [s], angular frequency [rad/s] and sum of the gains at each node [1/s] of the networks."""
@@ -166,15 +158,14 @@ def parts_of_a_tick() -> list[Row]:
 
 def messages() -> list[Row]:
     """Reading and writing by the suite, rclpy and rosbags; and what one message more costs."""
-    writer, reader, feedback = PostureFeedbackWriter(), PostureFeedbackReader(), PostureFeedback(
-        np.ones(12), np.ones((4, 3)), np.ones((4, 2)), np.ones(3))
+    writer, reader = conversions.PostureFeedbackWriter(), conversions.PostureFeedbackReader()
+    feedback = PostureFeedback(np.ones(12), np.ones((4, 3)), np.ones((4, 2)), np.ones(3))
     data, read = writer.fill(0, feedback).serialized, serialized_reader(JointState)
     message, store = deserialize_message(data, JointState), get_typestore(Stores.ROS2_JAZZY)
-    kind, twist_kind = (f'{package}/msg/{name}' for package, name in (
-        ('sensor_msgs', 'JointState'), ('geometry_msgs', 'TwistStamped')))
-    other, r = store.deserialize_cdr(data, kind), np.ones(3)
-    twist_writer, read_twist = ReferenceWriter(), serialized_reader(TwistStamped)
-    twist = twist_writer.fill(0, r).serialized
+    kind, twist_kind = (f'{of.__module__.split(".")[0]}/msg/{of.__name__}'
+                        for of in (JointState, TwistStamped))
+    other, read_twist = store.deserialize_cdr(data, kind), serialized_reader(TwistStamped)
+    twist = conversions.ReferenceWriter().fill(0, np.ones(3)).serialized
     with rclpy.context.Context() as context:
         node = rclpy.create_node('bench', context=context, enable_rosout=False)
         publisher = node.create_publisher(JointState, 'bench', 10)
@@ -196,8 +187,8 @@ def messages() -> list[Row]:
             ('write posture_feedback', lambda: writer.fill(0, feedback)),
             ('the same by rclpy, filled already', lambda: serialize_message(message)),
             ('the same by rosbags, filled already', lambda: store.serialize_cdr(other, kind)),
-            ('read reference', lambda: read_reference(read_twist(twist))),
-            ('the same by rclpy', lambda: read_reference(
+            ('read reference', lambda: conversions.read_reference(read_twist(twist))),
+            ('the same by rclpy', lambda: conversions.read_reference(
                 deserialize_message(twist, TwistStamped))),
             ('the same by rosbags', lambda: store.deserialize_cdr(twist, twist_kind)),
             ('deliver one message to four readers', deliver),

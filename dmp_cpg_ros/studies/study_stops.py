@@ -15,9 +15,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from functools import lru_cache, partial
 from itertools import groupby, product
-from math import pi
+from math import isnan, pi
 from multiprocessing import Pool
-from pathlib import Path
 
 from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary
 from dmp_cpg_ros.commands.ros_arguments import parse_arguments
@@ -27,7 +26,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, percent, write_results
 from dmp_cpg_ros.studies.stop_trial import METHODS, StopCase, run_trials
 from dmp_cpg_ros.suite import Suite, load_gait, load_suite
 
@@ -83,15 +82,16 @@ def suite_of(file: str | None, leg: str) -> Suite:
 
 
 @lru_cache
-def _robot_of(robot_file: Path, tick_ns: int) -> MujocoRobot:
-    return MujocoRobot(robot_file, tick_ns)
+def robot_of(file: str | None, leg: str) -> MujocoRobot:
+    """The robot of a parameter file; a walk resets it."""
+    suite = suite_of(file, leg)
+    return MujocoRobot(suite.robot_file, suite.tick_ns)
 
 
 @lru_cache
-def _bound_of(file: str | None, leg: str, gait: str, cadence: float) -> float:
+def bound_of(file: str | None, leg: str, gait: str, cadence: float) -> float:
     """Certified time to rest [s]; it holds for every phase and speed, and is infinite without."""
-    suite = suite_of(file, leg)
-    scale = body_scale(_robot_of(suite.robot_file, suite.tick_ns).description)
+    suite, scale = suite_of(file, leg), body_scale(robot_of(file, leg).description)
     p = suite.parameters
     network = GaitNetwork(p.canonical, load_gait(gait).scaled(cadence), scale)
     return certify(network, p.inhibition, p.reference, p.leg, p.posture,
@@ -101,27 +101,25 @@ def _bound_of(file: str | None, leg: str, gait: str, cadence: float) -> float:
 def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     """Run the cases of one walk with the robot and the parameters of a parameter file."""
     case = cases[0]
-    suite = suite_of(file, case.leg)
-    robot = _robot_of(suite.robot_file, suite.tick_ns)
     gait = load_gait(case.gait).scaled(case.cadence)
-    bound = _bound_of(file, case.leg, case.gait, case.cadence)
-    return list(run_trials(robot, cases, gait, suite.parameters, lambda loop: bound))
+    bound = bound_of(file, case.leg, case.gait, case.cadence)
+    return list(run_trials(robot_of(file, case.leg), cases, gait,
+                           suite_of(file, case.leg).parameters, bound))
 
 
 def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
               quiet: bool = True) -> Results:
     """Run cases on several processes; the results do not depend on how many."""
-    results: Results = []
+    outcomes: list[StopOutcome] = []
     walks = [list(group) for _, group in groupby(cases, _key)]
     with Pool(jobs) as pool:
-        outcomes = pool.imap(partial(run_walk, file=file), walks)
-        for walk, of_walk in zip(walks, outcomes, strict=True):
-            results.extend(zip(walk, of_walk, strict=True))
+        for of_walk in pool.imap(partial(run_walk, file=file), walks):
+            outcomes += of_walk
             if not quiet:
-                print(f'\r{len(results)}/{len(cases)}', end='', file=sys.stderr, flush=True)
+                print(f'\r{len(outcomes)}/{len(cases)}', end='', file=sys.stderr, flush=True)
     if not quiet:
         print('\r', end='', file=sys.stderr)
-    return results
+    return list(zip(cases, outcomes, strict=True))
 
 
 def table(results: Results) -> str:
@@ -129,12 +127,11 @@ def table(results: Results) -> str:
     rows = []
     for key, group in groupby(results, lambda result: _key(result[0])):
         labels = [f'{part:g}' if isinstance(part, float) else part for part in key]
-        of = StopSummary([outcome for _, outcome in group])
-        rows.append((*labels, *_cells(of, key[-1])))
+        rows.append((*labels, *_cells([outcome for _, outcome in group], key[-1])))
     for method in METHODS:
         outcomes = [outcome for case, outcome in results if case.method == method]
         if outcomes:
-            rows.append(('all', '', '', '', method, *_cells(StopSummary(outcomes), method)))
+            rows.append(('all', '', '', '', method, *_cells(outcomes, method)))
     return markdown_table(COLUMNS, rows)
 
 
@@ -142,25 +139,21 @@ def _key(case: StopCase) -> tuple[str, float, str, float, str]:
     return case.gait, case.speed, case.leg, case.cadence, case.method
 
 
-def _cells(of: StopSummary, method: str) -> tuple[str, ...]:
-    def pair(name: str, scale: float, digits: int) -> str:
-        values = of.spread(name)
-        if values[0] != values[0]:
-            return '-'
-        return ' / '.join(f'{scale * value:.{digits}f}' for value in values)
-
-    bounded, count = of.number('bounded'), len(of.outcomes)
-    return (str(count), str(of.number('fell')), _share(of.number('standing'), count),
-            _share(of.number('walked_on'), count) if method == METHODS[0] else '-',
-            pair('prediction_error', 100.0, 1),
-            f"{of.number('bound_exceeded')}/{bounded}" if bounded else '-',
-            pair('bound_s', 1.0, 2), pair('measured_s', 1.0, 2), pair('body_rest_s', 1.0, 2),
-            pair('slip_m', 1e3, 1), pair('displacement_m', 1.0, 2), pair('tilt', 180.0 / pi, 1),
-            pair('deceleration', 1.0, 1))
-
-
-def _share(part: int, whole: int) -> str:
-    return f'{100.0 * part / whole:.0f} %'
+def _cells(outcomes: Sequence[StopOutcome], method: str) -> tuple[str, ...]:
+    of = StopSummary(outcomes)
+    fell, stood, walked_on, bounded, exceeded = map(of.number, (
+        'fell', 'standing', 'walked_on', 'bounded', 'bound_exceeded'))
+    prediction_error, *others = (
+        '-' if isnan(of.spread(name)[0])
+        else ' / '.join(f'{scale * value:.{digits}f}' for value in of.spread(name))
+        for name, scale, digits in (
+            ('prediction_error', 100.0, 1), ('bound_s', 1.0, 2), ('measured_s', 1.0, 2),
+            ('body_rest_s', 1.0, 2), ('slip_m', 1e3, 1), ('displacement_m', 1.0, 2),
+            ('tilt', 180.0 / pi, 1), ('deceleration', 1.0, 1)))
+    count = len(outcomes)
+    return (str(count), str(fell), percent(stood, count),
+            percent(walked_on, count) if method == METHODS[0] else '-', prediction_error,
+            f'{exceeded}/{bounded}' if bounded else '-', *others)
 
 
 def _parser() -> argparse.ArgumentParser:

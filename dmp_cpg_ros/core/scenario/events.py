@@ -60,10 +60,8 @@ class Event:
         known(entry, ('at', *EVENT_KINDS, 'label'), where)
         kinds = [kind for kind in EVENT_KINDS if kind in entry]
         if 'at' not in entry or len(kinds) != 1:
-            raise DataError(
-                f"{where} needs 'at' and exactly one of {', '.join(EVENT_KINDS)}, "
-                f'not {dict(entry)}'
-            )
+            raise DataError(f"{where} needs 'at' and exactly one of {', '.join(EVENT_KINDS)}, not "
+                            f'{dict(entry)}')
         (at,) = numbers([entry['at']], where, f'at = {entry["at"]!r} s', 0.0, LONGEST_S)
         value, label = EVENT_KINDS[kinds[0]](entry[kinds[0]], where)
         return cls(at, kinds[0], value, str(entry.get('label', '')) or label)
@@ -95,9 +93,8 @@ def _command(value: Any, where: str) -> tuple[Command | None, str]:
     if value == 'silence':
         return None, 'silence'
     known(value, ('v_x', 'v_y', 'gamma'), where)
-    v_x, v_y, gamma = numbers(
-        (value.get(key, 0.0) for key in ('v_x', 'v_y', 'gamma')), where, f'command {value}',
-        -100.0, 100.0)
+    v_x, v_y, gamma = numbers((value.get(key, 0.0) for key in ('v_x', 'v_y', 'gamma')), where,
+                              f'command {value}', -100.0, 100.0)
     return (v_x, v_y, gamma), f'v = ({v_x:g}, {v_y:g}) m/s, gamma = {gamma:g} rad/s'
 
 
@@ -118,8 +115,8 @@ def _gait(value: Any, where: str) -> tuple[str, str]:
 def _votes(value: Any, where: str) -> tuple[dict[str, float], str]:
     """Read votes for a stop: weights by leg; none end what was voted before."""
     known(value, LEGS, where)
-    weights = dict(zip(
-        value, numbers(value.values(), where, f'votes {value}', 0.0, 100.0), strict=True))
+    weights = dict(zip(value, numbers(value.values(), where, f'votes {value}', 0.0, 100.0),
+                       strict=True))
     told = ', '.join(f'{leg} {weight:g}' for leg, weight in weights.items())
     return weights, f'votes {told}' if told else 'no more votes'
 
@@ -157,11 +154,9 @@ def _change(value: Any, where: str) -> tuple[dict[str, Any], str]:
                         'event for each')
     floats = {field.name for part in SuiteParameters().sets.values()
               for field in fields(cast(Any, part)) if isinstance(field.default, float)}
-    values = {
-        name: tuple(entry) if isinstance(entry, list)
-        else float(entry) if name in floats and type(entry) is int else entry
-        for name, entry in value.items()
-    }
+    values = {name: tuple(entry) if isinstance(entry, list)
+              else float(entry) if name in floats and type(entry) is int else entry
+              for name, entry in value.items()}
     return values, 'set ' + ', '.join(f'{name} = {entry}' for name, entry in value.items())
 
 

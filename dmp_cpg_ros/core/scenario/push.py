@@ -95,16 +95,14 @@ class Push:
         ticks = max(1, round(self.duration_s * 1e9 / tick_ns))
         f_x, f_y, f_z = (value / (ticks * tick_ns * 1e-9) for value in self.impulse)
         renewed = range(start_ns, start_ns + ticks * tick_ns, max(HOLD_NS // tick_ns, 1) * tick_ns)
-        pushing = (PushForce(at, (f_x, f_y, f_z), self.frame) for at in renewed)
-        end = PushForce(start_ns + ticks * tick_ns, (0.0, 0.0, 0.0), self.frame)
-        return (*pushing, end)
+        return (*(PushForce(at, (f_x, f_y, f_z), self.frame) for at in renewed),
+                PushForce(start_ns + ticks * tick_ns, (0.0, 0.0, 0.0), self.frame))
 
 
 class PushQueue:
     """Forces that wait for their time."""
 
     def __init__(self) -> None:
-        """Start without any."""
         self._waiting: list[PushForce] = []
 
     def add(self, force: PushForce) -> None:

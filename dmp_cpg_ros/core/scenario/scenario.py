@@ -14,7 +14,7 @@ from typing import Any
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.parameters import shown
-from dmp_cpg_ros.core.robot_model.world_choice import world_overrides
+from dmp_cpg_ros.core.robot_model.world import world_overrides
 from dmp_cpg_ros.core.scenario.events import LONGEST_S, Event, known
 
 COMMAND_PERIOD_NS = 100_000_000
@@ -83,49 +83,35 @@ class Scenario:
         """
         known(values, ('name', 'duration', 'events', 'parameters', 'world'), where)
         try:
-            duration = float(values['duration'])
-            entries = list(values['events'])
+            duration, entries = float(values['duration']), list(values['events'])
         except (KeyError, TypeError, ValueError) as error:
-            raise DataError(
-                f'{where} needs duration (a number of seconds) and events (a list): {error}'
-            ) from error
+            raise DataError(f'{where} needs duration (a number of seconds) and events (a list): '
+                            f'{error}') from error
         parameters = values.get('parameters') or {}
         if not isinstance(parameters, Mapping):
             raise DataError(f'{where}: parameters must be a mapping, not {shown(parameters)}')
         if not 0.0 < duration <= LONGEST_S:
             raise DataError(f'{where}: duration = {duration} s must be positive and at most a day')
-        events = tuple(
-            Event.from_mapping(entry, f'{where}, event {place + 1}')
-            for place, entry in enumerate(entries)
-        )
+        events = tuple(Event.from_mapping(entry, f'{where}, event {place + 1}')
+                       for place, entry in enumerate(entries))
         times = [event.at for event in events]
         if times != sorted(times) or (times and times[-1] > duration):
             raise DataError(
-                f'{where}: the times of the events must increase and lie within the duration'
-            )
-        return cls(
-            str(values.get('name', 'scenario')),
-            duration,
-            events,
-            {
-                **world_overrides(values.get('world'), where),
-                **parameters,
-            },
-        )
+                f'{where}: the times of the events must increase and lie within the duration')
+        return cls(str(values.get('name', 'scenario')), duration, events,
+                   {**world_overrides(values.get('world'), where), **parameters})
 
     def timeline(self, tick_ns: int) -> tuple[Action, ...]:
         """All actions in order, each at the first tick that is not before its time."""
-        actions = []
+        actions: list[Action] = []
         for place, event in enumerate(self.events):
             time_ns, times = round(event.at * 1e9), range(1)
             if event.kind in LASTING_KINDS:
-                following = [e.at for e in self.events[place + 1 :] if e.kind == event.kind]
+                following = [e.at for e in self.events[place + 1:] if e.kind == event.kind]
                 end_ns = round((following or [self.duration_s])[0] * 1e9)
                 times = range(0, max(end_ns - time_ns, 1) if event.value else 0, COMMAND_PERIOD_NS)
-            for later in times:
-                label = '' if later else event.label
-                at = _tick_after(time_ns + later, tick_ns)
-                actions.append(Action(at, event.kind, event.value, label))
+            actions += [Action(_tick_after(time_ns + later, tick_ns), event.kind, event.value,
+                               '' if later else event.label) for later in times]
         return tuple(sorted(actions, key=lambda action: action.time_ns))
 
     def ticks(self, tick_ns: int) -> int:
@@ -157,8 +143,7 @@ def play(scenario: Scenario, tick_ns: int, step: Callable[[], Any], takers: Take
     missing = {action.kind for action in actions} - set(takers)
     if missing:
         raise DataError(
-            f'nobody takes {", ".join(sorted(missing))}; taken are {", ".join(sorted(takers))}'
-        )
+            f'nobody takes {", ".join(sorted(missing))}; taken are {", ".join(sorted(takers))}')
     for k in range(scenario.ticks(tick_ns)):
         while place < len(actions) and actions[place].time_ns <= k * tick_ns:
             takers[actions[place].kind](actions[place].value)
