@@ -26,9 +26,10 @@ Matrix = Callable[[Array], Array]
 _TOLERANCE = 1e-3
 
 
-def sampled_contraction(jacobian: Matrix, region: Region, norm: float = 2,
-                        Theta: ArrayLike | None = None, count: int = 1000, seed: int = 0
-                        ) -> Finding:
+def sampled_contraction(
+    jacobian: Matrix, region: Region, norm: float = 2, Theta: ArrayLike | None = None,
+    count: int = 1000, seed: int = 0,
+) -> Finding:
     """Contraction in a norm under a constant change of coordinates, at sampled points.
 
     Parameters
@@ -96,9 +97,8 @@ def sampled_transverse_contraction(field: Field, region: Region, metric: Matrix 
         A = numerical_jacobian(field, x) if jacobian is None else jacobian(x)
         rates.append(_transverse_rate(x, f, A, metric or (lambda x: np.eye(x.size))))
     rate = min(rates)
-    return Finding(rate, SAMPLED, count, (
-        f'at {count} sampled points transverse displacements shrink at {rate:.6g} 1/s or more; '
-        'nothing is known between them'))
+    return Finding(rate, SAMPLED, count, f'at {count} sampled points transverse displacements '
+                   f'shrink at {rate:.6g} 1/s or more; nothing is known between them')
 
 
 def proved_contraction(jacobian: Callable[[Interval], Interval], box: Box, norm: float = 2,
@@ -148,9 +148,8 @@ def proved_contraction(jacobian: Callable[[Interval], Interval], box: Box, norm:
         if not np.any(undecided):
             break
         boxes = _split(boxes[undecided])
-    return Finding(-bound, PROVED, evaluations, (
-        f'on the whole box the matrix measure is at most {bound:.6g} 1/s, by interval bounds on '
-        f'{evaluations} boxes'))
+    return Finding(-bound, PROVED, evaluations, 'on the whole box the matrix measure is at most '
+                   f'{bound:.6g} 1/s, by interval bounds on {evaluations} boxes')
 
 
 def _split(boxes: Interval) -> Interval:

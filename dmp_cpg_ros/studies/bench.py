@@ -23,8 +23,7 @@ from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
-from dmp_cpg_ros.core.canonical.graph import CouplingGraph, Edges, graph_from_edges, topology
-from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.graph import Edges, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
@@ -34,11 +33,18 @@ from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.transformation.leg import LegFeedback
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
-from dmp_cpg_ros.paper.coupling import Array, Coupling, EdgeCoupling, MeanFieldCoupling
-from dmp_cpg_ros.paper.network import OscillatorNetwork
+from dmp_cpg_ros.paper.network import (
+    Array,
+    Coupling,
+    EdgeCoupling,
+    MeanFieldCoupling,
+    OscillatorNetwork,
+)
 from dmp_cpg_ros.paper.oscillators import HopfOscillators
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.loop_recording import LoopRun
 from dmp_cpg_ros.studies.output import parser_of, write_results
+from dmp_cpg_ros.studies.tightness import network
 from dmp_cpg_ros.suite import load_suite
 
 TICK, OMEGA, GAIN = 0.004, 9.0, 100.0
@@ -88,11 +94,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def steps_of_four() -> list[Row]:
     """Time steps of the gait's network, and of what else could be done."""
-    phases = -2.0 * np.pi * np.array([0.0, 0.5, 0.75, 0.25])
-    graph = graph_from_edges(4, topology('all_to_all', 4), GAIN, phases)
-    of = CanonicalSystem(graph, AndronovHopf(8.0), state_at(phases))
-    general = OscillatorNetwork(HopfOscillators(4, OMEGA), EdgeCoupling(graph), state_at(phases))
-    x, free, held = state_at(phases + 0.5), np.zeros(4), np.array([400.0, 0.0, 0.0, 0.0])
+    of = network('all_to_all', GAIN)
+    general = OscillatorNetwork(HopfOscillators(4, OMEGA), EdgeCoupling(of.graph), of.target)
+    x, free, held = state_at(of.graph.phases + 0.5), np.zeros(4), 400.0 * np.eye(4)[0]
     return _with_ratios([
         ('exponential step (core/canonical/system.py)', lambda: of.step(x, OMEGA, free, TICK)),
         ('the same, inhibited', lambda: of.step(x, OMEGA, held, TICK)),
@@ -105,13 +109,13 @@ def steps_of_four() -> list[Row]:
 def steps_of_many(sizes: Sequence[int]) -> list[Row]:
     """Time steps of growing networks, divided by the number of oscillators."""
     kinds: dict[str, Callable[[int], Coupling]] = {
-        'ring': lambda n: EdgeCoupling(_graph(n, topology('ring', n))),
-        'random, 6 neighbours': lambda n: EdgeCoupling(_graph(n, _random_edges(n))),
+        'ring': lambda n: _over(n, topology('ring', n)),
+        'random, 6 neighbours': lambda n: _over(n, _random_edges(n)),
         'all to all': lambda n: MeanFieldCoupling(n, GAIN / n),
     }
     rows = []
     for kind, coupling in kinds.items():
-        seconds = {size: _step_time(size, coupling(size)) / size for size in {*sizes, 1000}}
+        seconds = {size: _step_time(coupling(size)) for size in {*sizes, 1000}}
         rows += [Row(f'{kind}, {size:,}', seconds[size], seconds[size] / seconds[1000])
                  for size in sizes]
     return rows
@@ -121,15 +125,14 @@ def parts_of_a_tick() -> list[Row]:
     """Parts of the plain loop on the walking robot, and the prediction of a stop."""
     suite = load_suite(overrides={'cmd_vel_timeout': 0.0})
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
-    loop, state = WalkingLoop(robot.description, suite.gait, suite.parameters), robot.reset()
+    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
     loop.command(0.5)
-    for _ in range(500):
-        state = robot.step(loop.tick(state).targets)
-    x, r, dt, zero = loop.x, loop.r, suite.tick_ns * 1e-9, np.zeros(3)
+    run = LoopRun(robot, loop)
+    run.tick(500 * run.tick_s)
+    state, x, r, dt, zero = run.state, loop.x, loop.r, run.tick_s, np.zeros(3)
     x_dot = loop.network.rate(x, r, loop.inhibition)
     stopping = loop.supervisor.request(loop.stop, True)
-    leg, command = loop.legs[0].primitive, (0.5, 0.0, 0.0)
-    network, gait = loop.network, loop.canon.gait
+    leg, command, gait = loop.legs[0].primitive, (0.5, 0.0, 0.0), loop.canon.gait
     estimator = BodyEstimator(robot.description, suite.parameters.estimation)
     known, readings = loop.estimator_state, readings_of(state)
     asked = LegFeedback(state.joint_position[:3], zero, zero[:2], zero)
@@ -144,7 +147,7 @@ def parts_of_a_tick() -> list[Row]:
         ('reference', lambda: loop.reference.step(r, zero, dt)),
         ('oscillators', lambda: loop.network.step(x, r, loop.inhibition, dt)),
         ('state of the stop', lambda: loop.supervisor.step(
-            loop.stop, loop.stop.time_ns, network, x, x_dot, r, command)),
+            loop.stop, loop.stop.time_ns, loop.network, x, x_dot, r, command)),
         ('estimate of the body', lambda: estimator.step(known, readings)),
         ('balance', lambda: loop.body.posture.step(
             loop.posture.balance, state, gait, x, x_dot, r, dt)),
@@ -211,15 +214,15 @@ def _with_ratios(cases: Sequence[tuple[str, Callable[[], object]]]) -> list[Row]
             for (name, _), own in zip(cases, seconds, strict=True)]
 
 
-def _step_time(size: int, coupling: Coupling) -> float:
-    rng = np.random.default_rng(0)
+def _step_time(coupling: Coupling) -> float:
+    rng, size = np.random.default_rng(0), coupling.count
     of = OscillatorNetwork(HopfOscillators(size, rng.uniform(8.0, 10.0, size)), coupling)
     x = state_at(rng.uniform(-np.pi, np.pi, size))
-    return seconds_of(lambda: of.step(x, TICK))
+    return seconds_of(lambda: of.step(x, TICK)) / size
 
 
-def _graph(size: int, edges: Edges) -> CouplingGraph:
-    return graph_from_edges(size, edges, GAIN * size / max(len(edges), 1))
+def _over(size: int, edges: Edges) -> EdgeCoupling:
+    return EdgeCoupling(graph_from_edges(size, edges, GAIN * size / max(len(edges), 1)))
 
 
 def _random_edges(size: int) -> Edges:

@@ -32,8 +32,8 @@ from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies import walking_trials as trials
-from dmp_cpg_ros.studies.stop_trial import StopCase, run_trials
-from dmp_cpg_ros.suite import load_gait, load_gaits, load_suite
+from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
+from dmp_cpg_ros.suite import load_gaits, load_suite
 
 Grounds = tuple[tuple[str, tuple[tuple[str, float], ...]], ...]
 Results = list[tuple[Any, Any]]
@@ -171,8 +171,8 @@ def _number(value: float, digits: int) -> str:
 def pushes(pool: Processes, seeds: int, phases: int) -> Table:
     """Largest pushes survived, the least and the median over the phases."""
     results = _run(pool, trials.survived_pushes, [
-        trials.PushCase(gait, speed, i / phases, tuple(DIRECTIONS.values()))
-        for (gait, speed), i in product(PUSHED, range(phases))])
+        trials.PushCase(*walking, i / phases, tuple(DIRECTIONS.values()))
+        for walking, i in product(PUSHED, range(phases))])
     rows = []
     for gait, speed in PUSHED:
         of = np.array([outcome.speed_change for case, outcome in results
@@ -294,8 +294,7 @@ def run_robot(case: RobotCase) -> RobotOutcome:
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
     phases = [i / case.phases for i in range(case.phases)]
     stops = StopSummary(list(run_trials(
-        robot, [StopCase('amble', 0.5, phase) for phase in phases], load_gait('amble'),
-        suite.parameters)))
+        robot, [StopCase('amble', 0.5, phase) for phase in phases], suite.parameters)))
     stood, walked_on, fell = map(stops.number, ('standing', 'walked_on', 'fell'))
     pushed = [trials.survived_pushes(trials.PushCase('amble', 0.5, phase, SIDES), case.file)
               for phase in phases]

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.paper.coupling import EdgeCoupling, MeanFieldCoupling
 from dmp_cpg_ros.paper.network import (
+    EdgeCoupling,
+    MeanFieldCoupling,
     OscillatorNetwork,
     chebyshev_stages,
     chebyshev_step,
