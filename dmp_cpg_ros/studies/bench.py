@@ -135,6 +135,7 @@ def parts_of_a_tick() -> list[Row]:
     leg, command, gait = loop.legs[0].primitive, (0.5, 0.0, 0.0), loop.canon.gait
     estimator = BodyEstimator(robot.description, suite.parameters.estimation)
     known, readings = loop.estimator_state, readings_of(state)
+    balance, of_leg = loop.posture.balance, loop.leg_states[0].leg
     asked = LegFeedback(state.joint_position[:3], zero, zero[:2], zero)
 
     def tick() -> None:
@@ -149,10 +150,8 @@ def parts_of_a_tick() -> list[Row]:
         ('state of the stop', lambda: loop.supervisor.step(
             loop.stop, loop.stop.time_ns, loop.network, x, x_dot, r, command)),
         ('estimate of the body', lambda: estimator.step(known, readings)),
-        ('balance', lambda: loop.body.posture.step(
-            loop.posture.balance, state, gait, x, x_dot, r, dt)),
-        ('one leg', lambda: leg.step(
-            loop.leg_states[0].leg, gait, x[0], x_dot[0], r, asked, dt)),
+        ('balance', lambda: loop.body.posture.step(balance, state, gait, x, x_dot, r, dt)),
+        ('one leg', lambda: leg.step(of_leg, gait, x[0], x_dot[0], r, asked, dt)),
         ('prediction of a stop', lambda: predict(
             loop.supervisor, loop.reference, loop.canonical, stopping, loop.inhibition, loop.canon,
             r, command, dt)),

@@ -35,7 +35,6 @@ from dmp_cpg_ros.studies import walking_trials as trials
 from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
-Grounds = tuple[tuple[str, tuple[tuple[str, float], ...]], ...]
 Results = list[tuple[Any, Any]]
 """Cases with their outcomes."""
 
@@ -46,26 +45,20 @@ DIRECTIONS = {'ahead': 0.0, 'ahead left': 0.25 * pi, 'left': 0.5 * pi, 'back lef
 PUSHED = (('amble', 0.5), ('trot', 0.5), ('trot', 1.0))
 """Gaits and speeds that are pushed."""
 
-ROUGH: Grounds = (
-    ('blocks', (('height', 0.05),)), ('slope', (('degrees', 15.0),)),
-    ('slope', (('degrees', -15.0),)), ('steps', (('height', 0.08),)),
-    ('low_friction', (('friction', 0.3),)))
-"""Grounds that are crossed."""
+ROUGH = (('blocks', 'height', 0.05), ('slope', 'degrees', 15.0), ('slope', 'degrees', -15.0),
+         ('steps', 'height', 0.08), ('low_friction', 'friction', 0.3))
+"""Grounds that are crossed: worlds with one of their parameters."""
 
 ROUGH_GAITS = ('amble', 'trot')
 
-FELT_GROUNDS: Grounds = (
-    ('blocks', (('height', 0.03),)), ('blocks', (('height', 0.05),)),
-    ('blocks', (('height', 0.07),)), ('steps', (('height', 0.05),)),
-    ('steps', (('height', 0.08),)))
+FELT_GROUNDS = (('blocks', 'height', 0.03), ('blocks', 'height', 0.05), ('blocks', 'height', 0.07),
+                ('steps', 'height', 0.05), ('steps', 'height', 0.08))
 """Grounds that are crossed with and without feeling them."""
 
 FEELING: dict[trials.Values, str] = {
-    (('contact_feedback', False), ('stumble_lift', 0.0)): 'nothing',
-    (('contact_feedback', True), ('stumble_lift', 0.0)): 'touchdown, in the phase',
-    (('contact_feedback', False), ('stumble_lift', 0.13)): 'obstacles, in the swing',
-    (('contact_feedback', True), ('stumble_lift', 0.13)): 'both',
-}
+    (('contact_feedback', felt), ('stumble_lift', lift)): words for felt, lift, words in (
+        (False, 0.0, 'nothing'), (True, 0.0, 'touchdown, in the phase'),
+        (False, 0.13, 'obstacles, in the swing'), (True, 0.13, 'both'))}
 """Parameters, and what they make the legs feel."""
 
 STRAIGHT = {
@@ -192,9 +185,8 @@ def rough(pool: Processes, seeds: int, phases: int) -> Table:
         times = [outcome.time for outcome in of if outcome.crossed]
         rows.append((case.kind, words, case.gait, *shares,
                      f'{np.median(times):.1f}' if times else '-'))
-    return Table('Rough ground, blind, at 0.5 m/s within a tenth',
-                 ('ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s'),
-                 rows, results)
+    return Table('Rough ground, blind, at 0.5 m/s within a tenth', (
+        'ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s'), rows, results)
 
 
 def contacts(pool: Processes, seeds: int, phases: int) -> Table:
@@ -213,8 +205,8 @@ def contacts(pool: Processes, seeds: int, phases: int) -> Table:
 def _crossings(pool: Processes, seeds: int, walks: Iterator[tuple[Any, ...]]) -> Results:
     """Crossings of ground, gait and parameters with every seed, the seeds innermost."""
     return _run(pool, trials.cross, [
-        trials.CrossingCase(gait, kind, numbers, seed, values=values)
-        for ((kind, numbers), gait, values), seed in product(walks, range(seeds))], 2)
+        trials.CrossingCase(gait, kind, ((name, number),), seed, values=values)
+        for ((kind, name, number), gait, values), seed in product(walks, range(seeds))], 2)
 
 
 def _groups(results: Results, seeds: int) -> Iterator[tuple[

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import cos, radians, sin, tan
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,8 +68,6 @@ class World(Parameters):
         0.0, "sliding friction of all contacts; 0: the model's own, 0.3 on low_friction",
         minimum=0.0, maximum=2.0)
 
-    KIND: ClassVar[str] = 'flat'
-
     @property
     def floor(self) -> float:
         """Height of the floor on which everything stands [m]."""
@@ -109,8 +107,6 @@ class LowFriction(World):
 
     friction: float = parameter(0.3, 'sliding friction of all contacts', minimum=0.02, maximum=2.0)
 
-    KIND: ClassVar[str] = 'low_friction'
-
 
 @dataclass(frozen=True)
 class Slope(World):
@@ -118,8 +114,6 @@ class Slope(World):
 
     degrees: float = parameter(
         10.0, 'slope: its angle; negative: downhill', unit='deg', minimum=-40.0, maximum=40.0)
-
-    KIND: ClassVar[str] = 'slope'
 
     @property
     def floor(self) -> float:
@@ -157,8 +151,6 @@ class Blocks(World):
                               unit='m', minimum=0.0, maximum=1.0)
     size: float = parameter(0.2, 'blocks: side of each', unit='m', minimum=0.05, maximum=2.0)
     seed: int = parameter(0, 'blocks: seed of their heights', minimum=0)
-
-    KIND: ClassVar[str] = 'blocks'
 
     def heights(self) -> Array:
         """Heights of the blocks, uniform in [0, ``height``], ndarray (along x, along y) [m]."""
@@ -198,8 +190,6 @@ class Steps(World):
     platform: float = parameter(
         2.0, 'steps: length of the platform on top', unit='m', minimum=0.1, maximum=20.0)
 
-    KIND: ClassVar[str] = 'steps'
-
     def _ends(self) -> list[tuple[float, float]]:
         """Where each layer begins and ends along x [m], the lowest first."""
         whole = 2.0 * (self.count - 1) * self.depth + self.platform
@@ -218,9 +208,8 @@ class Steps(World):
         return np.where(np.abs(y) <= HALF_WIDTH, layers * self.height, 0.0)
 
 
-def height_over_ground(
-    world: World, base_position_in_world: ArrayLike, hips_in_world: ArrayLike,
-) -> Array:
+def height_over_ground(world: World, base_position_in_world: ArrayLike, hips_in_world: ArrayLike
+                       ) -> Array:
     """Height of the base over the ground below its hips.
 
     Parameters
@@ -258,8 +247,8 @@ def _slab(*ends: tuple[float, float]) -> Box:
                (0.5 * (x_1 - x_0), 0.5 * (y_1 - y_0), 0.5 * (z_1 - z_0)))
 
 
-WORLDS: dict[str, type[World]] = {
-    kind.KIND: kind for kind in (World, Slope, Blocks, Steps, LowFriction)}
+WORLDS: dict[str, type[World]] = {'flat': World, 'slope': Slope, 'blocks': Blocks, 'steps': Steps,
+                                  'low_friction': LowFriction}
 """Worlds by the word that chooses them."""
 
 PREFIX = 'world_'

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any, cast
 
 from dmp_cpg_ros.core.errors import DataError
@@ -74,8 +75,7 @@ def numbers(values: Iterable[Any], where: str, what: str, low: float, high: floa
     except (TypeError, ValueError) as error:
         raise DataError(f'{where}: {what} must be numbers: {error}') from error
     if not all(low <= number <= high for number in found):
-        raise DataError(
-            f'{where}: {what} must be finite, at least {low:g} and at most {high:g}')
+        raise DataError(f'{where}: {what} must be finite, at least {low:g} and at most {high:g}')
     return found
 
 
@@ -160,26 +160,16 @@ def _change(value: Any, where: str) -> tuple[dict[str, Any], str]:
     return values, 'set ' + ', '.join(f'{name} = {entry}' for name, entry in value.items())
 
 
-def _request(what: str) -> Read:
-    """Reader of a request without a value: ``stand_up: true``."""
-
-    def read(value: Any, where: str) -> tuple[bool, str]:
-        if value is not True:
-            raise DataError(f'{where}: {what} must be true, not {value!r}')
-        return True, what.replace('_', ' ')
-
-    return read
+def _request(what: str, value: Any, where: str) -> tuple[bool, str]:
+    """Read a request without a value: ``stand_up: true``."""
+    if value is not True:
+        raise DataError(f'{where}: {what} must be true, not {value!r}')
+    return True, what.replace('_', ' ')
 
 
 EVENT_KINDS: dict[str, Read] = {
-    'command': _command,
-    'inhibit': _inhibit,
-    'gait': _gait,
-    'push': _push,
-    'set': _change,
-    'votes': _votes,
-    **{what: _request(what) for what in REQUESTS},
-}
+    'command': _command, 'inhibit': _inhibit, 'gait': _gait, 'push': _push, 'set': _change,
+    'votes': _votes, **{what: partial(_request, what) for what in REQUESTS}}
 """Kind of event to the function that reads its value, ``(value, where) -> (value, label)``; it
 raises DataError.
 """
