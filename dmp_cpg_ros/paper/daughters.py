@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
-from dmp_cpg_ros.paper.diffeomorphism import Array, Diffeomorphism, Homogeneous
+from dmp_cpg_ros.paper.diffeomorphism import Array, Diffeomorphism
 
 Primitive = TypeVar('Primitive', DiscretePrimitive, RhythmicPrimitive)
 Field = Callable[[float, Array], Array]
@@ -133,6 +133,67 @@ class DaughterSum:
     def __call__(self, t: float, y: Array) -> Array:
         """The summed vector field at t [s] and y, ndarray (n,) → (n,)."""
         return self.gains @ np.array([daughter(t, y) for daughter in self.daughters])
+
+
+@dataclass(frozen=True, eq=False)
+class Homogeneous(Diffeomorphism):
+    """T(y) = s R y + y_T with s > 0 and R ∈ SO(n); maps many points (m, n) at once, too.
+
+    Attributes
+    ----------
+    scale : float
+        s.
+    rotation : ndarray (n, n)
+        R.
+    translation : ndarray (n,)
+        y_T.
+
+    Raises
+    ------
+    ParameterError
+        If s is not positive, R is not a rotation or the sizes differ.
+    """
+
+    scale: float
+    rotation: Array
+    translation: Array
+
+    def __post_init__(self) -> None:
+        R, shift = np.array(self.rotation, float), np.atleast_1d(np.array(self.translation, float))
+        if R.shape != (len(shift), len(shift)):
+            raise ParameterError(
+                f'rotation and translation must fit; shapes are {R.shape} and {shift.shape}')
+        if not (np.isfinite(self.scale) and self.scale > 0.0 and np.all(np.isfinite(shift))):
+            raise ParameterError(
+                f'scale = {self.scale!r} must be positive and finite, the translation finite')
+        if not (np.allclose(R @ R.T, np.eye(len(R)), atol=1e-9) and np.linalg.det(R) > 0.0):
+            raise ParameterError(
+                'rotation must be orthogonal with determinant 1 (R Rᵀ = I, det R = 1)')
+        object.__setattr__(self, 'rotation', R)
+        object.__setattr__(self, 'translation', shift)
+
+    @classmethod
+    def of(cls, dofs: int, scale: float = 1.0, rotation: ArrayLike | None = None,
+           translation: ArrayLike | None = None) -> Homogeneous:
+        """Map of n degrees of freedom in which what is not given does nothing."""
+        return cls(scale, np.asarray(np.eye(dofs) if rotation is None else rotation),
+                   np.asarray(np.zeros(dofs) if translation is None else translation))
+
+    def forward(self, y: Array) -> Array:
+        """T(y)."""
+        return self.direction(y) + self.translation
+
+    def jacobian(self, y: Array) -> Array:
+        """J = s R."""
+        return self.scale * self.rotation
+
+    def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
+        """T⁻¹(y') = Rᵀ(y' − y_T)/s."""
+        return (y_prime - self.translation) @ self.rotation / self.scale
+
+    def direction(self, v: Array) -> Array:
+        """J v, for velocities and forces."""
+        return self.scale * (v @ self.rotation.T)
 
 
 def transformed(primitive: Primitive, map_: Homogeneous) -> Primitive:

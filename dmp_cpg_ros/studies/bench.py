@@ -28,18 +28,12 @@ from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
 from dmp_cpg_ros.core.inhibition.prediction import predict
-from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.loop import Array, WalkingLoop
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.transformation.leg import LegFeedback
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
-from dmp_cpg_ros.paper.network import (
-    Array,
-    Coupling,
-    EdgeCoupling,
-    MeanFieldCoupling,
-    OscillatorNetwork,
-)
+from dmp_cpg_ros.paper import network as networks
 from dmp_cpg_ros.paper.oscillators import HopfOscillators
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_recording import LoopRun
@@ -95,7 +89,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def steps_of_four() -> list[Row]:
     """Time steps of the gait's network, and of what else could be done."""
     of = network('all_to_all', GAIN)
-    general = OscillatorNetwork(HopfOscillators(4, OMEGA), EdgeCoupling(of.graph), of.target)
+    coupling = networks.EdgeCoupling(of.graph)
+    general = networks.OscillatorNetwork(HopfOscillators(4, OMEGA), coupling, of.target)
     x, free, held = state_at(of.graph.phases + 0.5), np.zeros(4), 400.0 * np.eye(4)[0]
     return _with_ratios([
         ('exponential step (core/canonical/system.py)', lambda: of.step(x, OMEGA, free, TICK)),
@@ -108,10 +103,10 @@ def steps_of_four() -> list[Row]:
 
 def steps_of_many(sizes: Sequence[int]) -> list[Row]:
     """Time steps of growing networks, divided by the number of oscillators."""
-    kinds: dict[str, Callable[[int], Coupling]] = {
+    kinds: dict[str, Callable[[int], networks.Coupling]] = {
         'ring': lambda n: _over(n, topology('ring', n)),
         'random, 6 neighbours': lambda n: _over(n, _random_edges(n)),
-        'all to all': lambda n: MeanFieldCoupling(n, GAIN / n),
+        'all to all': lambda n: networks.MeanFieldCoupling(n, GAIN / n),
     }
     rows = []
     for kind, coupling in kinds.items():
@@ -213,15 +208,15 @@ def _with_ratios(cases: Sequence[tuple[str, Callable[[], object]]]) -> list[Row]
             for (name, _), own in zip(cases, seconds, strict=True)]
 
 
-def _step_time(coupling: Coupling) -> float:
+def _step_time(coupling: networks.Coupling) -> float:
     rng, size = np.random.default_rng(0), coupling.count
-    of = OscillatorNetwork(HopfOscillators(size, rng.uniform(8.0, 10.0, size)), coupling)
+    of = networks.OscillatorNetwork(HopfOscillators(size, rng.uniform(8.0, 10.0, size)), coupling)
     x = state_at(rng.uniform(-np.pi, np.pi, size))
     return seconds_of(lambda: of.step(x, TICK)) / size
 
 
-def _over(size: int, edges: Edges) -> EdgeCoupling:
-    return EdgeCoupling(graph_from_edges(size, edges, GAIN * size / max(len(edges), 1)))
+def _over(size: int, edges: Edges) -> networks.EdgeCoupling:
+    return networks.EdgeCoupling(graph_from_edges(size, edges, GAIN * size / max(len(edges), 1)))
 
 
 def _random_edges(size: int) -> Edges:

@@ -13,7 +13,6 @@ The robot is the MuJoCo one in the plain loop, which is identical to the nodes i
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, astuple, dataclass
@@ -99,7 +98,14 @@ class Table:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark and print its tables; returns the exit status."""
-    options, _ = parse_arguments(_parser(), arguments)
+    parser = output.parser_of('benchmark_walking', __doc__, 'every case and outcome')
+    parser.add_argument('--tables', nargs='+', choices=list(TABLES), default=list(TABLES),
+                        metavar='TABLE', help=f'which of {", ".join(TABLES)} (default: all)')
+    parser.add_argument('--seeds', type=output.at_least_one, default=50, metavar='N',
+                        help='seeds for each rough ground (default: 50)')
+    parser.add_argument('--phases', type=output.at_least_one, default=16, metavar='N',
+                        help='phases of the pushes, evenly over a cycle (default: 16)')
+    options, _ = parse_arguments(parser, arguments)
     results: dict[str, Any] = {}
     with Pool(options.jobs) as pool:
         for name in options.tables:
@@ -337,17 +343,6 @@ def _is_there(file: str) -> bool:
 
 TABLES = {make.__name__: make for make in (speeds, pushes, rough, contacts, gaits, robots)}
 """What can be measured."""
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = output.parser_of('benchmark_walking', __doc__, 'every case and outcome')
-    parser.add_argument('--tables', nargs='+', choices=list(TABLES), default=list(TABLES),
-                        metavar='TABLE', help=f'which of {", ".join(TABLES)} (default: all)')
-    parser.add_argument('--seeds', type=output.at_least_one, default=50, metavar='N',
-                        help='seeds for each rough ground (default: 50)')
-    parser.add_argument('--phases', type=output.at_least_one, default=16, metavar='N',
-                        help='phases of the pushes, evenly over a cycle (default: 16)')
-    return parser
 
 
 if __name__ == '__main__':

@@ -149,27 +149,24 @@ def suite_of(file: str | None, leg: str) -> Suite:
 
 
 @lru_cache
-def robot_of(file: str | None, leg: str) -> MujocoRobot:
-    """The robot of a parameter file; a walk resets it."""
+def _setting(file: str | None, leg: str, gait: str, cadence: float
+             ) -> tuple[MujocoRobot, SuiteParameters, float]:
+    """The robot, its parameters, and the certified time to rest [s], which holds for every phase
+    and speed, and is infinite without a certificate.
+    """
     suite = suite_of(file, leg)
-    return MujocoRobot(suite.robot_file, suite.tick_ns)
-
-
-@lru_cache
-def bound_of(file: str | None, leg: str, gait: str, cadence: float) -> float:
-    """Certified time to rest [s]; it holds for every phase and speed, and is infinite without."""
-    suite, scale = suite_of(file, leg), body_scale(robot_of(file, leg).description)
-    p = suite.parameters
+    robot, p = MujocoRobot(suite.robot_file, suite.tick_ns), suite.parameters
+    scale = body_scale(robot.description)
     network = GaitNetwork(p.canonical, load_gait(gait).scaled(cadence), scale)
-    return certify(network, p.inhibition, p.reference, p.leg, p.posture,
-                   suite.tick_ns * 1e-9, voting=p.voting).time_to_rest
+    certificate = certify(network, p.inhibition, p.reference, p.leg, p.posture,
+                          suite.tick_ns * 1e-9, voting=p.voting)
+    return robot, p, certificate.time_to_rest
 
 
 def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     """Run the cases of one walk with the robot and the parameters of a parameter file."""
-    leg = cases[0].leg
-    bound = bound_of(file, leg, cases[0].gait, cases[0].cadence)
-    return list(run_trials(robot_of(file, leg), cases, suite_of(file, leg).parameters, bound))
+    robot, parameters, bound = _setting(file, cases[0].leg, cases[0].gait, cases[0].cadence)
+    return list(run_trials(robot, cases, parameters, bound))
 
 
 def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,

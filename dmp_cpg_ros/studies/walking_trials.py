@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world import WORLDS, World
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_recording import LoopRun, recording_of
-from dmp_cpg_ros.suite import Suite, load_gait, load_gaits, load_suite
+from dmp_cpg_ros.suite import Suite, load_gaits, load_suite
 
 Velocity = tuple[float, float, float]
 Values = tuple[tuple[str, Any], ...]
@@ -87,7 +87,7 @@ class Walk(LoopRun[WalkingLoop]):
         body = MujocoRobot(suite.robot_file, suite.tick_ns, seed, 0.03 if seed else 0.0,
                            world=world or suite.world, sensors=suite.sensors)
         super().__init__(body, WalkingLoop(
-            body.description, load_gait(gait), suite.parameters, load_gaits()))
+            body.description, suite.gait, suite.parameters, load_gaits()))
         self.asked: Velocity = (0.0, 0.0, 0.0)
         self.walk(STANDING)
         self.loop.request(False)

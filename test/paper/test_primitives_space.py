@@ -19,20 +19,21 @@ from dmp_cpg_ros.core.primitives.states import DiscreteInput
 from dmp_cpg_ros.paper.daughters import (
     Daughter,
     DaughterSum,
+    Homogeneous,
     slowed,
     summed,
     transformed,
     transported_metric,
 )
 from dmp_cpg_ros.paper.diffeomorphism import (
+    ClosedCurveDiffeomorphism,
     Composition,
     FunctionDiffeomorphism,
-    Homogeneous,
     TangentLift,
+    canonical_field,
     newton_inverse,
 )
 from dmp_cpg_ros.paper.jacobians import difference_jacobian
-from dmp_cpg_ros.paper.limit_cycle import ClosedCurveDiffeomorphism, canonical_field
 
 SEEDS = st.integers(0, 10_000)
 

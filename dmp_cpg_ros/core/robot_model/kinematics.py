@@ -14,12 +14,11 @@ from collections.abc import Sequence
 from math import acos, atan2, cos, hypot, pi, sin, sqrt, tau
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, triple
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.robot_model.state import Array
 
 
 class LegKinematics:

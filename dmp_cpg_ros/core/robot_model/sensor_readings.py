@@ -7,12 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isnan
 
-import numpy as np
-from numpy.typing import NDArray
-
-from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.robot_model.state import LEGS, Array, RobotState
 
 FASTEST_TURN, HARDEST_BLOW = 100.0, 1000.0
 """Readings beyond these are no readings of a walking robot's IMU [rad/s], [m/s^2]."""

@@ -26,8 +26,7 @@ from dmp_cpg_ros.core.learning.learning import FitOptions, ridge_regression, sma
 from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, derivatives
 from dmp_cpg_ros.core.primitives.states import DiscreteInput, RhythmicInput
-from dmp_cpg_ros.paper.daughters import transformed
-from dmp_cpg_ros.paper.diffeomorphism import Homogeneous
+from dmp_cpg_ros.paper.daughters import Homogeneous, transformed
 
 DISCRETE = {
     **{f'letter {letter}': handwriting(letter) for letter in LETTERS},
