@@ -227,9 +227,8 @@ def proved_contraction(jacobian: Callable[[Interval], Interval], box: Box, norm:
         when the budget sufficed.
     """
     boxes = box.as_interval()
-    w = np.ones(boxes.lower.shape[1]) if weights is None else np.asarray(weights, dtype=float)
-    if np.any(w <= 0.0):
-        raise ParameterError(f'weights {w.tolist()} must all be positive')
+    n = boxes.lower.shape[1]
+    w = np.diag(_coordinates(np.ones(n) if weights is None else weights, n))
     ratios = Interval.of(w[:, None]) / Interval.of(w[None, :])
     bound, attained, evaluations = -np.inf, -np.inf, 0
     while True:

@@ -88,7 +88,20 @@ def find_orbit(field: Field, start: ArrayLike, transient: float, step: float,
         If the state does not come back within 100,000 steps or the orbit does not close.
     """
     x = _flow(field, start, transient, step).y[:, -1]
-    period = _time_of_return(field, x, step)
+    normal, farthest = field(x), 0.0
+
+    def height(_: float, at: Array) -> float:
+        """Height over the plane through x across the flow; below it where x is far away."""
+        nonlocal farthest
+        distance = float(np.linalg.norm(at - x))
+        farthest = max(farthest, distance)
+        return float((at - x) @ normal) if distance < 0.1 * farthest else -1.0
+
+    height.direction, height.terminal = 1.0, True  # type: ignore[attr-defined]
+    returned = _flow(field, x, 1e5 * step, step, events=height).t_events[0]
+    if not returned.size:
+        raise DataError('the state did not come back to where it was within 100,000 steps')
+    period = float(returned[0])
     states = _flow(field, x, period, step, np.linspace(0.0, period, count + 1)).y.T
     gap = float(np.linalg.norm(states[-1] - x))
     if not gap <= 1e-4 * float(np.ptp(states, axis=0).max()):
@@ -102,25 +115,6 @@ def _flow(field: Field, start: ArrayLike, duration: float, step: float,
           ) -> Any:
     return solve_ivp(lambda _, x: field(x), (0.0, duration), np.asarray(start, dtype=float),
                      'DOP853', times, events=events, rtol=1e-11, atol=1e-12, max_step=step)
-
-
-def _time_of_return(field: Field, x0: Array, step: float) -> float:
-    """Time until the state crosses the plane through x0 across the flow, close to x0."""
-    normal, begun, size = field(x0), 0.0, 0.0
-
-    def height(_: float, x: Array) -> float:
-        return float((x - x0) @ normal)
-
-    height.direction = 1.0  # type: ignore[attr-defined]
-    x = x0
-    for _ in range(1000):
-        piece = _flow(field, x, 100.0 * step, step, events=height)
-        size = max(size, float(np.linalg.norm(piece.y - x0[:, None], axis=0).max()))
-        for t, at in zip(piece.t_events[0], piece.y_events[0], strict=True):
-            if begun + t > step and np.linalg.norm(at - x0) < 0.1 * size:
-                return float(begun + t)
-        x, begun = piece.y[:, -1], begun + 100.0 * step
-    raise DataError('the state did not come back to where it was within 100,000 steps')
 
 
 @dataclass(frozen=True)
