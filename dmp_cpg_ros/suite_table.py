@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 LEG, POSTURE, ROBOT, RECORDER = (

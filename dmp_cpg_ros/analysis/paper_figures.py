@@ -22,8 +22,7 @@ from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.gait.gait import Gait
-from dmp_cpg_ros.paper.coupling import EdgeCoupling
-from dmp_cpg_ros.paper.network import OscillatorNetwork
+from dmp_cpg_ros.paper.network import EdgeCoupling, OscillatorNetwork
 from dmp_cpg_ros.paper.oscillators import HopfOscillators, VanDerPolOscillators
 
 VAN_DER_POL_OMEGA = (0.8, 1.0, 1.25, 1.5)

@@ -23,8 +23,7 @@ from dmp_cpg_ros.configuration import find_config, first_free
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.world import World
-from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
 from dmp_cpg_ros.suite import load_gait, load_gaits, node_sets
 from dmp_cpg_ros.suite_table import RECORDER, instances
 

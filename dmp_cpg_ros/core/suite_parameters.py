@@ -23,8 +23,7 @@ from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.robot_model.world import World
-from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
 from dmp_cpg_ros.core.transformation.foot_motion import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 

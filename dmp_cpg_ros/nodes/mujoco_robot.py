@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
-from dmp_cpg_ros.core.robot_model.world_choice import WorldParameters
+from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers, RobotTiming
 from dmp_cpg_ros.nodes.framework.parameters import NodeParameters
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode

@@ -23,9 +23,8 @@ from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
-from dmp_cpg_ros.core.scenario.events import Command
 from dmp_cpg_ros.core.scenario.push import Push
-from dmp_cpg_ros.core.scenario.scenario import Scenario
+from dmp_cpg_ros.core.scenario.scenario import Command, Scenario
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
 from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_state_word

@@ -1,21 +1,35 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Daughters: a contracting mother scaled in space and time, and their sums (Section 3.2)."""
+"""Daughters: a contracting mother scaled in space and time, and their sums (Section 3.2).
+
+Of any vector field (:class:`Daughter`, :class:`DaughterSum`), and of learned primitives in closed
+form: a homogeneous map turns a primitive into one with other weights, goal and start, so such a
+daughter costs no more than its mother. General diffeomorphisms have no such form: map the output
+with :class:`~dmp_cpg_ros.paper.diffeomorphism.TangentLift`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.diffeomorphism import Diffeomorphism
+from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
+from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
+from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
+from dmp_cpg_ros.paper.diffeomorphism import Array, Diffeomorphism
 
-Array = NDArray[np.float64]
+Primitive = TypeVar('Primitive', DiscretePrimitive, RhythmicPrimitive)
 Field = Callable[[float, Array], Array]
 """Vector field: time [s], state (n,) → derivative (n,); phase and references depend on time."""
+
+_POWERS_OF_TAU = {'weights': -2, 'phase_decay': -1, 'start_velocity': -1, 'duration': 1,
+                  'omega': -1, 'rho': -1}
+"""How what a primitive has scales with τ."""
 
 
 def transported_metric(M: ArrayLike, J: ArrayLike) -> Array:
@@ -33,8 +47,8 @@ def transported_metric(M: ArrayLike, J: ArrayLike) -> Array:
     ndarray (n, n)
         Symmetric.
     """
-    half = np.linalg.solve(np.asarray(J, dtype=float).T, np.asarray(M, dtype=float))  # J⁻ᵀ M
-    transported = np.linalg.solve(np.asarray(J, dtype=float).T, half.T)
+    J_inverse = np.linalg.inv(np.asarray(J, dtype=float))
+    transported = J_inverse.T @ np.asarray(M, dtype=float) @ J_inverse
     return np.asarray(0.5 * (transported + transported.T))
 
 
@@ -52,25 +66,12 @@ class Daughter:
     transformation : Diffeomorphism
         T.
     tau : float or callable
-        τ, or τ(t) > 0.
+        τ, or τ(t) > 0; the field raises ParameterError where it is not.
     """
 
     mother: Field
     transformation: Diffeomorphism
     tau: float | Callable[[float], float] = 1.0
-
-    def tau_at(self, t: float) -> float:
-        """τ(t).
-
-        Raises
-        ------
-        ParameterError
-            If it is not positive and finite.
-        """
-        tau = float(self.tau(t)) if callable(self.tau) else float(self.tau)
-        if not (np.isfinite(tau) and tau > 0.0):
-            raise ParameterError(f'tau = {tau!r} at t = {t!r} s must be a positive finite number')
-        return tau
 
     def __call__(self, t: float, y_prime: Array, guess: Array | None = None) -> Array:
         """The daughter's vector field.
@@ -88,22 +89,12 @@ class Daughter:
         ndarray (n,)
             ẏ'.
         """
+        tau = _positive(self.tau(t) if callable(self.tau) else self.tau)
         y = self.transformation.inverse(y_prime, guess)
-        return self.transformation.velocity(y, self.mother(t, y)) / self.tau_at(t)
+        return self.transformation.velocity(y, self.mother(t, y)) / tau
 
     def metric(self, y_prime: Array, M: ArrayLike | Callable[[Array], Array]) -> Array:
-        """The daughter's metric at y'.
-
-        Parameters
-        ----------
-        y_prime : ndarray (n,)
-        M : array_like (n, n) or callable
-            The mother's metric, or M(y).
-
-        Returns
-        -------
-        ndarray (n, n)
-        """
+        """The daughter's metric at y', (n, n), of the mother's metric M (n, n) or M(y)."""
         y = self.transformation.inverse(y_prime)
         return transported_metric(M(y) if callable(M) else M, self.transformation.jacobian(y))
 
@@ -132,37 +123,202 @@ class DaughterSum:
     gains: Array
 
     def __post_init__(self) -> None:
-        """Validate."""
         gains = np.atleast_1d(np.array(self.gains, dtype=float))
-        if (
-            gains.shape != (len(self.daughters),)
-            or not np.all(np.isfinite(gains))
-            or np.any(gains < 0.0)
-            or not np.any(gains > 0.0)
-        ):
-            raise ParameterError(
-                f'gains must be {len(self.daughters)} numbers of at least 0, not all 0; they are '
-                f'{gains.tolist()}'
-            )
+        if not (gains.shape == (len(self.daughters),) and np.all(np.isfinite(gains))
+                and gains.min() >= 0.0 < gains.max()):
+            raise ParameterError(f'gains must be {len(self.daughters)} numbers of at least 0, not '
+                                 f'all 0; they are {gains.tolist()}')
         object.__setattr__(self, 'gains', gains)
 
     def __call__(self, t: float, y: Array) -> Array:
-        """The summed vector field.
+        """The summed vector field at t [s] and y, ndarray (n,) → (n,)."""
+        return self.gains @ np.array([daughter(t, y) for daughter in self.daughters])
 
-        Parameters
-        ----------
-        t : float
-            [s]
-        y : ndarray (n,)
 
-        Returns
-        -------
-        ndarray (n,)
-        """
-        return np.sum(
-            [
-                gain * daughter(t, y)
-                for gain, daughter in zip(self.gains, self.daughters, strict=True)
-            ],
-            axis=0,
-        )
+@dataclass(frozen=True, eq=False)
+class Homogeneous(Diffeomorphism):
+    """T(y) = s R y + y_T with s > 0 and R ∈ SO(n); maps many points (m, n) at once, too.
+
+    Attributes
+    ----------
+    scale : float
+        s.
+    rotation : ndarray (n, n)
+        R.
+    translation : ndarray (n,)
+        y_T.
+
+    Raises
+    ------
+    ParameterError
+        If s is not positive, R is not a rotation or the sizes differ.
+    """
+
+    scale: float
+    rotation: Array
+    translation: Array
+
+    def __post_init__(self) -> None:
+        R, shift = np.array(self.rotation, float), np.atleast_1d(np.array(self.translation, float))
+        if R.shape != (len(shift), len(shift)):
+            raise ParameterError(
+                f'rotation and translation must fit; shapes are {R.shape} and {shift.shape}')
+        if not (np.isfinite(self.scale) and self.scale > 0.0 and np.all(np.isfinite(shift))):
+            raise ParameterError(
+                f'scale = {self.scale!r} must be positive and finite, the translation finite')
+        if not (np.allclose(R @ R.T, np.eye(len(R)), atol=1e-9) and np.linalg.det(R) > 0.0):
+            raise ParameterError(
+                'rotation must be orthogonal with determinant 1 (R Rᵀ = I, det R = 1)')
+        object.__setattr__(self, 'rotation', R)
+        object.__setattr__(self, 'translation', shift)
+
+    @classmethod
+    def of(cls, dofs: int, scale: float = 1.0, rotation: ArrayLike | None = None,
+           translation: ArrayLike | None = None) -> Homogeneous:
+        """Map of n degrees of freedom in which what is not given does nothing."""
+        return cls(scale, np.asarray(np.eye(dofs) if rotation is None else rotation),
+                   np.asarray(np.zeros(dofs) if translation is None else translation))
+
+    def forward(self, y: Array) -> Array:
+        """T(y)."""
+        return self.direction(y) + self.translation
+
+    def jacobian(self, y: Array) -> Array:
+        """J = s R."""
+        return self.scale * self.rotation
+
+    def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
+        """T⁻¹(y') = Rᵀ(y' − y_T)/s."""
+        return (y_prime - self.translation) @ self.rotation / self.scale
+
+    def direction(self, v: Array) -> Array:
+        """J v, for velocities and forces."""
+        return self.scale * (v @ self.rotation.T)
+
+
+def transformed(primitive: Primitive, map_: Homogeneous) -> Primitive:
+    """Daughter whose movement is T of the mother's: y'(t) = s R y(t) + y_T.
+
+    Parameters
+    ----------
+    primitive : DiscretePrimitive or RhythmicPrimitive
+    map_ : Homogeneous
+        T on the primitive's degrees of freedom.
+
+    Returns
+    -------
+    DiscretePrimitive or RhythmicPrimitive
+        Of the same kind; names are kept only when the map does not rotate.
+
+    Raises
+    ------
+    ParameterError
+        If the sizes differ, or the map rotates degrees of freedom that have different gains.
+    """
+    n, R, spring = primitive.dofs, map_.rotation, primitive.transformation
+    if len(R) != n:
+        raise ParameterError(
+            f'a map of {len(R)} degrees of freedom does not fit a primitive of {n}')
+    for gains in (spring.stiffness, spring.damping):
+        if not np.allclose(R * gains, gains[:, None] * R, atol=1e-12 * float(gains.max())):
+            raise ParameterError(
+                'a rotation can be taken into the weights only when the degrees of freedom that '
+                f'it mixes have equal gains; they have {gains.tolist()}')
+    names = primitive.names if np.array_equal(R, np.eye(n)) else ()
+    if isinstance(primitive, DiscretePrimitive):
+        return replace(primitive, weights=map_.direction(primitive.weights),
+                       start=map_.forward(primitive.start), goal=map_.forward(primitive.goal),
+                       start_velocity=map_.direction(np.asarray(primitive.start_velocity)),
+                       names=names)
+    weights = map_.scale * np.einsum('ij,mjc->mic', R, primitive.weights)
+    return replace(primitive, weights=weights, centre=map_.forward(primitive.centre), names=names)
+
+
+def slowed(primitive: Primitive, tau: float) -> Primitive:
+    """Daughter that at τ = 1 moves as the mother does at the given τ; scaled form only.
+
+    Parameters
+    ----------
+    primitive : DiscretePrimitive or RhythmicPrimitive
+    tau : float
+        Factor by which the movement is slower.
+
+    Returns
+    -------
+    DiscretePrimitive or RhythmicPrimitive
+
+    Raises
+    ------
+    ParameterError
+        If τ is not positive or the primitive has the printed form, whose path changes with τ.
+    """
+    _positive(tau)
+    if primitive.form != 'scaled':
+        raise ParameterError(
+            "only primitives of the form 'scaled' keep their path when they are slowed")
+    spring = primitive.transformation
+    gains = SpringDamper(spring.stiffness / tau**2, spring.damping / tau, spring.form)
+    changed: dict[str, Any] = {
+        name: np.multiply(getattr(primitive, name), tau**power)[()]
+        for name, power in _POWERS_OF_TAU.items() if hasattr(primitive, name)}
+    return replace(primitive, transformation=gains, **changed)
+
+
+def summed(primitives: Sequence[Primitive], gains: ArrayLike) -> Primitive:
+    """Primitive whose movement is Σ α_i y_i(t), on one canonical system.
+
+    Parameters
+    ----------
+    primitives : sequence of DiscretePrimitive or of RhythmicPrimitive
+        With the same bases, phase and spring-damper.
+    gains : array_like (k,)
+        α_i of either sign.
+
+    Returns
+    -------
+    DiscretePrimitive or RhythmicPrimitive
+
+    Raises
+    ------
+    ParameterError
+        If the primitives do not share what they must, or the gains do not fit.
+    """
+    gains = np.atleast_1d(np.asarray(gains, dtype=float))
+    if not primitives or gains.shape != (len(primitives),) or not np.all(np.isfinite(gains)):
+        raise ParameterError(f'a sum needs one finite gain per primitive; there are '
+                             f'{len(primitives)} primitives and gains of shape {gains.shape}')
+    first = primitives[0]
+    ours = _to_share(first)
+    for theirs in map(_to_share, primitives[1:]):
+        for name, value in ours.items():
+            if np.shape(value) != np.shape(theirs[name]) or not np.allclose(
+                    value, theirs[name], rtol=1e-12, atol=0.0):
+                raise ParameterError(f'primitives can be added when they share '
+                                     f'{", ".join(ours)}; they differ in {name}')
+    names = ('weights', 'start', 'goal', 'start_velocity') if isinstance(
+        first, DiscretePrimitive) else ('weights', 'centre')
+    blended: dict[str, Any] = {
+        name: np.tensordot(gains, np.array([getattr(p, name) for p in primitives]), axes=1)
+        for name in names}
+    return replace(first, **blended)
+
+
+def _to_share(primitive: DiscretePrimitive | RhythmicPrimitive) -> dict[str, Any]:
+    """What primitives that are added must have in common."""
+    spring, bases = primitive.transformation, primitive.bases
+    discrete = isinstance(primitive, DiscretePrimitive)
+    phase = ('phase_decay',) if discrete else ('omega', 'rho')
+    rates = ('goal_rate', 'tau_rate') if discrete else (
+        'centre_rate', 'amplitude_rate', 'tau_rate')
+    return {'the kind': float(discrete), 'basis centres': bases.centres,
+            'basis widths': bases.widths, 'stiffness': spring.stiffness,
+            'damping': spring.damping, 'the reading of tau': float(spring.form == 'scaled'),
+            'the phase': [getattr(primitive, name) for name in phase],
+            'the filter rates': [getattr(primitive, name) for name in rates],
+            'degrees of freedom': float(primitive.dofs)}
+
+
+def _positive(tau: float) -> float:
+    if not (np.isfinite(tau) and tau > 0.0):
+        raise ParameterError(f'tau = {tau!r} must be a positive finite number')
+    return tau

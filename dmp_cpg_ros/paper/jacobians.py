@@ -35,14 +35,10 @@ def complex_step_jacobian(field: Field, x: ArrayLike) -> Array:
         differentiated so.
     """
     x = np.asarray(x, dtype=float)
-    columns = []
-    for direction in np.eye(x.size):
-        value = np.asarray(field(x + 1j * _COMPLEX_STEP * direction))
-        if not np.iscomplexobj(value):
-            raise ParameterError(
-                "the function drops imaginary parts; use derivative = 'difference'")
-        columns.append(value.imag / _COMPLEX_STEP)
-    return np.stack(columns, axis=-1)
+    columns = [field(x + 1j * _COMPLEX_STEP * direction) for direction in np.eye(x.size)]
+    if not all(map(np.iscomplexobj, columns)):
+        raise ParameterError("the function drops imaginary parts; use derivative = 'difference'")
+    return np.stack(columns, axis=-1).imag / _COMPLEX_STEP
 
 
 def difference_jacobian(field: Field, x: ArrayLike) -> Array:

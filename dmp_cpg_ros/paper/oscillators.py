@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.paper.jacobians import Array
 
 
 class OscillatorFamily(Protocol):
@@ -30,17 +29,9 @@ class OscillatorFamily(Protocol):
         Section 5).
     """
 
-    @property
-    def count(self) -> int:
-        """Number N of oscillators."""
-
-    @property
-    def state_size(self) -> int:
-        """Dimension n of one oscillator's state."""
-
-    @property
-    def rotation_invariant(self) -> bool:
-        """Whether the field commutes with rotations of the state."""
+    count: int
+    state_size: int
+    rotation_invariant: bool
 
     def field(self, x: Array) -> Array:
         """Rates ẋ_i = f(x_i; ω_i): ndarray (N, n) → (N, n) [1/s]."""
@@ -52,29 +43,8 @@ class OscillatorFamily(Protocol):
         """Bound on the norm of the Jacobians at these states [1/s]."""
 
 
-def one_per_oscillator(name: str, values: ArrayLike, count: int, lowest: float) -> Array:
-    """Check and spread a parameter: a number for all oscillators, or one for each.
-
-    Parameters
-    ----------
-    name : str
-        Name for the error.
-    values : array_like
-        One number, or ``count`` numbers.
-    count : int
-        Number of oscillators.
-    lowest : float
-        What every value must be greater than.
-
-    Returns
-    -------
-    ndarray (count,)
-
-    Raises
-    ------
-    ParameterError
-        If there are neither one nor ``count`` finite values greater than ``lowest``.
-    """
+def _one_per_oscillator(name: str, values: ArrayLike, count: int, lowest: float) -> Array:
+    """Check and spread a parameter: a number for all oscillators, or one for each."""
     given = np.asarray(values, dtype=float)
     if given.shape not in ((), (count,)):
         raise ParameterError(f'{name} needs one value or {count}, not an array {given.shape}')
@@ -109,11 +79,10 @@ class HopfOscillators:
 
     def __init__(self, count: int, omega: ArrayLike, rho: ArrayLike = 8.0,
                  radius: ArrayLike = 1.0) -> None:
-        """Spread the parameters over the oscillators."""
         self.count = count
-        self.omega = one_per_oscillator('omega', omega, count, -np.inf)
-        self.rho = one_per_oscillator('rho', rho, count, 0.0)
-        self.radius = one_per_oscillator('radius', radius, count, 0.0)
+        self.omega = _one_per_oscillator('omega', omega, count, -np.inf)
+        self.rho = _one_per_oscillator('rho', rho, count, 0.0)
+        self.radius = _one_per_oscillator('radius', radius, count, 0.0)
         self._fastest = float(np.hypot(self.rho * self.radius**2, self.omega).max())
 
     def field(self, x: Array) -> Array:
@@ -126,8 +95,7 @@ class HopfOscillators:
 
     def stiffness(self, x: Array) -> float:
         """Bound |ω| + ρ r² + 3 ρ |x|² on the norms of the Jacobians [1/s]."""
-        squared = np.einsum('ij,ij->i', x, x)
-        return self._fastest + 3.0 * float((self.rho * squared).max())
+        return self._fastest + 3.0 * float((self.rho * np.einsum('ij,ij->i', x, x)).max())
 
 
 class VanDerPolOscillators:
@@ -155,32 +123,25 @@ class VanDerPolOscillators:
     rotation_invariant = False
 
     def __init__(self, count: int, omega: ArrayLike, mu: ArrayLike) -> None:
-        """Spread the parameters over the oscillators."""
         self.count = count
-        self.omega = one_per_oscillator('omega', omega, count, 0.0)
-        self.mu = one_per_oscillator('mu', mu, count, 0.0)
+        self.omega = _one_per_oscillator('omega', omega, count, 0.0)
+        self.mu = _one_per_oscillator('mu', mu, count, 0.0)
 
     def field(self, x: Array) -> Array:
         """Rates, ndarray (N, 2) → (N, 2)."""
-        x1, x2 = x[:, 0], x[:, 1]
-        rate = np.empty_like(x)
-        rate[:, 0] = x2
-        rate[:, 1] = self.mu * (1.0 - x1 * x1) * x2 - self.omega * self.omega * x1
-        return rate
+        x1, x2 = x.T
+        return np.stack([x2, self.mu * (1.0 - x1 * x1) * x2 - self.omega * self.omega * x1], 1)
 
     def jacobian(self, x: Array) -> Array:
         """Jacobians, ndarray (N, 2) → (N, 2, 2)."""
-        x1, x2 = x[:, 0], x[:, 1]
-        matrix = np.zeros((self.count, 2, 2))
-        matrix[:, 0, 1] = 1.0
-        matrix[:, 1, 0] = -self.omega**2 - 2.0 * self.mu * x1 * x2
-        matrix[:, 1, 1] = self.mu * (1.0 - x1 * x1)
-        return matrix
+        x1, x2 = x.T
+        rows = [np.zeros(self.count), np.ones(self.count),
+                -self.omega**2 - 2.0 * self.mu * x1 * x2, self.mu * (1.0 - x1 * x1)]
+        return np.stack(rows, axis=1).reshape(-1, 2, 2)
 
     def stiffness(self, x: Array) -> float:
         """Largest Frobenius norm of the Jacobians [1/s]."""
-        jacobian = self.jacobian(x)
-        return float(np.sqrt(np.einsum('nij,nij->n', jacobian, jacobian).max()))
+        return float(np.linalg.norm(self.jacobian(x), axis=(1, 2)).max())
 
 
 class PhaseOscillators:
@@ -204,14 +165,12 @@ class PhaseOscillators:
     rotation_invariant = True
 
     def __init__(self, count: int, omega: ArrayLike) -> None:
-        """Spread the frequencies over the oscillators."""
         self.count = count
-        self.omega = one_per_oscillator('omega', omega, count, -np.inf)
-        self._rate = self.omega[:, None]
+        self.omega = _one_per_oscillator('omega', omega, count, -np.inf)
 
     def field(self, x: Array) -> Array:
         """Rates, ndarray (N, 1), whatever the phases."""
-        return self._rate
+        return self.omega[:, None]
 
     def jacobian(self, x: Array) -> Array:
         """Zeros, ndarray (N, 1, 1)."""
@@ -237,28 +196,25 @@ class MixedOscillators:
     """
 
     def __init__(self, families: Sequence[OscillatorFamily]) -> None:
-        """Lay the families out."""
         sizes = sorted({family.state_size for family in families})
         if len(sizes) != 1:
             raise ParameterError(f'mixed oscillators need states of one size, not {sizes}')
         self.families, self.state_size = tuple(families), sizes[0]
         self.rotation_invariant = all(family.rotation_invariant for family in families)
         ends = np.cumsum([family.count for family in families])
-        self.count = int(ends[-1])
-        starts = ends - [family.count for family in families]
-        self._parts = [slice(int(a), int(b)) for a, b in zip(starts, ends, strict=True)]
+        self.count, self._starts = int(ends[-1]), ends[:-1]
 
     def field(self, x: Array) -> Array:
         """Rates, ndarray (N, n) → (N, n)."""
-        return np.concatenate([family.field(x[part]) for family, part in self._pairs()])
+        return np.concatenate([family.field(part) for family, part in self._parts(x)])
 
     def jacobian(self, x: Array) -> Array:
         """Jacobians, ndarray (N, n) → (N, n, n)."""
-        return np.concatenate([family.jacobian(x[part]) for family, part in self._pairs()])
+        return np.concatenate([family.jacobian(part) for family, part in self._parts(x)])
 
     def stiffness(self, x: Array) -> float:
         """Largest bound of the families [1/s]."""
-        return max(family.stiffness(x[part]) for family, part in self._pairs())
+        return max(family.stiffness(part) for family, part in self._parts(x))
 
-    def _pairs(self) -> zip[tuple[OscillatorFamily, slice]]:
-        return zip(self.families, self._parts, strict=True)
+    def _parts(self, x: Array) -> zip[tuple[OscillatorFamily, Array]]:
+        return zip(self.families, np.split(x, self._starts), strict=True)

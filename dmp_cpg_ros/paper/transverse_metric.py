@@ -1,7 +1,7 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The metric of Theorem 1, constructed numerically along an orbit (appendix, first part).
+The appendix: Theorem 1's metric along an orbit, and the tube in which a disturbed system stays.
 
 The paper builds M in coordinates (δz1, δz2) with δz1 = pᵀδx, p = f/|f|², along the flow and δz2
 across it. Written with covectors the construction needs no frame: along the orbit, backwards in
@@ -13,25 +13,108 @@ time, where they are stable, one integrates
 
 until they are periodic; all three vanish along f. M = ppᵀ + pmᵀ + mpᵀ + P then has
 Ṁ + AᵀM + MA = −(κM_s + 2rP): F_s is negative semidefinite of rank n − 1.
+
+In the tube inf_τ |x_d(t) − x(τ)| ≤ (R/λ) w̄ for every t > 0, where R bounds the condition number
+of Θ, M = ΘᵀΘ.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
-from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.paper.jacobians import Field
-from dmp_cpg_ros.paper.orbit import Orbit
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_contraction
+from dmp_cpg_ros.core.contraction.region import Annulus
+from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.paper.jacobians import Array, Field
 
 _MOST_PERIODS = 200
-_SETTLED = 1e-10
+_SETTLED = 1e-7
 _NEUTRAL = 1e-6  # decay per period that the integration cannot tell from none
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """States of one period, equally spaced in time; the last is one step before the first.
+
+    Attributes
+    ----------
+    states : ndarray (m, n)
+        States.
+    period : float
+        T [s].
+    """
+
+    states: Array
+    period: float
+
+    def spline(self, values: Array) -> CubicSpline:
+        """Periodic function of time of values at the states, ndarray (m, ...)."""
+        times = np.linspace(0.0, self.period, len(values) + 1)
+        return CubicSpline(times, np.append(values, values[:1], axis=0), bc_type='periodic')
+
+
+def find_orbit(field: Field, start: ArrayLike, transient: float, step: float,
+               count: int = 800) -> Orbit:
+    """Follow the flow onto an attracting orbit and once around it.
+
+    Parameters
+    ----------
+    field : callable
+        f: ndarray (n,) → ndarray (n,) [1/s].
+    start : array_like (n,)
+        State in the orbit's basin.
+    transient : float
+        Time after which the state is taken to be on the orbit [s].
+    step : float
+        Step while following; a small part of the period [s].
+    count : int
+        Number of states that are returned.
+
+    Returns
+    -------
+    Orbit
+
+    Raises
+    ------
+    DataError
+        If the state does not come back within 100,000 steps or the orbit does not close.
+    """
+    x = _flow(field, start, transient, step).y[:, -1]
+    normal, farthest = field(x), 0.0
+
+    def height(_: float, at: Array) -> float:
+        """Height over the plane through x across the flow; below it where x is far away."""
+        nonlocal farthest
+        distance = float(np.linalg.norm(at - x))
+        farthest = max(farthest, distance)
+        return float((at - x) @ normal) if distance < 0.1 * farthest else -1.0
+
+    height.direction, height.terminal = 1.0, True  # type: ignore[attr-defined]
+    returned = _flow(field, x, 1e5 * step, step, events=height).t_events[0]
+    if not returned.size:
+        raise DataError('the state did not come back to where it was within 100,000 steps')
+    period = float(returned[0])
+    states = _flow(field, x, period, step, np.linspace(0.0, period, count + 1)).y.T
+    gap = float(np.linalg.norm(states[-1] - x))
+    if not gap <= 1e-4 * float(np.ptp(states, axis=0).max()):
+        raise DataError(f'the orbit does not close: after {period:.6g} s the state is {gap:.3g} '
+                        'away; give a longer transient')
+    return Orbit(states[:-1].copy(), period)
+
+
+def _flow(field: Field, start: ArrayLike, duration: float, step: float,
+          times: Array | None = None, events: Callable[[float, Array], float] | None = None
+          ) -> Any:
+    return solve_ivp(lambda _, x: field(x), (0.0, duration), np.asarray(start, dtype=float),
+                     'DOP853', times, events=events, rtol=1e-11, atol=1e-12, max_step=step)
 
 
 @dataclass(frozen=True)
@@ -61,16 +144,6 @@ class TransverseMetric:
         return -float(self.eigenvalues[:, 1].max())
 
 
-@dataclass(frozen=True)
-class _Local:
-    """What the equations need at one instant: A, the projector across f, p and c."""
-
-    A: Array
-    across: Array
-    p: Array
-    c: Array
-
-
 def transverse_metric(field: Field, jacobian: Callable[[Array], Array], orbit: Orbit,
                       share: float = 0.5) -> TransverseMetric:
     """Construct Theorem 1's metric along an orbit.
@@ -80,109 +153,79 @@ def transverse_metric(field: Field, jacobian: Callable[[Array], Array], orbit: O
     field, jacobian : callable
         f: ndarray (n,) → ndarray (n,) and its Jacobian → ndarray (n, n) [1/s].
     orbit : Orbit
-        A closed orbit with an even number of states.
+        A closed orbit.
     share : float
         r as a share of the Floquet rate, in (0, 1).
 
     Returns
     -------
     TransverseMetric
-        At every second state of the orbit.
+        At every state of the orbit.
 
     Raises
     ------
     DataError
         If displacements across the orbit do not decay.
     """
-    local = [_local(field(x), jacobian(x)) for x in orbit.states]
     floquet = floquet_rate(jacobian, orbit)
     if not floquet * orbit.period > _NEUTRAL:
         raise DataError(f'displacements across the orbit do not decay (rate {floquet:.4g} 1/s)')
     r = share * floquet
-    Ms, m, P0, P1 = _periodic_solutions(local, orbit, r)
-    kappa = 1.0 + 2.0 * max(0.0, max(
-        _needed_scale(at.across, m_k, P0_k, P1_k)
-        for at, m_k, P0_k, P1_k in zip(local[::2], m, P0, P1, strict=True)))
+    f, A = (np.array([of(x) for x in orbit.states]) for of in (field, jacobian))
+    p = f / np.sum(f * f, axis=1, keepdims=True)
+    Af = np.einsum('tij,tj->ti', A, f)
+    p_dot = Af / np.sum(f * f, axis=1, keepdims=True) - 2.0 * p * np.sum(
+        p * Af, axis=1, keepdims=True)
+    c = p_dot + np.einsum('tji,tj->ti', A, p)
+    across = np.eye(f.shape[1]) - f[:, :, None] * p[:, None, :]
+    m, Ms, P0, P1 = _periodic_solutions(orbit, A, across, c, r)
+    kappa = 1.0 + 2.0 * max(0.0, *map(_needed_scale, across, m, P0, P1))
     P = P0 + kappa * P1
-    p = np.stack([at.p for at in local[::2]])
     pm = p[:, :, None] * m[:, None, :]
     M = p[:, :, None] * p[:, None, :] + pm + np.swapaxes(pm, 1, 2) + P
     half = np.linalg.inv(np.linalg.cholesky(M))
     Fs = -0.5 * half @ (kappa * Ms + 2.0 * r * P) @ np.swapaxes(half, 1, 2)
     eigenvalues = np.asarray(np.linalg.eigvalsh(Fs)[:, ::-1], dtype=float)
-    return TransverseMetric(orbit.states[::2].copy(), M, eigenvalues, floquet)
+    return TransverseMetric(orbit.states, M, eigenvalues, floquet)
 
 
 def floquet_rate(jacobian: Callable[[Array], Array], orbit: Orbit) -> float:
     """Slowest decay rate across an orbit: −log|second largest multiplier| / T [1/s]."""
-    h = 2.0 * orbit.period / len(orbit.states)
-    A = [jacobian(x) for x in orbit.states]
-    Phi = np.eye(orbit.states.shape[1])
-    for k in range(0, len(A), 2):
-        first, middle, last = A[k], A[k + 1], A[(k + 2) % len(A)]
-        k1 = first @ Phi
-        k2 = middle @ (Phi + 0.5 * h * k1)
-        k3 = middle @ (Phi + 0.5 * h * k2)
-        Phi = Phi + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + last @ (Phi + h * k3))
+    n, A = orbit.states.shape[1], orbit.spline(np.array([jacobian(x) for x in orbit.states]))
+    Phi = solve_ivp(lambda t, y: (A(t) @ y.reshape(n, n)).ravel(), (0.0, orbit.period),
+                    np.eye(n).ravel(), 'DOP853', rtol=1e-10, atol=1e-12).y[:, -1].reshape(n, n)
     multipliers = np.linalg.eigvals(Phi)
-    along = int(np.argmin(np.abs(multipliers - 1.0)))
-    others = np.abs(np.delete(multipliers, along))
+    others = np.abs(np.delete(multipliers, np.argmin(np.abs(multipliers - 1.0))))
     return -float(np.log(max(others.max(), 1e-300))) / orbit.period
 
 
-def _local(f: Array, A: Array) -> _Local:
-    squared = float(f @ f)
-    p = f / squared
-    p_dot = A @ f / squared - 2.0 * f * float(f @ A @ f) / squared**2
-    return _Local(A, np.eye(len(f)) - np.outer(f, f) / squared, p, p_dot + A.T @ p)
+def _periodic_solutions(orbit: Orbit, A: Array, across: Array, c: Array, r: float
+                        ) -> tuple[Array, ...]:
+    """m, M_s and P = P0 + κP1 at the states, by integrating backwards until they are periodic."""
+    count, n = c.shape
+    local = orbit.spline(np.concatenate([A, across, c[:, :, None]], axis=2))
 
+    def projected(y: Array, E: Array) -> tuple[Array, Array]:
+        """Parts m (n,) and M_s, P0, P1 (3, n, n), without what rounding adds along f."""
+        return E @ y[:n], E @ y[n:].reshape(3, n, n) @ E
 
-def _periodic_solutions(local: list[_Local], orbit: Orbit, r: float
-                        ) -> tuple[Array, Array, Array, Array]:
-    """M_s, m and P = P0 + κP1 at every second state, by integrating backwards until periodic."""
-    count, n = len(local), orbit.states.shape[1]
-    h = 2.0 * orbit.period / count
-    y = (np.zeros((n, n)), np.zeros(n), np.zeros((n, n)), np.zeros((n, n)))
-    history: list[tuple[Array, ...]] = []
+    def slope(back: float, y: Array) -> Array:
+        at = local(-back)
+        A, E, c = at[:, :n], at[:, n:-1], at[:, -1]
+        m, S = projected(y, E)
+        mc = np.outer(m, c)
+        source = np.stack([E, 2.0 * r * S[1] + mc + mc.T, 2.0 * r * S[2] + S[0]])
+        return np.append(A.T @ m + c, A.T @ S + S @ A + source)
+
+    times, y = np.linspace(0.0, orbit.period, count + 1), np.zeros(n + 3 * n * n)
     for _ in range(_MOST_PERIODS):
-        former, history = history, []
-        for k in range(count, 0, -2):
-            y = _step_back(y, local[k % count], local[k - 1], local[k - 2], h, r)
-            history.append(y)
-        if former and all(_settled(new, old) for new, old in zip(
-                history[-1], former[-1], strict=True)):
+        run = solve_ivp(slope, (0.0, orbit.period), y, 'DOP853', times, rtol=1e-9, atol=1e-11).y
+        former, y = y, np.append(*projected(run[:, -1], across[0]))
+        if np.allclose(y, former, _SETTLED, _SETTLED):
             break
-    history.reverse()                                       # now at the states 0, 2, 4, …
-    Ms, m, P0, P1 = (np.stack([entry[i] for entry in history]) for i in range(4))
-    return Ms, m, P0, P1
-
-
-def _step_back(y: tuple[Array, ...], last: _Local, middle: _Local, first: _Local, h: float,
-               r: float) -> tuple[Array, Array, Array, Array]:
-    """One classical Runge-Kutta step from the end of an interval to its beginning."""
-    def slope(at: _Local, y: tuple[Array, ...]) -> tuple[Array, ...]:
-        Ms, m, P0, P1 = y
-        mc = np.outer(m, at.c)
-        return (at.A.T @ Ms + Ms @ at.A + at.across, at.A.T @ m + at.c,
-                at.A.T @ P0 + P0 @ at.A + 2.0 * r * P0 + mc + mc.T,
-                at.A.T @ P1 + P1 @ at.A + 2.0 * r * P1 + Ms)
-
-    def moved(by: float, slopes: tuple[Array, ...]) -> tuple[Array, ...]:
-        return tuple(value + by * change for value, change in zip(y, slopes, strict=True))
-
-    k1 = slope(last, y)
-    k2 = slope(middle, moved(0.5 * h, k1))
-    k3 = slope(middle, moved(0.5 * h, k2))
-    k4 = slope(first, moved(h, k3))
-    Ms, m, P0, P1 = (value + h / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-                     for value, a, b, c, d in zip(y, k1, k2, k3, k4, strict=True))
-    # Exactly, all four vanish along f; rounding would grow there.
-    E = first.across
-    return E @ Ms @ E, E @ m, E @ P0 @ E, E @ P1 @ E
-
-
-def _settled(new: Array, old: Array) -> bool:
-    return float(np.abs(new - old).max()) <= _SETTLED * (1.0 + float(np.abs(new).max()))
+    # backwards in time the last row is of state 0, the one before of state 1, …
+    m, S = zip(*map(projected, run[:, :0:-1].T, across), strict=True)
+    return np.array(m), *np.stack(S, axis=1)
 
 
 def _needed_scale(across: Array, m: Array, P0: Array, P1: Array) -> float:
@@ -191,3 +234,60 @@ def _needed_scale(across: Array, m: Array, P0: Array, P1: Array) -> float:
     half = np.linalg.inv(np.linalg.cholesky(basis.T @ P1 @ basis))
     lacking = basis.T @ (np.outer(m, m) - P0) @ basis
     return float(np.linalg.eigvalsh(half @ lacking @ half.T)[-1])
+
+
+def metric_condition(metrics: ArrayLike) -> float:
+    """R = sup ‖Θ‖ / inf σ_min(Θ) over metrics M = ΘᵀΘ, array_like (..., n, n)."""
+    eigenvalues = np.linalg.eigvalsh(np.asarray(metrics, dtype=float))
+    if not eigenvalues.min() > 0.0:
+        raise ParameterError('a metric must be positive definite everywhere')
+    return float(np.sqrt(eigenvalues.max() / eigenvalues.min()))
+
+
+def tube_radius(rate: float, condition: float, disturbance: float) -> float:
+    """(R/λ) w̄, the radius of the tube around the undisturbed trajectory.
+
+    Parameters
+    ----------
+    rate : float
+        Transverse contraction rate λ > 0 [1/s]; ParameterError if it is not.
+    condition : float
+        R ≥ 1 of the metric.
+    disturbance : float
+        w̄ ≥ |w(t)| [1/s].
+    """
+    if not rate > 0.0:
+        raise ParameterError(f'rate = {rate!r} 1/s must be positive for a tube to exist')
+    return condition / rate * disturbance
+
+
+def hopf_tube(oscillator: AndronovHopf, omega: float, disturbance: float
+              ) -> tuple[float, Annulus] | None:
+    """Tube of one Andronov-Hopf oscillator, with the annulus K that it is valid in.
+
+    Parameters
+    ----------
+    oscillator : AndronovHopf
+        Oscillator.
+    omega : float
+        Angular frequency > 0 [rad/s].
+    disturbance : float
+        w̄ [1/s].
+
+    Returns
+    -------
+    radius : float
+        Of the tube around the trajectory.
+    annulus : Annulus
+        The smallest annulus around the cycle that the disturbed state cannot leave; None for both
+        when the disturbance can push the state through the origin.
+    """
+    rho, r = float(oscillator.rho), float(oscillator.radius)
+    if disturbance >= rho * 2.0 * r**3 / (3.0 * 3.0**0.5):
+        return None
+    # ρ(r² − s²)s = w̄ between its maximum at r/√3 and r; −ρ(r² − s²)s = w̄ beyond r.
+    inner, outer = (float(np.roots([1.0, 0.0, -r * r, w / rho]).real.max())
+                    for w in (disturbance, -disturbance))
+    annulus = Annulus(inner, max(outer, inner))
+    rate = transverse_contraction(oscillator, omega, annulus).rate
+    return tube_radius(rate, annulus.outer / annulus.inner, disturbance), annulus

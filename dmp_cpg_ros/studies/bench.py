@@ -19,36 +19,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 import rclpy
 from geometry_msgs.msg import TwistStamped
-from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
-from dmp_cpg_ros.core.canonical.graph import CouplingGraph, Edges, graph_from_edges, topology
-from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.graph import Edges, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
 from dmp_cpg_ros.core.inhibition.supervisor import predict
-from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.loop import Array, WalkingLoop
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.transformation.leg import LegFeedback
+from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
-from dmp_cpg_ros.nodes.messages.conversions import (
-    PostureFeedbackReader,
-    PostureFeedbackWriter,
-    ReferenceWriter,
-    read_reference,
-)
-from dmp_cpg_ros.paper.coupling import Coupling, EdgeCoupling, MeanFieldCoupling
-from dmp_cpg_ros.paper.network import OscillatorNetwork
+from dmp_cpg_ros.paper import network as networks
 from dmp_cpg_ros.paper.oscillators import HopfOscillators
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.loop_recording import LoopRun
 from dmp_cpg_ros.studies.output import parser_of, write_results
+from dmp_cpg_ros.studies.tightness import network
 from dmp_cpg_ros.suite import load_suite
-
-Array = NDArray[np.float64]
 
 TICK, OMEGA, GAIN = 0.004, 9.0, 100.0
 """Tick [s], angular frequency [rad/s] and sum of the gains at each node [1/s] of the networks."""
@@ -97,11 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def steps_of_four() -> list[Row]:
     """Time steps of the gait's network, and of what else could be done."""
-    phases = -2.0 * np.pi * np.array([0.0, 0.5, 0.75, 0.25])
-    graph = graph_from_edges(4, topology('all_to_all', 4), GAIN, phases)
-    of = CanonicalSystem(graph, AndronovHopf(8.0), state_at(phases))
-    general = OscillatorNetwork(HopfOscillators(4, OMEGA), EdgeCoupling(graph), state_at(phases))
-    x, free, held = state_at(phases + 0.5), np.zeros(4), np.array([400.0, 0.0, 0.0, 0.0])
+    of = network('all_to_all', GAIN)
+    coupling = networks.EdgeCoupling(of.graph)
+    general = networks.OscillatorNetwork(HopfOscillators(4, OMEGA), coupling, of.target)
+    x, free, held = state_at(of.graph.phases + 0.5), np.zeros(4), 400.0 * np.eye(4)[0]
     return _with_ratios([
         ('exponential step (core/canonical/system.py)', lambda: of.step(x, OMEGA, free, TICK)),
         ('the same, inhibited', lambda: of.step(x, OMEGA, held, TICK)),
@@ -113,14 +104,14 @@ def steps_of_four() -> list[Row]:
 
 def steps_of_many(sizes: Sequence[int]) -> list[Row]:
     """Time steps of growing networks, divided by the number of oscillators."""
-    kinds: dict[str, Callable[[int], Coupling]] = {
-        'ring': lambda n: EdgeCoupling(_graph(n, topology('ring', n))),
-        'random, 6 neighbours': lambda n: EdgeCoupling(_graph(n, _random_edges(n))),
-        'all to all': lambda n: MeanFieldCoupling(n, GAIN / n),
+    kinds: dict[str, Callable[[int], networks.Coupling]] = {
+        'ring': lambda n: _over(n, topology('ring', n)),
+        'random, 6 neighbours': lambda n: _over(n, _random_edges(n)),
+        'all to all': lambda n: networks.MeanFieldCoupling(n, GAIN / n),
     }
     rows = []
     for kind, coupling in kinds.items():
-        seconds = {size: _step_time(size, coupling(size)) / size for size in {*sizes, 1000}}
+        seconds = {size: _step_time(coupling(size)) for size in {*sizes, 1000}}
         rows += [Row(f'{kind}, {size:,}', seconds[size], seconds[size] / seconds[1000])
                  for size in sizes]
     return rows
@@ -130,17 +121,17 @@ def parts_of_a_tick() -> list[Row]:
     """Parts of the plain loop on the walking robot, and the prediction of a stop."""
     suite = load_suite(overrides={'cmd_vel_timeout': 0.0})
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
-    loop, state = WalkingLoop(robot.description, suite.gait, suite.parameters), robot.reset()
+    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
     loop.command(0.5)
-    for _ in range(500):
-        state = robot.step(loop.tick(state).targets)
-    x, r, dt, zero = loop.x, loop.r, suite.tick_ns * 1e-9, np.zeros(3)
+    run = LoopRun(robot, loop)
+    run.tick(500 * run.tick_s)
+    state, x, r, dt, zero = run.state, loop.x, loop.r, run.tick_s, np.zeros(3)
     x_dot = loop.network.rate(x, r, loop.inhibition)
     stopping = loop.supervisor.request(loop.stop, True)
-    leg, command = loop.legs[0].primitive, (0.5, 0.0, 0.0)
-    network, gait = loop.network, loop.canon.gait
+    leg, command, gait = loop.legs[0].primitive, (0.5, 0.0, 0.0), loop.canon.gait
     estimator = BodyEstimator(robot.description, suite.parameters.estimation)
     known, readings = loop.estimator_state, readings_of(state)
+    balance, of_leg = loop.posture.balance, loop.leg_states[0].leg
     asked = LegFeedback(state.joint_position[:3], zero, zero[:2], zero)
 
     def tick() -> None:
@@ -153,12 +144,10 @@ def parts_of_a_tick() -> list[Row]:
         ('reference', lambda: loop.reference.step(r, zero, dt)),
         ('oscillators', lambda: loop.network.step(x, r, loop.inhibition, dt)),
         ('state of the stop', lambda: loop.supervisor.step(
-            loop.stop, loop.stop.time_ns, network, x, x_dot, r, command)),
+            loop.stop, loop.stop.time_ns, loop.network, x, x_dot, r, command)),
         ('estimate of the body', lambda: estimator.step(known, readings)),
-        ('balance', lambda: loop.body.posture.step(
-            loop.posture.balance, state, gait, x, x_dot, r, dt)),
-        ('one leg', lambda: leg.step(
-            loop.leg_states[0].leg, gait, x[0], x_dot[0], r, asked, dt)),
+        ('balance', lambda: loop.body.posture.step(balance, state, gait, x, x_dot, r, dt)),
+        ('one leg', lambda: leg.step(of_leg, gait, x[0], x_dot[0], r, asked, dt)),
         ('prediction of a stop', lambda: predict(
             loop.supervisor, loop.reference, loop.canonical, stopping, loop.inhibition, loop.canon,
             r, command, dt)),
@@ -167,15 +156,14 @@ def parts_of_a_tick() -> list[Row]:
 
 def messages() -> list[Row]:
     """Reading and writing by the suite, rclpy and rosbags; and what one message more costs."""
-    writer, reader, feedback = PostureFeedbackWriter(), PostureFeedbackReader(), PostureFeedback(
-        np.ones(12), np.ones((4, 3)), np.ones((4, 2)), np.ones(3))
+    writer, reader = conversions.PostureFeedbackWriter(), conversions.PostureFeedbackReader()
+    feedback = PostureFeedback(np.ones(12), np.ones((4, 3)), np.ones((4, 2)), np.ones(3))
     data, read = writer.fill(0, feedback).serialized, serialized_reader(JointState)
     message, store = deserialize_message(data, JointState), get_typestore(Stores.ROS2_JAZZY)
-    kind, twist_kind = (f'{package}/msg/{name}' for package, name in (
-        ('sensor_msgs', 'JointState'), ('geometry_msgs', 'TwistStamped')))
-    other, r = store.deserialize_cdr(data, kind), np.ones(3)
-    twist_writer, read_twist = ReferenceWriter(), serialized_reader(TwistStamped)
-    twist = twist_writer.fill(0, r).serialized
+    kind, twist_kind = (f'{of.__module__.split(".")[0]}/msg/{of.__name__}'
+                        for of in (JointState, TwistStamped))
+    other, read_twist = store.deserialize_cdr(data, kind), serialized_reader(TwistStamped)
+    twist = conversions.ReferenceWriter().fill(0, np.ones(3)).serialized
     with rclpy.context.Context() as context:
         node = rclpy.create_node('bench', context=context, enable_rosout=False)
         publisher = node.create_publisher(JointState, 'bench', 10)
@@ -205,8 +193,8 @@ def messages() -> list[Row]:
             ('write and publish posture_feedback', lambda: publisher.publish(
                 writer.fill(0, feedback).serialized)),
             ('fill and publish it by rclpy', fill_by_rclpy),
-            ('read reference', lambda: read_reference(read_twist(twist))),
-            ('the same by rclpy', lambda: read_reference(
+            ('read reference', lambda: conversions.read_reference(read_twist(twist))),
+            ('the same by rclpy', lambda: conversions.read_reference(
                 deserialize_message(twist, TwistStamped))),
             ('the same by rosbags', lambda: store.deserialize_cdr(twist, twist_kind)),
             ('deliver one message to four readers', deliver),
@@ -229,15 +217,15 @@ def _with_ratios(cases: Sequence[tuple[str, Callable[[], object]]]) -> list[Row]
             for (name, _), own in zip(cases, seconds, strict=True)]
 
 
-def _step_time(size: int, coupling: Coupling) -> float:
-    rng = np.random.default_rng(0)
-    of = OscillatorNetwork(HopfOscillators(size, rng.uniform(8.0, 10.0, size)), coupling)
+def _step_time(coupling: networks.Coupling) -> float:
+    rng, size = np.random.default_rng(0), coupling.count
+    of = networks.OscillatorNetwork(HopfOscillators(size, rng.uniform(8.0, 10.0, size)), coupling)
     x = state_at(rng.uniform(-np.pi, np.pi, size))
-    return seconds_of(lambda: of.step(x, TICK))
+    return seconds_of(lambda: of.step(x, TICK)) / size
 
 
-def _graph(size: int, edges: Edges) -> CouplingGraph:
-    return graph_from_edges(size, edges, GAIN * size / max(len(edges), 1))
+def _over(size: int, edges: Edges) -> networks.EdgeCoupling:
+    return networks.EdgeCoupling(graph_from_edges(size, edges, GAIN * size / max(len(edges), 1)))
 
 
 def _random_edges(size: int) -> Edges:

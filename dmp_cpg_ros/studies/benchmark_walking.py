@@ -13,48 +13,336 @@ The robot is the MuJoCo one in the plain loop, which is identical to the nodes i
 
 from __future__ import annotations
 
-import argparse
 import sys
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, astuple, dataclass
+from itertools import product
+from math import isnan, nan, pi
 from multiprocessing import Pool
+from multiprocessing.pool import Pool as Processes
+from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.commands.ros_arguments import parse_arguments
-from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.studies import benchmark_tables
-from dmp_cpg_ros.studies.output import at_least_one, parser_of, write_results
+import numpy as np
 
-TABLES = ('speeds', 'pushes', 'rough', 'contacts', 'gaits', 'robots')
-"""What can be measured."""
+from dmp_cpg_ros.analysis.stop_outcome import StopSummary
+from dmp_cpg_ros.commands.ros_arguments import parse_arguments
+from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies import output
+from dmp_cpg_ros.studies import walking_trials as trials
+from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
+from dmp_cpg_ros.suite import load_gaits, load_suite
+
+Results = list[tuple[Any, Any]]
+"""Cases with their outcomes."""
+
+DIRECTIONS = {'ahead': 0.0, 'ahead left': 0.25 * pi, 'left': 0.5 * pi, 'back left': 0.75 * pi,
+              'back': pi, 'back right': 1.25 * pi, 'right': 1.5 * pi, 'ahead right': 1.75 * pi}
+"""Directions of the pushes [rad]."""
+
+PUSHED = (('amble', 0.5), ('trot', 0.5), ('trot', 1.0))
+"""Gaits and speeds that are pushed."""
+
+ROUGH = (('blocks', 'height', 0.05), ('slope', 'degrees', 15.0), ('slope', 'degrees', -15.0),
+         ('steps', 'height', 0.08), ('low_friction', 'friction', 0.3))
+"""Grounds that are crossed: worlds with one of their parameters."""
+
+ROUGH_GAITS = ('amble', 'trot')
+
+FELT_GROUNDS = (('blocks', 'height', 0.03), ('blocks', 'height', 0.05), ('blocks', 'height', 0.07),
+                ('steps', 'height', 0.05), ('steps', 'height', 0.08))
+"""Grounds that are crossed with and without feeling them."""
+
+FEELING: dict[trials.Values, str] = {
+    (('contact_feedback', felt), ('stumble_lift', lift)): words for felt, lift, words in (
+        (False, 0.0, 'nothing'), (True, 0.0, 'touchdown, in the phase'),
+        (False, 0.13, 'obstacles, in the swing'), (True, 0.13, 'both'))}
+"""Parameters, and what they make the legs feel."""
+
+STRAIGHT = {
+    'amble': (0.1, 0.2, 0.5, 0.8, 1.0, 1.25, 1.5), 'walk': (0.1, 0.2, 0.5, 0.8),
+    'trot': (0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0), 'pace': (0.2, 0.5, 0.8),
+    'bound': (0.2, 0.5, 0.8), 'pronk': (0.2, 0.5, 0.8)}
+"""Speeds forwards of the table ``speeds`` by gait [m/s]."""
+
+OTHERS: tuple[tuple[str, trials.Velocity], ...] = (
+    ('amble', (-0.3, 0.0, 0.0)), ('trot', (-0.5, 0.0, 0.0)), ('amble', (0.0, 0.3, 0.0)),
+    ('trot', (0.0, 0.5, 0.0)), ('amble', (0.0, 0.0, 1.0)), ('trot', (0.0, 0.0, 1.0)),
+    ('trot', (0.0, 0.0, 2.0)), ('amble', (0.5, 0.0, 0.5)), ('trot', (1.0, 0.0, 1.0)))
+"""Velocities of the table ``speeds`` that are not straight ahead."""
+
+ROBOTS = tuple(f'robots/{name}.yaml' for name in
+               ('mini_quadruped', 'mini_cheetah', 'go1', 'go2', 'aliengo'))
+"""Robots by their files; all but the first need the extra ``robots``."""
+
+SIDES = (0.5 * pi, 1.5 * pi)
+"""Directions of the pushes of each robot [rad]."""
+
+TOP_SPEEDS = (1.0, 1.5, 2.0, 2.5, 3.0)
+"""Speeds that are tried in a trot, one after the other [m/s]."""
+
+TOP_ERROR = 0.05
+"""Share of the commanded speed that counts as having reached it."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table and what it was made of."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    results: Results
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the benchmark and print its tables; returns the exit status."""
-    options, _ = parse_arguments(_parser(), arguments)
+    parser = output.parser_of('benchmark_walking', __doc__, 'every case and outcome')
+    parser.add_argument('--tables', nargs='+', choices=list(TABLES), default=list(TABLES),
+                        metavar='TABLE', help=f'which of {", ".join(TABLES)} (default: all)')
+    parser.add_argument('--seeds', type=output.at_least_one, default=50, metavar='N',
+                        help='seeds for each rough ground (default: 50)')
+    parser.add_argument('--phases', type=output.at_least_one, default=16, metavar='N',
+                        help='phases of the pushes, evenly over a cycle (default: 16)')
+    options, _ = parse_arguments(parser, arguments)
     results: dict[str, Any] = {}
     with Pool(options.jobs) as pool:
         for name in options.tables:
             try:
-                table = getattr(benchmark_tables, name)(pool, options.seeds, options.phases)
+                table = TABLES[name](pool, options.seeds, options.phases)
             except DmpCpgError as error:
                 print(f'benchmark_walking: {error}', file=sys.stderr)
                 return 2
-            print(f'{table.title}\n\n{table.text}\n', flush=True)
+            print(f'{table.title}\n\n{output.markdown_table(table.columns, table.rows)}\n',
+                  flush=True)
             results[name] = [asdict(case) | asdict(outcome) for case, outcome in table.results]
-    write_results(options.json, results)
+    output.write_results(options.json, results)
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = parser_of('benchmark_walking', __doc__, 'every case and outcome')
-    parser.add_argument('--tables', nargs='+', choices=TABLES, default=list(TABLES),
-                        metavar='TABLE', help=f'which of {", ".join(TABLES)} (default: all)')
-    parser.add_argument('--seeds', type=at_least_one, default=50, metavar='N',
-                        help='seeds for each rough ground (default: 50)')
-    parser.add_argument('--phases', type=at_least_one, default=16, metavar='N',
-                        help='phases of the pushes, evenly over a cycle (default: 16)')
-    return parser
+def _run(pool: Processes, trial: Callable[[Any], Any], cases: Sequence[Any], chunk: int = 1
+         ) -> Results:
+    """Cases with their outcomes, on several processes."""
+    return list(zip(cases, pool.map(trial, cases, chunksize=chunk), strict=True))
+
+
+@dataclass(frozen=True)
+class SpeedCase:
+    """A velocity to hold: v_x, v_y [m/s], γ [rad/s]; robot None is the suite's own."""
+
+    gait: str
+    velocity: trials.Velocity
+    robot: str | None = None
+
+
+def speeds(pool: Processes, seeds: int, phases: int) -> Table:
+    """Steady velocities in all gaits."""
+    straight = [SpeedCase(gait, (v, 0.0, 0.0)) for gait, vs in STRAIGHT.items() for v in vs]
+    results = _run(pool, _steady, straight + [SpeedCase(*other) for other in OTHERS])
+    rows = [(case.gait, _velocity(case.velocity), *steady_cells(case.velocity, outcome))
+            for case, outcome in results]
+    return Table('Speeds', ('gait', 'asked m/s, rad/s', 'reached', 'error %',
+                            'yaw drift deg/10 m', 'cost of transport'), rows, results)
+
+
+def _steady(case: SpeedCase) -> trials.SteadyOutcome:
+    return trials.steady(*astuple(case))
+
+
+def steady_cells(velocity: trials.Velocity, outcome: trials.SteadyOutcome) -> tuple[str, ...]:
+    """Cells of one held velocity: reached, error, yaw drift, cost of transport."""
+    if outcome.fell:
+        return 'fell', '-', '-', '-'
+    error = 100.0 * trials.relative_error(outcome, velocity)
+    return (_velocity(outcome.velocity, 3), _number(error, 1), _number(outcome.yaw_drift, 2),
+            _number(outcome.cost_of_transport, 2))
+
+
+def _velocity(velocity: trials.Velocity, digits: int = 2) -> str:
+    return ', '.join(f'{value:.{digits}f}' for value in velocity)
+
+
+def _number(value: float, digits: int) -> str:
+    return '-' if isnan(value) else f'{value:.{digits}f}'
+
+
+def pushes(pool: Processes, seeds: int, phases: int) -> Table:
+    """Largest pushes survived, the least and the median over the phases."""
+    results = _run(pool, trials.survived_pushes, [
+        trials.PushCase(*walking, i / phases, tuple(DIRECTIONS.values()))
+        for walking, i in product(PUSHED, range(phases))])
+    rows = []
+    for gait, speed in PUSHED:
+        of = np.array([outcome.speed_change for case, outcome in results
+                       if (case.gait, case.speed) == (gait, speed)])
+        rows.append((f'{gait} {speed:g} m/s', *(
+            f'{low:.1f} / {middle:.1f}'
+            for low, middle in zip(of.min(axis=0), np.median(of, axis=0), strict=True))))
+    return Table(f'Pushes: speed change in m/s that is survived at every one of {phases} phases / '
+                 'at half of them; times the mass it is the impulse in N s',
+                 ('walking', *DIRECTIONS), rows, results)
+
+
+def rough(pool: Processes, seeds: int, phases: int) -> Table:
+    """Share of the seeds that cross each ground."""
+    results, rows = _crossings(pool, seeds, product(ROUGH, ROUGH_GAITS, [()])), []
+    for case, words, of, shares in _groups(results, seeds):
+        times = [outcome.time for outcome in of if outcome.crossed]
+        rows.append((case.kind, words, case.gait, *shares,
+                     f'{np.median(times):.1f}' if times else '-'))
+    return Table('Rough ground, blind, at 0.5 m/s within a tenth', (
+        'ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s'), rows, results)
+
+
+def contacts(pool: Processes, seeds: int, phases: int) -> Table:
+    """Crossings of rough ground with each of ``FEELING``."""
+    results, rows = _crossings(pool, seeds, product(FELT_GROUNDS, ROUGH_GAITS, FEELING)), []
+    for case, words, of, shares in _groups(results, seeds):
+        rows.append((f'{case.kind}, {words}', case.gait, FEELING[case.values], *shares,
+                     f'{np.mean([outcome.distance for outcome in of]):.2f}',
+                     f'{np.mean([outcome.distance / outcome.time for outcome in of]):.3f}',
+                     f'{np.nanmean([outcome.tilt for outcome in of]):.2f}'))
+    return Table('Feeling the ground, blind, at 0.5 m/s within a tenth',
+                 ('ground', 'gait', 'feels', 'seeds', 'crossed 5 m', 'fell', 'mean distance m',
+                  'mean speed m/s', 'tilt rms deg'), rows, results)
+
+
+def _crossings(pool: Processes, seeds: int, walks: Iterator[tuple[Any, ...]]) -> Results:
+    """Crossings of ground, gait and parameters with every seed, the seeds innermost."""
+    return _run(pool, trials.cross, [
+        trials.CrossingCase(gait, kind, ((name, number),), seed, values=values)
+        for ((kind, name, number), gait, values), seed in product(walks, range(seeds))], 2)
+
+
+def _groups(results: Results, seeds: int) -> Iterator[tuple[
+        trials.CrossingCase, str, list[trials.CrossingOutcome], tuple[str, str, str]]]:
+    """One case of all seeds, the ground's numbers in words, the outcomes, and how many crossed."""
+    for i in range(0, len(results), seeds):
+        case, of = results[i][0], [outcome for _, outcome in results[i:i + seeds]]
+        words = ', '.join(f'{name} {value:g}' for name, value in case.numbers)
+        crossed, fell = (sum(getattr(outcome, what) for outcome in of)
+                         for what in ('crossed', 'fell'))
+        yield case, words, of, (str(seeds), output.percent(crossed, seeds), str(fell))
+
+
+def gaits(pool: Processes, seeds: int, phases: int) -> Table:
+    """Every ordered pair of gaits changed while moving, at a quarter of the phases."""
+    walks = _run(pool, trials.run_changes, [
+        trials.ChangeCase(before, speed, max(1, phases // 4))
+        for before, speed in product(load_gaits(), trials.CHANGE_SPEEDS)])
+    results = [(case, one) for case, of in walks for one in of]
+    rows = []
+    for before, after in sorted({(case.before, one.after) for case, one in results}):
+        of = [one for case, one in results if (case.before, one.after) == (before, after)]
+        upright = [one for one in of if not one.fell]
+        worst = [f'{max(getattr(one, name) for one in upright):{form}}' if upright else '-'
+                 for name, form in (('duration', '.2f'), ('cycles', '.1f'),
+                                    ('phase_error', '.1e'), ('sway', '.0f'))]
+        rows.append((f'{before} to {after}', str(len(of)), str(len(of) - len(upright)),
+                     str(sum(one.in_time for one in upright)), *worst))
+    asked = ' and '.join(map(str, trials.CHANGE_SPEEDS))
+    return Table(f'Gaits changed while walking, at {asked} m/s',
+                 ('change', 'cases', 'fell', 'phase error in bound 3 cycles after', 'longest s',
+                  'in cycles', 'largest phase error rad', 'largest roll or pitch deg'),
+                 rows, results)
+
+
+@dataclass(frozen=True)
+class RobotCase:
+    """A robot by its file, and the number of phases of its stops and pushes."""
+
+    file: str
+    phases: int
+
+
+@dataclass(frozen=True)
+class RobotOutcome:
+    """What a robot did.
+
+    Attributes
+    ----------
+    mass : float
+        [kg]
+    amble, trot : SteadyOutcome
+        At 0.5 and 1 m/s.
+    top_speed : float
+        Fastest trot of ``TOP_SPEEDS`` that was reached [m/s]; NaN if none was.
+    stops, stood, walked_on, stop_falls : int
+        Stops from an amble at 0.5 m/s, and what became of them.
+    pushed : float
+        Sideways speed change survived at every phase of the amble at 0.5 m/s [m/s].
+    """
+
+    mass: float
+    amble: trials.SteadyOutcome
+    trot: trials.SteadyOutcome
+    top_speed: float
+    stops: int
+    stood: int
+    walked_on: int
+    stop_falls: int
+    pushed: float
+
+
+def run_robot(case: RobotCase) -> RobotOutcome:
+    """Walk, trot faster and faster, stop, start, and be pushed."""
+    # a zero command is no request here, but the first command starts the gait
+    suite = load_suite(None, {'robot': case.file, 'cmd_vel_timeout': 0.0})
+    robot = MujocoRobot(suite.robot_file, suite.tick_ns)
+    phases = [i / case.phases for i in range(case.phases)]
+    stops = StopSummary(list(run_trials(
+        robot, [StopCase('amble', 0.5, phase) for phase in phases], suite.parameters)))
+    stood, walked_on, fell = map(stops.number, ('standing', 'walked_on', 'fell'))
+    pushed = [trials.survived_pushes(trials.PushCase('amble', 0.5, phase, SIDES), case.file)
+              for phase in phases]
+    return RobotOutcome(
+        robot.description.mass, trials.steady('amble', (0.5, 0.0, 0.0), case.file),
+        trials.steady('trot', (1.0, 0.0, 0.0), case.file), _top_speed(case.file),
+        len(phases), stood, walked_on, fell,
+        min(change for outcome in pushed for change in outcome.speed_change))
+
+
+def _top_speed(file: str) -> float:
+    """Fastest trot that is reached within ``TOP_ERROR``, trying faster ones until one is not."""
+    top = nan
+    for speed in TOP_SPEEDS:
+        velocity = (speed, 0.0, 0.0)
+        error = trials.relative_error(trials.steady('trot', velocity, file), velocity)
+        if not error <= TOP_ERROR:
+            break
+        top = speed
+    return top
+
+
+def robots(pool: Processes, seeds: int, phases: int) -> Table:
+    """All robots that are there, with their files alone."""
+    results = _run(
+        pool, run_robot, [RobotCase(file, phases) for file in ROBOTS if _is_there(file)])
+    rows = []
+    for case, of in results:
+        amble, trot = (steady_cells((v, 0.0, 0.0), outcome)
+                       for v, outcome in ((0.5, of.amble), (1.0, of.trot)))
+        rows.append((Path(case.file).stem, f'{of.mass:.1f}', amble[1], amble[3], trot[1], trot[3],
+                     _number(of.top_speed, 1), f'{of.stood}/{of.stops}',
+                     f'{of.walked_on}/{of.stops}', str(of.stop_falls), _number(of.pushed, 1)))
+    return Table('Robots; CoT is positive joint work over m g d, the push is survived at every '
+                 'phase of the amble',
+                 ('robot', 'kg', 'amble 0.5 m/s: error %', 'CoT', 'trot 1 m/s: error %', 'CoT',
+                  'top trot m/s', 'stood', 'walked on', 'fell', 'push sideways m/s'),
+                 rows, results)
+
+
+def _is_there(file: str) -> bool:
+    try:
+        MujocoRobot(trials.suite_of(file, 'amble').robot_file)
+    except MissingFileError:
+        return False
+    return True
+
+
+TABLES = {make.__name__: make for make in (speeds, pushes, rough, contacts, gaits, robots)}
+"""What can be measured."""
 
 
 if __name__ == '__main__':

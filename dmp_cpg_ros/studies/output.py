@@ -15,11 +15,15 @@ from dmp_cpg_ros.analysis.strict_json import write_json
 
 def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Markdown table with columns of even width, from headings and one cell per column."""
-    widths = [max(len(row[i]) for row in (columns, *rows)) for i in range(len(columns))]
+    widths = [max(map(len, cells)) for cells in zip(columns, *rows, strict=True)]
     rule = ['-' * width for width in widths]
-    return '\n'.join(
-        f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |"
-        for row in (columns, rule, *rows))
+    return '\n'.join(f"| {' | '.join(map(str.ljust, row, widths))} |"
+                     for row in (columns, rule, *rows))
+
+
+def percent(part: float, whole: float) -> str:
+    """Share as a cell; of nothing it is 0 %."""
+    return f'{100.0 * part / max(whole, 1):.0f} %'
 
 
 def at_least_one(text: str) -> int:

@@ -32,7 +32,11 @@ INHIBITED_AT, RELEASED_AT, END = 4.0, 8.1, 11.0
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw and write; returns the exit status."""
-    options = _parser().parse_args(arguments)
+    parser = argparse.ArgumentParser(prog='paper_figures', description=__doc__)
+    parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
+    parser.add_argument('--out', type=Path, default=Path('paper_figures'), metavar='DIR',
+                        help='folder for the PNG files (default: paper_figures)')
+    options = parser.parse_args(arguments)
     try:
         suite = load_suite(options.file, {'cmd_vel_timeout': 0.0})
         options.out.mkdir(parents=True, exist_ok=True)
@@ -81,14 +85,6 @@ def experiment(suite: Suite, robot: MujocoRobot) -> Recording:
         ticks.append(loop.tick(state))
         state = robot.step(ticks[-1].targets)
     return recording_of(states, ticks)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='paper_figures', description=__doc__)
-    parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
-    parser.add_argument('--out', type=Path, default=Path('paper_figures'), metavar='DIR',
-                        help='folder for the PNG files (default: paper_figures)')
-    return parser
 
 
 if __name__ == '__main__':

@@ -23,8 +23,8 @@ from dmp_cpg_ros.commands.ros_arguments import parse_arguments
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.loop_run import LoopRun
-from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.loop_recording import LoopRun
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, percent, write_results
 from dmp_cpg_ros.suite import load_suite
 
 OWN_ROBOT = 'robots/mini_quadruped.yaml'
@@ -87,50 +87,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run_of(robot: str, start_pose: str, start_mode: str, seed: int = 0) -> LoopRun[WalkingLoop]:
-    """Make a robot that lies or has fallen, and its loop."""
+    """Make a robot that lies or has fallen and has come to rest, and its loop."""
     suite = load_suite(None, {'robot': robot, 'start_mode': start_mode})
     body = MujocoRobot(
         suite.robot_file, suite.tick_ns, seed, sensors=suite.sensors, start_pose=start_pose)
-    return LoopRun(body, WalkingLoop(body.description, suite.gait, suite.parameters))
+    run = LoopRun(body, WalkingLoop(body.description, suite.gait, suite.parameters))
+    run.tick(SETTLING_S)
+    return run
 
 
 def up_and_down(robot: str) -> tuple[bool, bool]:
     """Whether a robot stands up from its belly, and lies down again."""
     run = run_of(robot, 'lying', 'lying')
-    _tick(run, SETTLING_S)
-    run.loop.request_mode('stand_up')
-    stands = _until(run, 'standing')
-    if stands:
-        run.loop.request_mode('lie_down')
-    return stands, stands and _until(run, 'lying')
+    stands = _reaches(run, 'stand_up', 'standing')
+    return stands, stands and _reaches(run, 'lie_down', 'lying')
 
 
 def recovery(robot: str, seed: int) -> Recovery:
     """Let a robot fall by a seed, and recover."""
     run = run_of(robot, 'fallen', 'damped', seed)
-    _tick(run, SETTLING_S)
-    run.loop.request_mode('recover')
     begin = run.state.time_ns
-    stands = _until(run, 'standing')
-    mode = run.loop.mode
-    seconds = (run.state.time_ns - begin) * 1e-9
+    stands = _reaches(run, 'recover', 'standing')
+    mode, seconds = run.loop.mode, (run.state.time_ns - begin) * 1e-9
     return Recovery(seed, stands, mode.tries, seconds, mode.reason)
 
 
-def _until(run: LoopRun[WalkingLoop], mode: str) -> bool:
-    """Tick until a mode lasts; return whether it does, and whether what stands has not fallen."""
+def _reaches(run: LoopRun[WalkingLoop], request: str, mode: str) -> bool:
+    """Request and tick until a mode lasts; return whether it does, and what stands is upright."""
+    run.loop.request_mode(request)
     end = run.state.time_ns + round(LONGEST_S * 1e9)
-    _tick(run, run.tick_s)
+    run.tick(run.tick_s)
     while run.loop.mode.mode not in (mode, 'damped') and run.state.time_ns < end:
-        _tick(run, run.tick_s)
+        run.tick(run.tick_s)
     if run.loop.mode.mode == mode:
-        _tick(run, STANDING_S)
+        run.tick(STANDING_S)
     return run.loop.mode.mode == mode and (mode != 'standing' or not run.fell())
-
-
-def _tick(run: LoopRun[WalkingLoop], seconds: float) -> None:
-    for _ in range(round(seconds / run.tick_s)):
-        run.state = run.robot.step(run.loop.tick(run.state).targets)
 
 
 def row(robot: str, up: bool, down: bool, falls: Sequence[Recovery]) -> tuple[str, ...]:
@@ -141,8 +132,8 @@ def row(robot: str, up: bool, down: bool, falls: Sequence[Recovery]) -> tuple[st
     times = f'{np.median(seconds):.1f} / {max(seconds):.1f}' if seconds else '-'
     yes = ('no', 'yes')
     return (Path(robot).stem, yes[up], yes[down], str(len(falls)),
-            f'{len(stood)} ({100.0 * len(stood) / max(len(falls), 1):.0f} %)',
-            ' / '.join(map(str, rolls)), times)
+            f'{len(stood)} ({percent(len(stood), len(falls))})', ' / '.join(map(str, rolls)),
+            times)
 
 
 if __name__ == '__main__':

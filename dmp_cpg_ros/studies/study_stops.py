@@ -5,37 +5,103 @@
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 Exit status 1 when it fell in a case that was stopped by inhibition, 2 when the arguments cannot
 be used.
+
+The robot walks once for all request phases of a gait and speed; every case goes on from a copy of
+robot and loop at its phase, and so gives the same numbers as a run of its own.
+
+Two simple ways to stop a gait are compared with sparse inhibition:
+
+- *freeze*: all phases stop at once, and every leg holds the joint targets that it has.
+- *finish swing*: a leg that stands stops at once; a leg that swings goes on to its touchdown.
+
+In both the reference is brought to zero as usual, the balance of the body works as usual, and no
+oscillator is coupled or inhibited until the gait is resumed.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterator, Sequence
+from copy import deepcopy
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from itertools import groupby, product
-from math import pi
+from math import isnan, pi
 from multiprocessing import Pool
-from pathlib import Path
+from typing import Any
 
-from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis import stop_outcome
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.stop_outcome import StopOutcome
 from dmp_cpg_ros.commands.ros_arguments import parse_arguments
+from dmp_cpg_ros.core.balance.controller import PostureFeedback
+from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
+from dmp_cpg_ros.core.primitives.spring_damper import SpringState
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
-from dmp_cpg_ros.studies.stop_trial import METHODS, StopCase, run_trials
+from dmp_cpg_ros.studies.loop_recording import LoopRun, recording_of
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, percent, write_results
 from dmp_cpg_ros.suite import Suite, load_gait, load_suite
 
-Results = list[tuple[StopCase, StopOutcome]]
+METHODS = ('inhibition', 'freeze', 'finish_swing')
+"""Ways to stop: sparse inhibition, and the two simple ones."""
+
+WALKING_BEFORE, WALKING_AFTER = 4.0, 3.5
+"""Time from the start to the first request, and from the resume to the end [s]."""
+
+SHORTEST_HOLD, LONGEST_HOLD, HOLD_AT_REST = 2.5, 12.0, 1.0
+"""The hold takes this at least and at most, and this after the oscillators are at rest [s]."""
+
+SPEED_WINDOW = 2.0
+"""Time at the end over which the resumed speed is averaged [s]."""
 
 COLUMNS = ('gait', 'm/s', 'leg', 'cadence', 'stopped by', 'cases', 'fell', 'stood', 'walked on',
            'prediction error %', 'over bound', 'bound s', 'rest s', 'body rest s', 'slip mm',
            'moved m', 'tilt deg', 'm/s^2')
+
+
+@dataclass(frozen=True)
+class StopCase:
+    """One case of the study.
+
+    Attributes
+    ----------
+    gait : str
+        Name of the gait.
+    speed : float
+        Commanded forward speed [m/s].
+    phase : float
+        Fraction of a cycle by which the request comes later.
+    cadence : float
+        Factor on the gait's cadence.
+    leg : str
+        Leg whose oscillator is inhibited.
+    push : float
+        Lateral impulse in the instant of the request [N s].
+    method : str
+        One of ``METHODS``.
+    """
+
+    gait: str
+    speed: float
+    phase: float
+    cadence: float = 1.0
+    leg: str = 'fl'
+    push: float = 0.0
+    method: str = METHODS[0]
+
+
+Results = list[tuple[StopCase, StopOutcome]]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -83,45 +149,167 @@ def suite_of(file: str | None, leg: str) -> Suite:
 
 
 @lru_cache
-def _robot_of(robot_file: Path, tick_ns: int) -> MujocoRobot:
-    return MujocoRobot(robot_file, tick_ns)
-
-
-@lru_cache
-def _bound_of(file: str | None, leg: str, gait: str, cadence: float) -> float:
-    """Certified time to rest [s]; it holds for every phase and speed, and is infinite without."""
+def _setting(file: str | None, leg: str, gait: str, cadence: float
+             ) -> tuple[MujocoRobot, SuiteParameters, float]:
+    """The robot, its parameters, and the certified time to rest [s], which holds for every phase
+    and speed, and is infinite without a certificate.
+    """
     suite = suite_of(file, leg)
-    scale = body_scale(_robot_of(suite.robot_file, suite.tick_ns).description)
-    p = suite.parameters
+    robot, p = MujocoRobot(suite.robot_file, suite.tick_ns), suite.parameters
+    scale = body_scale(robot.description)
     network = GaitNetwork(p.canonical, load_gait(gait).scaled(cadence), scale)
-    return certify(network, p.inhibition, p.reference, p.leg, p.posture,
-                   suite.tick_ns * 1e-9, voting=p.voting).time_to_rest
+    certificate = certify(network, p.inhibition, p.reference, p.leg, p.posture,
+                          suite.tick_ns * 1e-9, voting=p.voting)
+    return robot, p, certificate.time_to_rest
 
 
 def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     """Run the cases of one walk with the robot and the parameters of a parameter file."""
-    case = cases[0]
-    suite = suite_of(file, case.leg)
-    robot = _robot_of(suite.robot_file, suite.tick_ns)
-    gait = load_gait(case.gait).scaled(case.cadence)
-    bound = _bound_of(file, case.leg, case.gait, case.cadence)
-    return list(run_trials(robot, cases, gait, suite.parameters, lambda loop: bound))
+    robot, parameters, bound = _setting(file, cases[0].leg, cases[0].gait, cases[0].cadence)
+    return list(run_trials(robot, cases, parameters, bound))
 
 
 def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
               quiet: bool = True) -> Results:
     """Run cases on several processes; the results do not depend on how many."""
-    results: Results = []
+    outcomes: list[StopOutcome] = []
     walks = [list(group) for _, group in groupby(cases, _key)]
     with Pool(jobs) as pool:
-        outcomes = pool.imap(partial(run_walk, file=file), walks)
-        for walk, of_walk in zip(walks, outcomes, strict=True):
-            results.extend(zip(walk, of_walk, strict=True))
+        for of_walk in pool.imap(partial(run_walk, file=file), walks):
+            outcomes += of_walk
             if not quiet:
-                print(f'\r{len(results)}/{len(cases)}', end='', file=sys.stderr, flush=True)
+                print(f'\r{len(outcomes)}/{len(cases)}', end='', file=sys.stderr, flush=True)
     if not quiet:
         print('\r', end='', file=sys.stderr)
-    return results
+    return list(zip(cases, outcomes, strict=True))
+
+
+class FreezingLoop(WalkingLoop):
+    """A walking loop whose legs freeze when :meth:`freeze` is called; made as a WalkingLoop."""
+
+    _frozen: NDArray[np.bool_] | None = None
+
+    def freeze(self, finish_swing: bool) -> None:
+        """Stop the legs from the next tick on.
+
+        Parameters
+        ----------
+        finish_swing : bool
+            Whether a leg that swings finishes its swing before it freezes.
+        """
+        self._finish_swing, self._frozen = finish_swing, np.zeros(len(LEGS), dtype=bool)
+
+    def resume(self) -> None:
+        """Walk on from the phases and joint angles at which the legs are."""
+        self._frozen = None
+
+    def tick(self, state: RobotState) -> Tick:
+        """Run all parts on the robot's state of one tick, as :meth:`WalkingLoop.tick`."""
+        if self._frozen is None:
+            return super().tick(state)
+        dt = self._clock.step(state.time_ns)
+        self.stop = replace(self.stop, time_ns=state.time_ns)
+        self.r = self.reference.step(self.r, np.zeros(3), dt)
+        self._frozen = self._frozen | ~(self._finish_swing & self._swinging())
+        omega = np.where(self._frozen, 0.0, self.network.omega(self.r))
+        x = state_at(phase(self.x) + omega * dt, np.hypot(self.x[:, 0], self.x[:, 1]))
+        x_dot = omega[:, None] * (x @ phase_generator().T)
+        self.canon = replace(self.canon, x=x, x_dot=x_dot)
+        balance, feedback = self.body.posture.step(
+            self.posture.balance, state, self.canon.gait, x, x_dot, self.r, dt)
+        self.posture = replace(self.posture, balance=balance)
+        targets = self._joint_targets(state, x_dot, feedback, dt)
+        return Tick(state.time_ns, self.r, x, x_dot, self.stop, feedback, targets, self.mode,
+                    self.canon.gait)
+
+    def _swinging(self) -> NDArray[np.bool_]:
+        """Which legs are in the swing of their cycle, (4,)."""
+        gait, scale = self.network.gait, self.network.scale
+        duty = gait.duty(scale.foot_speed(*self.r.tolist()), scale)
+        return np.abs(gait.cycle_position(phase(self.x))) < 0.5 * (1.0 - duty)
+
+    def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
+             dt: float) -> JointTargets:
+        """Targets of one leg: those of its primitive, or those that it froze with."""
+        if self._frozen is None or not self._frozen[i]:
+            return super()._leg(i, state, x_dot, feedback, dt)
+        leg, joints, of_leg = self.legs[i].primitive, self.legs[i].joints, self.leg_states[i].leg
+        position, zero = of_leg.joints.position, np.zeros(3)
+        held = of_leg._replace(joints=SpringState(position, zero))
+        self.leg_states[i] = self.leg_states[i]._replace(leg=held)
+        measured = SpringState(state.joint_position[joints], state.joint_velocity[joints]) \
+            if leg.parameters.reading == 'torque' else None
+        return leg.targets(held, position, zero, feedback.torque[joints], measured)
+
+
+def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], parameters: SuiteParameters,
+               bound_s: float = np.nan) -> Iterator[StopOutcome]:
+    """Walk once; at the phase of each case stop and hold, and after an inhibition walk on.
+
+    Parameters
+    ----------
+    robot : MujocoRobot
+        Is reset; equal calls give equal outcomes.
+    cases : sequence of StopCase
+        Of one gait, speed and cadence, with ascending phases. The leg is in the parameters.
+    parameters : SuiteParameters
+        Parameters of the parts, without a timeout of the command.
+    bound_s : float
+        Guaranteed time to rest, for the outcomes; NaN where there is none [s].
+
+    Yields
+    ------
+    StopOutcome
+        One per case, in order.
+    """
+    gait = load_gait(cases[0].gait).scaled(cases[0].cadence)
+    run = LoopRun(robot, FreezingLoop(robot.description, gait, parameters))
+    for case in cases:
+        run.loop.command(case.speed)
+        omega = run.loop.network.omega(np.array((case.speed, 0.0, 0.0)))
+        request = round((WALKING_BEFORE + case.phase * 2.0 * np.pi / omega) / run.tick_s)
+        run.walk((request - run.state.time_ns // robot.tick_ns) * run.tick_s)
+        run.states.clear()
+        yield StopOutcome(fell=True) if run.fell() else _outcome(deepcopy(run), case, bound_s)
+
+
+def _outcome(run: LoopRun[FreezingLoop], case: StopCase, bound_s: float) -> StopOutcome:
+    """What becomes of a run that walks at the phase of the case."""
+    if case.push:
+        run.push(np.array((0.0, case.push, 0.0)))
+    run.states = [run.state]
+    times: dict[str, Any] = {}
+    if case.method == METHODS[0]:
+        predicted, measured = _held(run)
+        times = {'predicted_s': predicted, 'bound_s': bound_s, 'measured_s': measured}
+    else:
+        run.loop.freeze(case.method == 'finish_swing')
+        run.walk(SHORTEST_HOLD)
+    if run.fell():
+        return StopOutcome(True, **times)
+    robot = run.robot.description
+    at_rest = stop_outcome.body_at_rest(
+        recording_of(run.states), robot, RunContext(robot=robot).contact_force)
+    if case.method != METHODS[0]:
+        return at_rest
+    run.loop.request(False)
+    run.walk(WALKING_AFTER)
+    last = run.states[-round(SPEED_WINDOW / run.tick_s):]
+    resumed = float(np.mean([state.base_velocity_in_base[0] for state in last]))
+    return replace(at_rest, fell=run.fell(), **times, resumed_speed=resumed,
+                   walked_on=abs(resumed - case.speed) <= stop_outcome.WALKING_ERROR * case.speed)
+
+
+def _held(run: LoopRun[FreezingLoop]) -> tuple[float, float]:
+    """Inhibit and hold; return the predicted and measured time to rest [s]."""
+    predicted, held, measured = run.loop.request(True), 0.0, np.inf
+    while held < min(LONGEST_HOLD, max(SHORTEST_HOLD, measured + HOLD_AT_REST)) and not run.fell():
+        run.walk(run.tick_s)
+        held += run.tick_s
+        if run.loop.stop.state == 'at_rest':
+            measured = run.loop.stop.measured_s
+    # a robot that fell on the way says nothing of the oscillators' time to rest
+    return predicted, np.nan if run.fell() and measured == np.inf else measured
 
 
 def table(results: Results) -> str:
@@ -129,12 +317,11 @@ def table(results: Results) -> str:
     rows = []
     for key, group in groupby(results, lambda result: _key(result[0])):
         labels = [f'{part:g}' if isinstance(part, float) else part for part in key]
-        of = StopSummary([outcome for _, outcome in group])
-        rows.append((*labels, *_cells(of, key[-1])))
+        rows.append((*labels, *_cells([outcome for _, outcome in group], key[-1])))
     for method in METHODS:
         outcomes = [outcome for case, outcome in results if case.method == method]
         if outcomes:
-            rows.append(('all', '', '', '', method, *_cells(StopSummary(outcomes), method)))
+            rows.append(('all', '', '', '', method, *_cells(outcomes, method)))
     return markdown_table(COLUMNS, rows)
 
 
@@ -142,25 +329,21 @@ def _key(case: StopCase) -> tuple[str, float, str, float, str]:
     return case.gait, case.speed, case.leg, case.cadence, case.method
 
 
-def _cells(of: StopSummary, method: str) -> tuple[str, ...]:
-    def pair(name: str, scale: float, digits: int) -> str:
-        values = of.spread(name)
-        if values[0] != values[0]:
-            return '-'
-        return ' / '.join(f'{scale * value:.{digits}f}' for value in values)
-
-    bounded, count = of.number('bounded'), len(of.outcomes)
-    return (str(count), str(of.number('fell')), _share(of.number('standing'), count),
-            _share(of.number('walked_on'), count) if method == METHODS[0] else '-',
-            pair('prediction_error', 100.0, 1),
-            f"{of.number('bound_exceeded')}/{bounded}" if bounded else '-',
-            pair('bound_s', 1.0, 2), pair('measured_s', 1.0, 2), pair('body_rest_s', 1.0, 2),
-            pair('slip_m', 1e3, 1), pair('displacement_m', 1.0, 2), pair('tilt', 180.0 / pi, 1),
-            pair('deceleration', 1.0, 1))
-
-
-def _share(part: int, whole: int) -> str:
-    return f'{100.0 * part / whole:.0f} %'
+def _cells(outcomes: Sequence[StopOutcome], method: str) -> tuple[str, ...]:
+    of = stop_outcome.StopSummary(outcomes)
+    fell, stood, walked_on, bounded, exceeded = map(of.number, (
+        'fell', 'standing', 'walked_on', 'bounded', 'bound_exceeded'))
+    prediction_error, *others = (
+        '-' if isnan(of.spread(name)[0])
+        else ' / '.join(f'{scale * value:.{digits}f}' for value in of.spread(name))
+        for name, scale, digits in (
+            ('prediction_error', 100.0, 1), ('bound_s', 1.0, 2), ('measured_s', 1.0, 2),
+            ('body_rest_s', 1.0, 2), ('slip_m', 1e3, 1), ('displacement_m', 1.0, 2),
+            ('tilt', 180.0 / pi, 1), ('deceleration', 1.0, 1)))
+    count = len(outcomes)
+    return (str(count), str(fell), percent(stood, count),
+            percent(walked_on, count) if method == METHODS[0] else '-', prediction_error,
+            f'{exceeded}/{bounded}' if bounded else '-', *others)
 
 
 def _parser() -> argparse.ArgumentParser:

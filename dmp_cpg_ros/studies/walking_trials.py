@@ -8,30 +8,27 @@ equal outcomes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from math import ceil, cos, hypot, isnan, log2, nan, pi, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
-from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.core.loop import Array, WalkingLoop
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.state import RobotState
-from dmp_cpg_ros.core.robot_model.world import World
-from dmp_cpg_ros.core.robot_model.world_choice import WORLDS
+from dmp_cpg_ros.core.robot_model.world import WORLDS, World
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.loop_recording import recording_of
-from dmp_cpg_ros.studies.loop_run import LoopRun
-from dmp_cpg_ros.suite import Suite, load_gait, load_gaits, load_suite
+from dmp_cpg_ros.studies.loop_recording import LoopRun, recording_of
+from dmp_cpg_ros.suite import Suite, load_gaits, load_suite
 
-Array = NDArray[np.float64]
 Velocity = tuple[float, float, float]
 Values = tuple[tuple[str, Any], ...]
 
@@ -51,13 +48,21 @@ RECOVERY = 3.0
 FINISH, CROSSING_TIME = 5.0, 30.0
 """Distance to cross on rough ground [m], and the time after which a trial ends [s]."""
 
+CHANGE_SPEEDS = (0.4, 0.6)
+"""Speeds at which gaits change, which every gait can do [m/s]."""
+
+CYCLES_AFTER = 3
+"""Cycles after a transition within which the phase error must be back under its bound."""
+
+WATCHED = 5.0
+"""Time for which the robot is watched after a change was asked for [s]."""
+
 
 @lru_cache
-def suite_of(robot: str | None, gait: str, file: str | None = None,
-             values: Values = ()) -> Suite:
-    """Parameter file with a robot and gait, and a command that needs no repetition."""
+def suite_of(robot: str | None, gait: str, values: Values = ()) -> Suite:
+    """The package's parameters with a robot and gait, and a command that needs no repetition."""
     overrides = {'gait': gait, 'cmd_vel_timeout': 0.0, 'auto_inhibit': False, **dict(values)}
-    return load_suite(file, overrides if robot is None else overrides | {'robot': robot})
+    return load_suite(None, overrides if robot is None else overrides | {'robot': robot})
 
 
 class Walk(LoopRun[WalkingLoop]):
@@ -73,35 +78,39 @@ class Walk(LoopRun[WalkingLoop]):
         Flat without.
     seed : int
         Seed of the joints' initial spread of ±0.03 rad; none with 0.
-    file : str, optional
-        Parameter file; the package's own without.
     values : tuple of (str, value)
-        Parameters that differ from the file.
+        Parameters that differ from the package's own.
     """
 
     def __init__(self, gait: str, robot: str | None = None, world: World | None = None,
-                 seed: int = 0, file: str | None = None, values: Values = ()) -> None:
-        suite = suite_of(robot, gait, file, values)
+                 seed: int = 0, values: Values = ()) -> None:
+        suite = suite_of(robot, gait, values)
         body = MujocoRobot(suite.robot_file, suite.tick_ns, seed, 0.03 if seed else 0.0,
                            world=world or suite.world, sensors=suite.sensors)
         super().__init__(body, WalkingLoop(
-            body.description, load_gait(gait), suite.parameters, load_gaits()))
+            body.description, suite.gait, suite.parameters, load_gaits()))
         self.asked: Velocity = (0.0, 0.0, 0.0)
         self.walk(STANDING)
         self.loop.request(False)
 
     def reach(self, velocity: Velocity) -> bool:
         """Ramp the command to a velocity; return whether the robot is on its feet."""
-        begin = np.array(self.asked)
-        rates = np.abs(np.array(velocity) - begin) / np.array((RAMP, RAMP, 3.0 * RAMP))
-        steps = max(1, ceil(rates.max() / 0.1))
+        begin, change = np.array(self.asked), np.array(velocity) - self.asked
+        steps = max(1, ceil(np.max(np.abs(change) / (RAMP, RAMP, 3.0 * RAMP)) / 0.1))
         for i in range(1, steps + 1):
-            v_x, v_y, gamma = (begin + (np.array(velocity) - begin) * i / steps).tolist()
-            self.loop.command(v_x, v_y, gamma)
+            self.loop.command(*(begin + change * i / steps).tolist())
             if not self.walk(0.1):
                 return False
         self.asked = velocity
         return True
+
+    def settle(self, velocity: Velocity) -> bool:
+        """Ramp to a velocity and hold it; return whether the robot is on its feet."""
+        return self.reach(velocity) and self.walk(3.0)
+
+    def period(self) -> float:
+        """Length of a cycle [s]."""
+        return 2.0 * pi / self.loop.network.omega(self.loop.r)
 
 
 @dataclass(frozen=True)
@@ -126,31 +135,41 @@ class SteadyOutcome:
     cost_of_transport: float = nan
 
 
-def steady(gait: str, velocity: Velocity, robot: str | None = None,
-           file: str | None = None) -> SteadyOutcome:
+def steady(gait: str, velocity: Velocity, robot: str | None = None) -> SteadyOutcome:
     """Walk at a velocity until it is steady, then for ``MEASURED`` and ``MEASURED_WAY``."""
-    run = Walk(gait, robot, file=file)
-    if not (run.reach(velocity) and run.walk(3.0)):
-        return SteadyOutcome(True)
-    run.states = [run.state]
+    run = Walk(gait, robot)
+    upright = run.settle(velocity)
+    run.states = states = [run.state]
     speed = hypot(*velocity[:2])
-    if not run.walk(max(MEASURED, MEASURED_WAY / speed if speed else 0.0)):
+    if not (upright and run.walk(max(MEASURED, MEASURED_WAY / speed if speed else 0.0))):
         return SteadyOutcome(True)
-    states = run.states
-    mean = np.mean([(*state.base_velocity_in_base[:2], state.base_rate_in_base[2])
-                    for state in states], axis=0)
+    v_x, v_y, gamma = np.mean([(*state.base_velocity_in_base[:2], state.base_rate_in_base[2])
+                               for state in states], axis=0).tolist()
+    held = SteadyOutcome(False, (v_x, v_y, gamma))
     way = float(np.hypot(*(states[-1].base_position_in_world
                            - states[0].base_position_in_world)[:2]))
-    drift = work = nan
-    if way > 0.1 and velocity[2] == 0.0:
-        yaw = np.unwrap(roll_pitch_yaw(np.array([s.base_quaternion for s in states]))[:, 2])
-        # a straight line through all samples, which the swaying of a cycle does not turn
-        gained = np.polyfit(np.linspace(0.0, 1.0, len(yaw)), yaw, 1)[0]
-        drift = abs(float(np.rad2deg(gained))) * 10.0 / way
-        work = cost_of_transport(
-            recording_of(states), RunContext(robot=run.robot.description), way)[0] or nan
-    v_x, v_y, gamma = mean.tolist()
-    return SteadyOutcome(False, (v_x, v_y, gamma), drift, work)
+    if way <= 0.1 or velocity[2] != 0.0:
+        return held
+    # a straight line through all samples, which the swaying of a cycle does not turn
+    yaw = np.unwrap(_attitude(states)[:, 2])
+    gained = np.polyfit(np.linspace(0.0, 1.0, len(yaw)), yaw, 1)[0]
+    work, _ = cost_of_transport(
+        recording_of(states), RunContext(robot=run.robot.description), way)
+    return replace(held, yaw_drift=abs(float(np.rad2deg(gained))) * 10.0 / way,
+                   cost_of_transport=work or nan)
+
+
+def relative_error(outcome: SteadyOutcome, velocity: Velocity) -> float:
+    """Size of the velocity error over that of the commanded velocity, along its direction;
+    turning alone counts in turn rates.
+    """
+    if outcome.fell or isnan(outcome.velocity[0]):
+        return nan
+    speed = hypot(*velocity[:2])
+    if speed == 0.0:
+        return abs(outcome.velocity[2] - velocity[2]) / abs(velocity[2])
+    along = float(np.dot(outcome.velocity[:2], velocity[:2])) / speed
+    return abs(along - speed) / speed
 
 
 @dataclass(frozen=True)
@@ -193,8 +212,7 @@ def survived_pushes(case: PushCase, robot: str | None = None) -> PushOutcome:
     before any push.
     """
     run = Walk(case.gait, robot)
-    upright = run.reach((case.speed, 0.0, 0.0)) and run.walk(3.0) and run.walk(
-        case.phase * 2.0 * pi / run.loop.network.omega(run.loop.r))
+    upright = run.settle((case.speed, 0.0, 0.0)) and run.walk(case.phase * run.period())
     return PushOutcome(tuple(
         _largest(run, angle, case) if upright else nan for angle in case.directions))
 
@@ -211,7 +229,7 @@ def survives(run: Walk, angle: float, speed_change: float) -> bool:
     the base frame [rad] that would change the free body's speed by so much [m/s].
     """
     after = deepcopy(run)
-    yaw = float(roll_pitch_yaw(run.state.base_quaternion[None])[0, 2]) + angle
+    yaw = float(_attitude([run.state])[0, 2]) + angle
     impulse = after.robot.description.mass * speed_change
     after.push(np.array((impulse * cos(yaw), impulse * sin(yaw), 0.0)))
     return after.walk(RECOVERY)
@@ -258,46 +276,117 @@ class CrossingOutcome:
     tilt: float
 
 
-def cross(case: CrossingCase, robot: str | None = None) -> CrossingOutcome:
+def cross(case: CrossingCase) -> CrossingOutcome:
     """Walk straight ahead until ``FINISH``, a fall, or ``CROSSING_TIME``."""
-    numbers: Mapping[str, float] = dict(case.numbers)
+    numbers: dict[str, Any] = dict(case.numbers)
     if case.kind == 'blocks':
-        numbers = {**numbers, 'seed': case.seed}
-    world = WORLDS[case.kind](**numbers)
-    speed = case.speed * float(np.random.default_rng(case.seed).uniform(0.9, 1.1))
-    run = Walk(case.gait, robot, world, seed=case.seed + 1, values=case.values)
-    run.loop.command(speed)
-    begin, tilt = run.state.time_ns, []
-    run.states.clear()
-    while run.walk(0.1):
-        tilt.append(_mean_squared_tilt(run.states))
+        numbers['seed'] = case.seed
+    run = Walk(case.gait, None, WORLDS[case.kind](**numbers), case.seed + 1, case.values)
+    run.loop.command(case.speed * float(np.random.default_rng(case.seed).uniform(0.9, 1.1)))
+    begin, tilt, distance, time = run.state.time_ns, [], 0.0, 0.0
+    while distance < FINISH and time < CROSSING_TIME:
         run.states.clear()
-        elapsed = (run.state.time_ns - begin) * 1e-9
-        if _distance(run.state) >= FINISH or elapsed >= CROSSING_TIME:
+        upright = run.walk(0.1)
+        distance = float(run.state.base_position_in_world[0])
+        time = (run.state.time_ns - begin) * 1e-9
+        if not upright:
             break
-    distance = _distance(run.state)
-    return CrossingOutcome(distance >= FINISH and not run.fell(), run.fell(), distance,
-                           (run.state.time_ns - begin) * 1e-9,
+        tilt.append(float(np.mean(np.sum(_attitude(run.states)[:, :2] ** 2, axis=1))))
+    return CrossingOutcome(distance >= FINISH and not run.fell(), run.fell(), distance, time,
                            float(np.rad2deg(np.sqrt(np.mean(tilt)))) if tilt else nan)
 
 
-def _mean_squared_tilt(states: list[RobotState]) -> float:
-    quaternions = np.array([state.base_quaternion for state in states])
-    return float(np.mean(np.sum(roll_pitch_yaw(quaternions)[:, :2] ** 2, axis=1)))
+def _attitude(states: Sequence[RobotState]) -> Array:
+    """Roll, pitch and yaw (n, 3) [rad]."""
+    return roll_pitch_yaw(np.array([state.base_quaternion for state in states]))
 
 
-def _distance(state: RobotState) -> float:
-    return float(state.base_position_in_world[0])
+@dataclass(frozen=True)
+class ChangeCase:
+    """Changes from one gait to all others at one speed.
 
-
-def relative_error(outcome: SteadyOutcome, velocity: Velocity) -> float:
-    """Size of the velocity error over that of the commanded velocity, along its direction;
-    turning alone counts in turn rates.
+    Attributes
+    ----------
+    before : str
+        Name of the gait that is walked.
+    speed : float
+        Commanded forward speed [m/s].
+    phases : int
+        Number of phases, evenly over a cycle, at which the change is asked for.
     """
-    if outcome.fell or isnan(outcome.velocity[0]):
-        return nan
-    speed = hypot(*velocity[:2])
-    if speed == 0.0:
-        return abs(outcome.velocity[2] - velocity[2]) / abs(velocity[2])
-    along = float(np.dot(outcome.velocity[:2], velocity[:2])) / speed
-    return abs(along - speed) / speed
+
+    before: str
+    speed: float
+    phases: int
+
+
+@dataclass(frozen=True)
+class ChangeOutcome:
+    """One change.
+
+    Attributes
+    ----------
+    after : str
+        Name of the new gait.
+    phase : float
+        Fraction of a cycle at which it was asked for.
+    fell : bool
+        Whether the robot fell, before or after.
+    duration : float
+        From the request until the new gait is in force [s].
+    cycles : float
+        The same in cycles of the new gait.
+    phase_error : float
+        Largest deviation of a leg from its moving place, from the request on [rad].
+    in_time : bool
+        Whether the error stayed below ``LOCKED_PHASE_ERROR`` from ``CYCLES_AFTER`` cycles after
+        the end on.
+    sway : float
+        Largest roll or pitch from the request on [deg].
+    """
+
+    after: str
+    phase: float
+    fell: bool
+    duration: float = nan
+    cycles: float = nan
+    phase_error: float = nan
+    in_time: bool = False
+    sway: float = nan
+
+
+def run_changes(case: ChangeCase) -> list[ChangeOutcome]:
+    """Walk once, and change to every other gait at every phase in copies of the walk."""
+    run = Walk(case.before)
+    upright = run.settle((case.speed, 0.0, 0.0))
+    step = run.period() / case.phases
+    outcomes = []
+    for k in range(case.phases):
+        for after in load_gaits():
+            if after != case.before:
+                fell = ChangeOutcome(after, k / case.phases, True)
+                outcomes.append(_changed(deepcopy(run), fell) if upright else fell)
+        upright = run.walk(step)
+    return outcomes
+
+
+def _changed(run: Walk, fell: ChangeOutcome) -> ChangeOutcome:
+    """Outcome of a change that is asked for now."""
+    run.states.clear()
+    reason = run.loop.change_gait(fell.after)
+    if reason:
+        raise RuntimeError(reason)
+    errors, duration = [], nan
+    for k in range(ceil(WATCHED / run.tick_s)):
+        if not run.walk(run.tick_s):
+            return fell
+        network = run.loop.network
+        errors.append(float(np.abs(network.phase_errors(run.loop.x)).max()))
+        if network.gait.name == fell.after and isnan(duration):
+            duration = (k + 1) * run.tick_s
+    period = run.period()
+    settled = errors[round((duration + CYCLES_AFTER * period) / run.tick_s):]
+    sway = float(np.abs(np.rad2deg(_attitude(run.states)[:, :2])).max())
+    return replace(fell, fell=False, duration=duration, cycles=duration / period,
+                   phase_error=max(errors), sway=sway,
+                   in_time=bool(settled) and max(settled) < LOCKED_PHASE_ERROR)

@@ -18,8 +18,9 @@ from dmp_cpg_ros.core.contraction.hopf_bounds import (
 )
 from dmp_cpg_ros.core.contraction.region import Annulus, Ball, Box
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.matrix_measure import NORMS, matrix_measure
-from dmp_cpg_ros.paper.on_region import (
+from dmp_cpg_ros.paper.matrix_measure import (
+    NORMS,
+    matrix_measure,
     proved_contraction,
     sampled_contraction,
     sampled_transverse_contraction,

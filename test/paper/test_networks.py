@@ -15,14 +15,14 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.coupling import (
+from dmp_cpg_ros.paper.network import (
     Coupling,
     EdgeCoupling,
     MeanFieldCoupling,
+    OscillatorNetwork,
     PhaseEdgeCoupling,
     PhaseMeanFieldCoupling,
 )
-from dmp_cpg_ros.paper.network import OscillatorNetwork
 from dmp_cpg_ros.paper.oscillators import (
     HopfOscillators,
     MixedOscillators,

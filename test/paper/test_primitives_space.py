@@ -16,17 +16,24 @@ from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput
-from dmp_cpg_ros.paper.algebra import slowed, summed, transformed
-from dmp_cpg_ros.paper.daughters import Daughter, DaughterSum, transported_metric
+from dmp_cpg_ros.paper.daughters import (
+    Daughter,
+    DaughterSum,
+    Homogeneous,
+    slowed,
+    summed,
+    transformed,
+    transported_metric,
+)
 from dmp_cpg_ros.paper.diffeomorphism import (
+    ClosedCurveDiffeomorphism,
     Composition,
     FunctionDiffeomorphism,
     TangentLift,
+    canonical_field,
     newton_inverse,
 )
-from dmp_cpg_ros.paper.homogeneous import Homogeneous
 from dmp_cpg_ros.paper.jacobians import difference_jacobian
-from dmp_cpg_ros.paper.limit_cycle import ClosedCurveDiffeomorphism, canonical_field
 
 SEEDS = st.integers(0, 10_000)
 

@@ -11,15 +11,16 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.paper.coupling import EdgeCoupling, MeanFieldCoupling
-from dmp_cpg_ros.paper.network import OscillatorNetwork
-from dmp_cpg_ros.paper.oscillators import HopfOscillators, VanDerPolOscillators
-from dmp_cpg_ros.paper.stabilised_step import (
+from dmp_cpg_ros.paper.network import (
+    EdgeCoupling,
+    MeanFieldCoupling,
+    OscillatorNetwork,
     chebyshev_stages,
     chebyshev_step,
     contractive_stages,
     contractive_step,
 )
+from dmp_cpg_ros.paper.oscillators import HopfOscillators, VanDerPolOscillators
 
 METHODS = {'chebyshev': chebyshev_step, 'contractive': contractive_step}
 

@@ -11,6 +11,7 @@ import pytest
 
 from dmp_cpg_ros.configuration import find_config, load_yaml
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.robot_model.world import Blocks
 from dmp_cpg_ros.suite import load_gaits, load_suite, node_sets
 from dmp_cpg_ros.suite_table import WALKING, Kind
 
@@ -32,7 +33,7 @@ def test_a_robot_in_a_namespace_has_its_world(tmp_path: Path) -> None:
     path.write_text(FILE.read_text(encoding='utf-8').replace('world: flat', 'world: blocks'),
                     encoding='utf-8')
     for namespace in ('', '/robot1', '/a/b'):
-        assert load_suite(path, namespace=namespace).world.KIND == 'blocks'
+        assert isinstance(load_suite(path, namespace=namespace).world, Blocks)
 
 
 def test_the_file_names_every_parameter() -> None:

@@ -18,8 +18,7 @@ from dmp_cpg_ros.analysis.recording import WorkSeries
 from dmp_cpg_ros.studies.output import markdown_table
 
 pytest.importorskip('mujoco')
-from dmp_cpg_ros.studies import benchmark_tables
-from dmp_cpg_ros.studies.benchmark_walking import main
+from dmp_cpg_ros.studies.benchmark_walking import main, steady_cells
 from dmp_cpg_ros.studies.loop_recording import recording_of
 from dmp_cpg_ros.studies.walking_trials import (
     CrossingCase,
@@ -38,8 +37,8 @@ def test_the_error_is_along_the_command() -> None:
     assert relative_error(SteadyOutcome(False, (0.0, 0.0, 0.9)), (0.0, 0.0, 1.0)) == (
         pytest.approx(0.1))
     assert isnan(relative_error(SteadyOutcome(True), (1.0, 0.0, 0.0)))
-    assert benchmark_tables.steady_cells((1.0, 0.0, 0.0), SteadyOutcome(True))[0] == 'fell'
-    assert benchmark_tables.steady_cells(
+    assert steady_cells((1.0, 0.0, 0.0), SteadyOutcome(True))[0] == 'fell'
+    assert steady_cells(
         (0.5, 0.0, 0.0), SteadyOutcome(False, (0.45, 0.0, 0.0), nan, nan))[1] == '10.0'
 
 

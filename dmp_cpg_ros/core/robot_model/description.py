@@ -6,8 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from dmp_cpg_ros.core.robot_model.state import Array
 
 
 @dataclass(frozen=True)
@@ -43,17 +42,17 @@ class LegGeometry:
     """
 
     name: str
-    hip_in_base: NDArray[np.float64]
-    hip_offset: NDArray[np.float64]
-    thigh: NDArray[np.float64]
-    shank: NDArray[np.float64]
-    axis_sign: NDArray[np.float64]
+    hip_in_base: Array
+    hip_offset: Array
+    thigh: Array
+    shank: Array
+    axis_sign: Array
     knee_sign: int
-    position_lower: NDArray[np.float64]
-    position_upper: NDArray[np.float64]
-    torque_limit: NDArray[np.float64]
-    velocity_limit: NDArray[np.float64]
-    rotor_inertia: NDArray[np.float64]
+    position_lower: Array
+    position_upper: Array
+    torque_limit: Array
+    velocity_limit: Array
+    rotor_inertia: Array
     foot_radius: float
 
 
@@ -86,9 +85,9 @@ class RobotDescription:
     name: str
     legs: tuple[LegGeometry, ...]
     mass: float
-    base_inertia: NDArray[np.float64]
-    com_in_base: NDArray[np.float64]
+    base_inertia: Array
+    com_in_base: Array
     stance_height: float
-    kp: NDArray[np.float64]
-    kd: NDArray[np.float64]
+    kp: Array
+    kd: Array
     belly_depth: float = 0.0

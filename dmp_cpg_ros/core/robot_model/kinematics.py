@@ -5,22 +5,20 @@
     p = Rx(s₀ q₀) (o + Ry(s₁ q₁) (t + Ry(s₂ q₂) c)),    foot_in_base = hip_in_base + p
 
 with o, t, c the offsets of :class:`~dmp_cpg_ros.core.robot_model.description.LegGeometry`. Plain
-floats
-instead of arrays: each function runs for every leg at every tick.
+floats instead of arrays: each function runs for every leg at every tick.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import acos, atan2, cos, hypot, sin, sqrt
+from math import acos, atan2, cos, hypot, pi, sin, sqrt, tau
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, triple
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.robot_model.state import Array
 
 
 class LegKinematics:
@@ -30,6 +28,13 @@ class LegKinematics:
     ----------
     geometry : LegGeometry
         The leg.
+
+    Attributes
+    ----------
+    lateral_offset : float
+        Sideways distance from the abduction axis to the leg's plane [m], positive to the left.
+    thigh_length, shank_length : float
+        In the leg's plane [m].
     """
 
     def __init__(self, geometry: LegGeometry) -> None:
@@ -38,24 +43,14 @@ class LegKinematics:
         self._hip, self._o, self._t, self._c, self._s = (
             triple([float(value) for value in vector])
             for vector in (geometry.hip_in_base, geometry.hip_offset, geometry.thigh,
-                           geometry.shank, geometry.axis_sign)
-        )
-        self._lateral = self._o[1] + self._t[1] + self._c[1]
+                           geometry.shank, geometry.axis_sign))
+        self.lateral_offset = self._o[1] + self._t[1] + self._c[1]
         self.thigh_length = hypot(self._t[0], self._t[2])
         self.shank_length = hypot(self._c[0], self._c[2])
         self._thigh_angle = atan2(-self._t[0], -self._t[2])  # about +y, from straight down
         self._shank_angle = atan2(-self._c[0], -self._c[2])
-        self._reach = (
-            abs(self.thigh_length - self.shank_length) + 1e-3,
-            self.thigh_length + self.shank_length - 1e-3,
-        )
-
-    @property
-    def lateral_offset(self) -> float:
-        """Sideways distance from the abduction axis to the leg's plane [m], positive to the
-        left.
-        """
-        return self._lateral
+        self._reach = (abs(self.thigh_length - self.shank_length) + 1e-3,
+                       self.thigh_length + self.shank_length - 1e-3)
 
     def foot_in_base(self, q: Array | Sequence[float]) -> Array:
         """Position of the foot's centre.
@@ -74,9 +69,7 @@ class LegKinematics:
 
     def foot(self, q: Array | Sequence[float]) -> Triple:
         """:meth:`foot_in_base` as a tuple."""
-        chain = self._chain(q)
-        hip_x, hip_y, hip_z = self._hip
-        return hip_x + chain[0], hip_y + chain[1], hip_z + chain[2]
+        return self._foot(self._chain(q))
 
     def jacobian_in_base(self, q: Array | Sequence[float]) -> Array:
         """Jacobian of :meth:`foot_in_base`.
@@ -88,22 +81,21 @@ class LegKinematics:
         """
         return np.array(self._jacobian(self._chain(q)))
 
-    def foot_and_jacobian(
-        self, q: Array | Sequence[float]
-    ) -> tuple[Triple, Matrix]:
+    def foot_and_jacobian(self, q: Array | Sequence[float]) -> tuple[Triple, Matrix]:
         """:meth:`foot_in_base` and :meth:`jacobian_in_base` for the price of one, as tuples."""
         chain = self._chain(q)
+        return self._foot(chain), self._jacobian(chain)
+
+    def _foot(self, chain: tuple[float, ...]) -> Triple:
         hip_x, hip_y, hip_z = self._hip
-        return (hip_x + chain[0], hip_y + chain[1], hip_z + chain[2]), self._jacobian(chain)
+        return hip_x + chain[0], hip_y + chain[1], hip_z + chain[2]
 
     def _jacobian(self, chain: tuple[float, ...]) -> Matrix:
         _, y, z, reach_x, reach_z, shank_x, shank_z, s0, c0 = chain
         sign_0, sign_1, sign_2 = self._s
-        return (
-            (0.0, sign_1 * reach_z, sign_2 * shank_z),
-            (-sign_0 * z, sign_1 * s0 * reach_x, sign_2 * s0 * shank_x),
-            (sign_0 * y, -sign_1 * c0 * reach_x, -sign_2 * c0 * shank_x),
-        )
+        return ((0.0, sign_1 * reach_z, sign_2 * shank_z),
+                (-sign_0 * z, sign_1 * s0 * reach_x, sign_2 * s0 * shank_x),
+                (sign_0 * y, -sign_1 * c0 * reach_x, -sign_2 * c0 * shank_x))
 
     def inverse(self, foot_in_base: ArrayLike) -> Array:
         """Joint angles that bring the foot to a point; a point out of reach is brought to the
@@ -127,9 +119,8 @@ class LegKinematics:
         """:meth:`inverse` for and as a tuple."""
         px, py, pz = foot_in_base
         px, py, pz = px - self._hip[0], py - self._hip[1], pz - self._hip[2]
-        depth = -sqrt(max(py * py + pz * pz - self._lateral * self._lateral, 1e-8))
-        q0 = atan2(pz, py) - atan2(depth, self._lateral)
-        q0 = (q0 + 3.141592653589793) % 6.283185307179586 - 3.141592653589793
+        depth = -sqrt(max(py * py + pz * pz - self.lateral_offset * self.lateral_offset, 1e-8))
+        q0 = atan2(pz, py) - atan2(depth, self.lateral_offset)
         x, z = px - self._o[0], depth - self._o[2]
         lower, upper = self._reach
         length = min(max(hypot(x, z), lower), upper)
@@ -137,9 +128,8 @@ class LegKinematics:
         bend = acos(min(max((length * length - a * a - b * b) / (2.0 * a * b), -1.0), 1.0))
         knee = self.geometry.knee_sign * bend
         hip = atan2(-x, -z) - atan2(b * sin(knee), a + b * cos(knee))
-        q1 = hip - self._thigh_angle
-        q2 = knee - self._shank_angle + self._thigh_angle
-        return self._s[0] * q0, self._s[1] * _wrapped(q1), self._s[2] * _wrapped(q2)
+        return (self._s[0] * _wrapped(q0), self._s[1] * _wrapped(hip - self._thigh_angle),
+                self._s[2] * _wrapped(knee - self._shank_angle + self._thigh_angle))
 
     def _chain(self, q: Array | Sequence[float]) -> tuple[float, ...]:
         q0, q1, q2 = q.tolist() if isinstance(q, np.ndarray) else q
@@ -153,22 +143,13 @@ class LegKinematics:
         s2, c2 = sin(angle_2), cos(angle_2)
         shank_x, shank_z = c2 * c_x + s2 * c_z, c2 * c_z - s2 * c_x
         reach_x, reach_z = c1 * t_x + s1 * t_z + shank_x, c1 * t_z - s1 * t_x + shank_z
-        plane_y, plane_z = self._lateral, self._o[2] + reach_z
-        return (
-            self._o[0] + reach_x,
-            c0 * plane_y - s0 * plane_z,
-            s0 * plane_y + c0 * plane_z,
-            reach_x,
-            reach_z,
-            shank_x,
-            shank_z,
-            s0,
-            c0,
-        )
+        plane_y, plane_z = self.lateral_offset, self._o[2] + reach_z
+        return (self._o[0] + reach_x, c0 * plane_y - s0 * plane_z, s0 * plane_y + c0 * plane_z,
+                reach_x, reach_z, shank_x, shank_z, s0, c0)
 
 
 def _wrapped(angle: float) -> float:
-    return (angle + 3.141592653589793) % 6.283185307179586 - 3.141592653589793
+    return (angle + pi) % tau - pi
 
 
 class RobotLegs:
@@ -209,8 +190,6 @@ class RobotLegs:
         """
         if q != self._at:
             self._at = list(q)
-            self._found = tuple(
-                leg.foot_and_jacobian(q[3 * i : 3 * i + 3])
-                for i, leg in enumerate(self.kinematics)
-            )
+            self._found = tuple(leg.foot_and_jacobian(q[3 * i:3 * i + 3])
+                                for i, leg in enumerate(self.kinematics))
         return self._found

@@ -8,21 +8,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import isnan
 
-import numpy as np
-from numpy.typing import NDArray
-
-from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, RobotState
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.robot_model.state import LEGS, Array, RobotState
 
 FASTEST_TURN, HARDEST_BLOW = 100.0, 1000.0
 """Readings beyond these are no readings of a walking robot's IMU [rad/s], [m/s^2]."""
 
 FASTEST_JOINT, LARGEST_FORCE = 200.0, 1e5
 """Readings beyond these are faults of joint and contact sensors [rad/s], [N]."""
-
-_ALL_LEGS = (True,) * len(LEGS)
-_FIRST_JOINT = range(0, len(JOINT_NAMES), len(JOINTS_OF_LEG))
 
 
 @dataclass(frozen=True)
@@ -60,17 +52,13 @@ class SensorReadings:
         """Whether angles and velocities of each leg's joints are possible."""
         q, q_dot = self.joint_position.tolist(), self.joint_velocity.tolist()
         if _within(q, FASTEST_JOINT) and _within(q_dot, FASTEST_JOINT):
-            return _ALL_LEGS
-        return tuple(
-            _within(q[i : i + 3], FASTEST_JOINT) and _within(q_dot[i : i + 3], FASTEST_JOINT)
-            for i in _FIRST_JOINT
-        )
+            return (True,) * len(LEGS)
+        return tuple(_within(q[i:i + 3] + q_dot[i:i + 3], FASTEST_JOINT) for i in range(0, 12, 3))
 
     @cached_property
     def usable_contacts(self) -> tuple[bool, ...]:
         """Whether each foot's force is possible."""
-        limit = LARGEST_FORCE
-        return tuple(-limit <= force <= limit for force in self.foot_force.tolist())
+        return tuple(abs(force) <= LARGEST_FORCE for force in self.foot_force.tolist())
 
 
 def _within(values: list[float], limit: float) -> bool:
@@ -81,11 +69,5 @@ def _within(values: list[float], limit: float) -> bool:
 def readings_of(state: RobotState) -> SensorReadings:
     """Sensors' part of a robot's state; its ground truth stays behind."""
     return SensorReadings(
-        state.time_ns,
-        state.joint_position,
-        state.joint_velocity,
-        state.joint_effort,
-        state.measured_rate_in_base,
-        state.acceleration_in_base,
-        state.foot_force,
-    )
+        state.time_ns, state.joint_position, state.joint_velocity, state.joint_effort,
+        state.measured_rate_in_base, state.acceleration_in_base, state.foot_force)

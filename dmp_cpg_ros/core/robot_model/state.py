@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+Array = NDArray[np.float64]
+
 LEGS = ('fl', 'fr', 'rl', 'rr')
 """Leg names in the order of every array over legs."""
 
@@ -54,22 +56,22 @@ class RobotState:
     """
 
     time_ns: int
-    joint_position: NDArray[np.float64]
-    joint_velocity: NDArray[np.float64]
-    joint_effort: NDArray[np.float64]
-    base_position_in_world: NDArray[np.float64]
-    base_quaternion: NDArray[np.float64]
-    base_velocity_in_base: NDArray[np.float64]
-    base_rate_in_base: NDArray[np.float64]
-    acceleration_in_base: NDArray[np.float64]
-    foot_force: NDArray[np.float64]
-    gyro_in_base: NDArray[np.float64] | None = None
-    ground_normal_in_world: NDArray[np.float64] | None = None
-    joint_work: NDArray[np.float64] | None = None
-    joint_peak_effort: NDArray[np.float64] | None = None
+    joint_position: Array
+    joint_velocity: Array
+    joint_effort: Array
+    base_position_in_world: Array
+    base_quaternion: Array
+    base_velocity_in_base: Array
+    base_rate_in_base: Array
+    acceleration_in_base: Array
+    foot_force: Array
+    gyro_in_base: Array | None = None
+    ground_normal_in_world: Array | None = None
+    joint_work: Array | None = None
+    joint_peak_effort: Array | None = None
 
     @property
-    def measured_rate_in_base(self) -> NDArray[np.float64]:
+    def measured_rate_in_base(self) -> Array:
         """Gyroscope's reading, (3,) [rad/s]; a perfect one's where none is given."""
         return self.base_rate_in_base if self.gyro_in_base is None else self.gyro_in_base
 
@@ -84,6 +86,6 @@ class JointTargets:
         Target angle [rad], angular velocity [rad/s] and feed-forward torque [N m].
     """
 
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    effort: NDArray[np.float64]
+    position: Array
+    velocity: Array
+    effort: Array

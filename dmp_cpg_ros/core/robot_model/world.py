@@ -2,20 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Worlds to walk in, as data: what stands on the floor and how high the ground is anywhere.
 
-The robot starts at the origin, facing along x, on a patch that is flat up to x = ``PATCH``.
+The robot starts at the origin, facing along x, on a patch that is flat up to x = ``PATCH``. A
+world is chosen by parameters of the robot, or by the entry ``world`` of a scenario.
 """
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import cos, radians, sin, tan
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.parameters import Parameters, parameter, shown
 
 Array = NDArray[np.float64]
 
@@ -33,6 +37,8 @@ LEVEL = 4.0
 
 THICKNESS = 1.0
 """Thickness of slabs, most of it inside the floor [m]."""
+
+_ACROSS = (-HALF_WIDTH, HALF_WIDTH)
 
 
 @dataclass(frozen=True)
@@ -59,10 +65,8 @@ class World(Parameters):
     """A flat floor; the base of all worlds."""
 
     friction: float = parameter(
-        0.0, "sliding friction of all contacts; 0: the model's own", minimum=0.0, maximum=2.0
-    )
-
-    KIND: ClassVar[str] = 'flat'
+        0.0, "sliding friction of all contacts; 0: the model's own, 0.3 on low_friction",
+        minimum=0.0, maximum=2.0)
 
     @property
     def floor(self) -> float:
@@ -91,18 +95,17 @@ class World(Parameters):
         ndarray (...)
             [m]
         """
-        return np.zeros(np.broadcast(x, y).shape)
+        return self._height(*np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float)))
+
+    def _height(self, x: Array, y: Array) -> Array:
+        return np.zeros(x.shape)
 
 
 @dataclass(frozen=True)
 class LowFriction(World):
     """A flat, slippery floor."""
 
-    friction: float = parameter(
-        0.3, 'sliding friction of all contacts', minimum=0.02, maximum=2.0
-    )
-
-    KIND: ClassVar[str] = 'low_friction'
+    friction: float = parameter(0.3, 'sliding friction of all contacts', minimum=0.02, maximum=2.0)
 
 
 @dataclass(frozen=True)
@@ -110,10 +113,7 @@ class Slope(World):
     """A slope, and level ground at both of its ends."""
 
     degrees: float = parameter(
-        10.0, 'angle of the slope; negative: downhill', unit='deg', minimum=-40.0, maximum=40.0
-    )
-
-    KIND: ClassVar[str] = 'slope'
+        10.0, 'slope: its angle; negative: downhill', unit='deg', minimum=-40.0, maximum=40.0)
 
     @property
     def floor(self) -> float:
@@ -129,43 +129,28 @@ class Slope(World):
         if self.degrees == 0.0:
             return ()
         angle, half = radians(self.degrees), 0.5 * THICKNESS
-        ramp = Box(
-            (
-                PATCH + 0.5 * LENGTH + half * sin(angle),
-                0.0,
-                0.5 * self._rise - half * cos(angle),
-            ),
-            (0.5 * LENGTH / cos(angle), HALF_WIDTH, half),
-            -angle,
-        )
+        ramp = Box((PATCH + 0.5 * LENGTH + half * sin(angle), 0.0,
+                    0.5 * self._rise - half * cos(angle)),
+                   (0.5 * LENGTH / cos(angle), HALF_WIDTH, half), -angle)
         start = PATCH - LEVEL if self.degrees < 0.0 else PATCH + LENGTH
         top = max(0.0, self._rise)
-        level = _slab(
-            start, start + LEVEL, (-HALF_WIDTH, HALF_WIDTH), top, top - abs(self._rise)
-        )
-        return ramp, level
+        return ramp, _slab((start, start + LEVEL), _ACROSS, (top - abs(self._rise), top))
 
-    def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Height of the ground; see :meth:`World.height_at`."""
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    def _height(self, x: Array, y: Array) -> Array:
         along = np.clip(x - PATCH, 0.0, LENGTH) / LENGTH * self._rise
         upper = x <= PATCH if self.degrees < 0.0 else x >= PATCH + LENGTH
         end = x < PATCH - LEVEL if self.degrees < 0.0 else x > PATCH + LENGTH + LEVEL
-        outside = (np.abs(y) > HALF_WIDTH) | (upper & end)
-        return np.where(outside, self.floor, along)
+        return np.where((np.abs(y) > HALF_WIDTH) | (upper & end), self.floor, along)
 
 
 @dataclass(frozen=True)
 class Blocks(World):
     """A field of square blocks of random heights."""
 
-    height: float = parameter(
-        0.05, 'height of the highest blocks or of a step', unit='m', minimum=0.0, maximum=1.0
-    )
-    size: float = parameter(0.2, 'side of a block', unit='m', minimum=0.05, maximum=2.0)
-    seed: int = parameter(0, "seed of the blocks' heights", minimum=0)
-
-    KIND: ClassVar[str] = 'blocks'
+    height: float = parameter(0.05, 'blocks: height of the highest; steps: height of each',
+                              unit='m', minimum=0.0, maximum=1.0)
+    size: float = parameter(0.2, 'blocks: side of each', unit='m', minimum=0.05, maximum=2.0)
+    seed: int = parameter(0, 'blocks: seed of their heights', minimum=0)
 
     def heights(self) -> Array:
         """Heights of the blocks, uniform in [0, ``height``], ndarray (along x, along y) [m]."""
@@ -175,22 +160,13 @@ class Blocks(World):
         """All blocks."""
         if self.height == 0.0:
             return ()
-        heights = self.heights()
-        left = -0.5 * heights.shape[1] * self.size
-        return tuple(
-            _slab(
-                PATCH + i * self.size,
-                PATCH + (i + 1) * self.size,
-                (left + j * self.size, left + (j + 1) * self.size),
-                float(heights[i, j]),
-                -0.1,
-            )
-            for i, j in np.ndindex(heights.shape)
-        )
+        heights, size = self.heights(), self.size
+        left = -0.5 * heights.shape[1] * size
+        return tuple(_slab((PATCH + i * size, PATCH + (i + 1) * size),
+                           (left + j * size, left + (j + 1) * size), (-0.1, float(height)))
+                     for (i, j), height in np.ndenumerate(heights))
 
-    def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Height of the ground; see :meth:`World.height_at`."""
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    def _height(self, x: Array, y: Array) -> Array:
         heights = self.heights()
         i = np.floor((x - PATCH) / self.size).astype(int)
         j = np.floor(y / self.size + 0.5 * heights.shape[1]).astype(int)
@@ -198,48 +174,42 @@ class Blocks(World):
         return np.where(inside, heights[np.where(inside, i, 0), np.where(inside, j, 0)], 0.0)
 
 
+def _as_of(world: type[World], name: str) -> Any:
+    """The same parameter as another world's."""
+    field = world.__dataclass_fields__[name]
+    return dataclasses.field(default=field.default, metadata=field.metadata)
+
+
 @dataclass(frozen=True)
 class Steps(World):
     """Steps up, a platform, and as many steps down."""
 
-    height: float = parameter(
-        0.05, 'height of the highest blocks or of a step', unit='m', minimum=0.0, maximum=1.0
-    )
-    depth: float = parameter(0.35, 'depth of a step', unit='m', minimum=0.05, maximum=4.0)
-    count: int = parameter(1, 'number of steps up, and down', minimum=1, maximum=50)
+    height: float = _as_of(Blocks, 'height')
+    depth: float = parameter(0.35, 'steps: depth of each', unit='m', minimum=0.05, maximum=4.0)
+    count: int = parameter(1, 'steps: how many up, and down', minimum=1, maximum=50)
     platform: float = parameter(
-        2.0, 'length of the platform between up and down', unit='m', minimum=0.1, maximum=20.0
-    )
-
-    KIND: ClassVar[str] = 'steps'
+        2.0, 'steps: length of the platform on top', unit='m', minimum=0.1, maximum=20.0)
 
     def _ends(self) -> list[tuple[float, float]]:
         """Where each layer begins and ends along x [m], the lowest first."""
         whole = 2.0 * (self.count - 1) * self.depth + self.platform
-        return [
-            (PATCH + i * self.depth, PATCH + whole - i * self.depth) for i in range(self.count)
-        ]
+        return [(PATCH + i * self.depth, PATCH + whole - i * self.depth)
+                for i in range(self.count)]
 
     def boxes(self) -> tuple[Box, ...]:
         """One slab per step, the highest in the middle."""
         if self.height == 0.0:
             return ()
-        across = (-HALF_WIDTH, HALF_WIDTH)
-        return tuple(
-            _slab(*ends, across, (i + 1) * self.height, i * self.height - 0.1)
-            for i, ends in enumerate(self._ends())
-        )
+        return tuple(_slab(ends, _ACROSS, (i * self.height - 0.1, (i + 1) * self.height))
+                     for i, ends in enumerate(self._ends()))
 
-    def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Height of the ground; see :meth:`World.height_at`."""
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    def _height(self, x: Array, y: Array) -> Array:
         layers = np.sum([(x >= start) & (x < end) for start, end in self._ends()], axis=0)
         return np.where(np.abs(y) <= HALF_WIDTH, layers * self.height, 0.0)
 
 
-def height_over_ground(
-    world: World, base_position_in_world: ArrayLike, hips_in_world: ArrayLike
-) -> Array:
+def height_over_ground(world: World, base_position_in_world: ArrayLike, hips_in_world: ArrayLike
+                       ) -> Array:
     """Height of the base over the ground below its hips.
 
     Parameters
@@ -257,8 +227,7 @@ def height_over_ground(
         [m]
     """
     base, hips = np.asarray(base_position_in_world), np.asarray(hips_in_world)
-    ground = world.height_at(hips[..., 0], hips[..., 1]).mean(axis=-1)
-    height: Array = base[..., 2] - ground
+    height: Array = base[..., 2] - world.height_at(hips[..., 0], hips[..., 1]).mean(axis=-1)
     return height
 
 
@@ -271,11 +240,74 @@ def _block_heights(size: float, seed: int) -> Array:
     return heights
 
 
-def _slab(
-    start: float, end: float, across: tuple[float, float], top: float, bottom: float
-) -> Box:
-    """An upright box from ``start`` to ``end`` along x."""
-    return Box(
-        (0.5 * (start + end), 0.5 * (across[0] + across[1]), 0.5 * (top + bottom)),
-        (0.5 * (end - start), 0.5 * (across[1] - across[0]), 0.5 * (top - bottom)),
-    )
+def _slab(*ends: tuple[float, float]) -> Box:
+    """An upright box between its ends along x, y and z."""
+    (x_0, x_1), (y_0, y_1), (z_0, z_1) = ends
+    return Box((0.5 * (x_0 + x_1), 0.5 * (y_0 + y_1), 0.5 * (z_0 + z_1)),
+               (0.5 * (x_1 - x_0), 0.5 * (y_1 - y_0), 0.5 * (z_1 - z_0)))
+
+
+WORLDS: dict[str, type[World]] = {'flat': World, 'slope': Slope, 'blocks': Blocks, 'steps': Steps,
+                                  'low_friction': LowFriction}
+"""Worlds by the word that chooses them."""
+
+PREFIX = 'world_'
+"""What stands before a world's parameter among the parameters of a node."""
+
+
+@dataclass(frozen=True)
+class WorldParameters(Parameters):
+    """Which world the robot walks in; each kind uses those of its own."""
+
+    world: str = parameter('flat', 'kind of ground', choices=tuple(WORLDS))
+    world_degrees: float = _as_of(Slope, 'degrees')
+    world_height: float = _as_of(Blocks, 'height')
+    world_size: float = _as_of(Blocks, 'size')
+    world_seed: int = _as_of(Blocks, 'seed')
+    world_depth: float = _as_of(Steps, 'depth')
+    world_count: int = _as_of(Steps, 'count')
+    world_platform: float = _as_of(Steps, 'platform')
+    world_friction: float = _as_of(World, 'friction')
+
+    def build(self) -> World:
+        """Make the world."""
+        kind = WORLDS[self.world]
+        given = {field.name: getattr(self, PREFIX + field.name)
+                 for field in dataclasses.fields(kind)}
+        if given['friction'] == 0.0:
+            del given['friction']
+        return kind(**given)
+
+
+def world_overrides(values: Any, where: str) -> dict[str, Any]:
+    """Parameters of the robot for the entry ``world`` of a scenario.
+
+    Parameters
+    ----------
+    values : mapping or None
+        ``kind`` and that world's own parameters, such as ``{kind: blocks, height: 0.05}``.
+    where : str
+        For the text of errors.
+
+    Returns
+    -------
+    dict
+        Such as ``{'world': 'blocks', 'world_height': 0.05}``; empty for None.
+
+    Raises
+    ------
+    DataError
+        If the kind or one of its parameters is not known, or a value is bad.
+    """
+    if values is None:
+        return {}
+    kind = values.get('kind') if isinstance(values, Mapping) else None
+    if not isinstance(kind, str) or kind not in WORLDS:
+        raise DataError(f'{where}: world must be a mapping with kind, one of {", ".join(WORLDS)}, '
+                        f'not {shown(values)}')
+    own = {name: value for name, value in values.items() if name != 'kind'}
+    try:
+        WORLDS[kind].from_mapping(own, 'world')
+    except ParameterError as error:
+        raise DataError(f'{where}: {kind}: {error}') from error
+    return {'world': kind, **{PREFIX + name: value for name, value in own.items()}}

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from math import cos, isfinite, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
+from dmp_cpg_ros.core.maths.rotations import Array, roll_pitch_yaw
 
 HOLD_NS = 100_000_000
 """How long a force acts that is not renewed [ns]."""
@@ -59,7 +58,7 @@ class PushForce:
             raise DataError(
                 f'push: the force {self.force} must be at most {LARGEST_FORCE:g} N on each axis')
 
-    def in_world(self, base_quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
+    def in_world(self, base_quaternion: Array) -> Array:
         """Force in the world, ndarray (3,) [N], for a base orientation x, y, z, w."""
         f_x, f_y, f_z = self.force
         if self.frame == 'odom':
@@ -95,16 +94,14 @@ class Push:
         ticks = max(1, round(self.duration_s * 1e9 / tick_ns))
         f_x, f_y, f_z = (value / (ticks * tick_ns * 1e-9) for value in self.impulse)
         renewed = range(start_ns, start_ns + ticks * tick_ns, max(HOLD_NS // tick_ns, 1) * tick_ns)
-        pushing = (PushForce(at, (f_x, f_y, f_z), self.frame) for at in renewed)
-        end = PushForce(start_ns + ticks * tick_ns, (0.0, 0.0, 0.0), self.frame)
-        return (*pushing, end)
+        return (*(PushForce(at, (f_x, f_y, f_z), self.frame) for at in renewed),
+                PushForce(start_ns + ticks * tick_ns, (0.0, 0.0, 0.0), self.frame))
 
 
 class PushQueue:
     """Forces that wait for their time."""
 
     def __init__(self) -> None:
-        """Start without any."""
         self._waiting: list[PushForce] = []
 
     def add(self, force: PushForce) -> None:

@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.contraction.heterogeneity import (
 )
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.tube import hopf_tube, metric_condition, tube_radius
+from dmp_cpg_ros.paper.transverse_metric import hopf_tube, metric_condition, tube_radius
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 

@@ -21,11 +21,11 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
     synchronisation_complement,
 )
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.paper.matrix_measure import matrix_measure
-from dmp_cpg_ros.paper.norm_form import (
+from dmp_cpg_ros.paper.matrix_measure import (
     coupling_measure,
     disagreement_measure,
     hopf_jacobian_vertices,
+    matrix_measure,
 )
 
 SEEDS = st.integers(0, 10_000)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from dmp_cpg_ros.studies import tightness
-from dmp_cpg_ros.studies.tightness_trials import threshold
+from dmp_cpg_ros.studies.tightness import threshold
 
 Trial = Callable[[str], tightness.Row]
 

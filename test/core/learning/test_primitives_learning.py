@@ -27,8 +27,7 @@ from dmp_cpg_ros.core.learning.rhythmic import learn_rhythmic
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, derivatives
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput
-from dmp_cpg_ros.paper.algebra import transformed
-from dmp_cpg_ros.paper.homogeneous import Homogeneous
+from dmp_cpg_ros.paper.daughters import Homogeneous, transformed
 
 DISCRETE = {
     **{f'letter {letter}': handwriting(letter) for letter in LETTERS},

@@ -13,8 +13,17 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import fell
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.robot_model.state import JointTargets
-from dmp_cpg_ros.core.robot_model.world import PATCH, Blocks, LowFriction, Slope, Steps, World
-from dmp_cpg_ros.core.robot_model.world_choice import WORLDS, WorldParameters, world_overrides
+from dmp_cpg_ros.core.robot_model.world import (
+    PATCH,
+    WORLDS,
+    Blocks,
+    LowFriction,
+    Slope,
+    Steps,
+    World,
+    WorldParameters,
+    world_overrides,
+)
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.robot.camera import Camera
 from dmp_cpg_ros.robot.mujoco_import import mujoco

@@ -11,8 +11,7 @@ import pytest
 from checkout import ROOT
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.scenario.events import EVENT_KINDS
-from dmp_cpg_ros.core.scenario.scenario import COMMAND_PERIOD_NS, Scenario, play
+from dmp_cpg_ros.core.scenario.scenario import COMMAND_PERIOD_NS, EVENT_KINDS, Scenario, play
 from dmp_cpg_ros.suite import load_gaits
 
 SCENARIOS = ROOT / 'config' / 'scenarios'

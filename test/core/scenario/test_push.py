@@ -9,9 +9,8 @@ import pytest
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import JointTargets
-from dmp_cpg_ros.core.scenario.events import EVENT_KINDS
 from dmp_cpg_ros.core.scenario.push import HOLD_NS, Push, PushForce, PushQueue
-from dmp_cpg_ros.core.scenario.scenario import Scenario, play
+from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS, Scenario, play
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
