@@ -7,7 +7,7 @@ Computed from the parameters that the nodes run with, for the highest cadence th
 limits allow: (a) the legs synchronise, (b) inhibition makes the network contract, (c) capture
 holds, (d) the tick is short enough, (e) reference and joints contract, (f) at rest all feet are on
 the ground, (g) unequal leg frequencies are tolerated, (h) the time to rest is bounded, (i) where
-legs can vote, a majority stops the gait and fewer do not.
+legs can vote, a majority stops the gait and fewer do not, (j) capture bears delays.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.certificates.network import (
     analyse_network,
+    armed_capture,
     contact_limits,
     later_stop,
     network_inequalities,
     slowest_cadence,
 )
-from dmp_cpg_ros.core.certificates.step import step_inequalities
+from dmp_cpg_ros.core.certificates.step import delay_inequalities, step_inequalities
 from dmp_cpg_ros.core.certificates.timing import time_to_rest, time_to_walking
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
@@ -67,7 +68,7 @@ class Certificate:
     Attributes
     ----------
     inequalities : tuple of Inequality
-        In the order (a) to (i).
+        In the order (a) to (j).
     contraction_grade : str
         ``global``: the inhibited network contracts from every state; ``regional``: on the set that
         capture leads into; ``none``.
@@ -193,24 +194,22 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
         contact, contact_row = contact_limits(network, analysis, span,
                                               inhibition.region_radius, start)
         stop += later_stop(span, tick_s)
-    network_rows = network_inequalities(network, inhibition, span, analysis)
-    rows = [entry for entry in network_rows if entry.name != 'frequency_mismatch']
+    *rows, mismatch = network_inequalities(network, inhibition, span, analysis)
     rows += step_inequalities(p.rho, p.radius, span.omega[1], slowest, inhibition.region_radius,
                               tick_s)
     rows += hierarchy_inequalities(reference, leg, posture, found, p.rho, p.radius,
                                    slowest_cadence(span, p))
     rows += rest_inequalities(network, leg, analysis.rest)
-    rows += [entry for entry in network_rows if entry.name == 'frequency_mismatch']
-    rows += [contact_row] if p.contact_feedback else []
+    rows += [mismatch, contact_row] if p.contact_feedback else [mismatch]
+    rows += delay_inequalities(armed_capture(network, analysis, span, inhibition, contact), tick_s)
     rows += _time_inequalities(stop, start)
     if voting is not None:
         rows += vote_inequalities(network, inhibition, voting, span, reference.alpha_r,
                                   leg.activity_rate, tick_s)
-    rest = analysis.rest
-    return Certificate(
-        tuple(rows), analysis.contraction.reach, span.omega[1], stop, start,
-        () if rest is None else tuple(float(a) for a in rest.phase_ahead),
-        () if rest is None else tuple(float(a) for a in rest.radius), contact)
+    ahead, radius = ((), ()) if analysis.rest is None else (
+        tuple(analysis.rest.phase_ahead.tolist()), tuple(analysis.rest.radius.tolist()))
+    return Certificate(tuple(rows), analysis.contraction.reach, span.omega[1], stop, start, ahead,
+                       radius, contact)
 
 
 def _time_inequalities(stop: float, start: float) -> list[Inequality]:

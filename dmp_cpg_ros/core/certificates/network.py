@@ -11,8 +11,14 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.inequality import Inequality
-from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set
+from dmp_cpg_ros.core.contraction.capture import (
+    CaptureSet,
+    capture_set,
+    place_tolerance,
+    radius_tolerance,
+)
 from dmp_cpg_ros.core.contraction.capture_anywhere import needed_gain_anywhere
+from dmp_cpg_ros.core.contraction.delays import Capture
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium, inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import PROVED
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound, mismatch_margin
@@ -26,7 +32,11 @@ from dmp_cpg_ros.core.contraction.inhibited import (
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, entry_tolerances
+from dmp_cpg_ros.core.inhibition.supervisor import (
+    LOCKED_PHASE_ERROR,
+    entry_tolerances,
+    largest_degree,
+)
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -120,6 +130,31 @@ def network_inequalities(network: GaitNetwork, inhibition: InhibitionParameters,
                    f'{EXPECTED_MISMATCH:.0%} of omega_max', 'tolerated mismatch', PROVED,
                    f'legs whose own frequencies differ stay within {LOCKED_PHASE_ERROR:g} rad of '
                    'their places', required=False)]
+
+
+def armed_capture(network: GaitNetwork, analysis: NetworkAnalysis, span: OperatingRange,
+                  inhibition: InhibitionParameters, contact: ContactLimits | None) -> Capture:
+    """Capture at the cadences at which inhibition is armed, for its delays.
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        Oscillators.
+    analysis : NetworkAnalysis
+        Of the network.
+    span : OperatingRange
+        Cadences.
+    inhibition : InhibitionParameters
+        For the region.
+    contact : ContactLimits or None
+        What contact feedback may add to the frequency of a leg.
+    """
+    p, r0 = network.parameters, inhibition.region_radius
+    places = place_tolerance(span.omega_at_rest, p.coupling_gain * largest_degree(
+        p.coupling_graph), p.radius)
+    omega = span.omega_armed[1] + (contact.own if contact else 0.0)
+    return Capture(network.system, omega, analysis.capture.gains, r0, places,
+                   radius_tolerance(p.radius, r0))
 
 
 def _contraction(contraction: InhibitedContraction) -> Inequality:
