@@ -141,7 +141,9 @@ def _report(certified: Certified, suggest: bool) -> list[str]:
             f'{leg} {math.degrees(ahead):.1f} deg at {radius:.3f}' for leg, ahead, radius
             in zip(LEGS, certificate.rest_phase, certificate.rest_radius, strict=True))
         lines += ['', f'at rest, phase ahead of its place and radius: {at_rest}']
-    lines += ['', *_votes(certified)]
+    lines += ['', f'from a request on the reference goes at most '
+              f'{certificate.distance_to_rest:.4g} m, at its largest speed',
+              '', *_votes(certified)]
     lines += ['', 'certificate: ' + (
         f'holds; contraction under inhibition is of {certificate.contraction_grade} grade; '
         f"sampled, not proved: {', '.join(certificate.sampled) or 'nothing'}"

@@ -65,7 +65,7 @@ class InhibitionNode(CertifiedNode):
         self._x: Any = None
         self._x_dot: Any = None
         self._r = np.zeros(3)
-        self._predicted = self._bound = float('nan')
+        self._predicted = self._bound = self._way = float('nan')
         self._told: tuple[Any, ...] = ()
         self._lock_step = self.parameters_of(LockStepParameters).lock_step
         self._writer, self._publisher = InhibitionStateWriter(), self.publisher('inhibition_state')
@@ -207,7 +207,8 @@ class InhibitionNode(CertifiedNode):
             f'at most {self._bound:.3f} s' if isfinite(self._bound)
             else 'without a bound from this state'
         )
-        response.message = f'{verb} {when}, {most}; {self._words()}'
+        way = f'; the reference goes on for at most {self._way:.3f} m' if request.data else ''
+        response.message = f'{verb} {when}, {most}; {self._words()}{way}'
         return response
 
     def _predict(self, published: Inhibition) -> None:
@@ -235,6 +236,8 @@ class InhibitionNode(CertifiedNode):
             if self._state.requested
             else self._certificate_in_force().time_to_walking
         )
+        self._way = self.running_in(gait).stop_distance(
+            self._r, self._gate.at(self._state.time_ns)) if self._state.requested else float('nan')
         if self._state.voted:
             self._bound = self._votes.bound(self._supervisor, self._network, self._state)
 
@@ -257,6 +260,7 @@ class InhibitionNode(CertifiedNode):
             request_stamp=state.request_ns * 1e-9,
             predicted_s=self._predicted,
             bound_s=self._bound,
+            bound_m=self._way,
             measured_s=state.measured_s,
             grade=self._words(),
             **self._votes.told(state),

@@ -52,6 +52,7 @@ from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
+from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
@@ -83,6 +84,8 @@ class Certificate:
         |x_i| of each leg at rest.
     contact : ContactLimits or None
         What contact feedback may do; None where it is off.
+    distance_to_rest : float
+        Bound on the way of the reference after a request at the largest speed [m].
     """
 
     inequalities: tuple[Inequality, ...]
@@ -93,6 +96,7 @@ class Certificate:
     rest_phase: tuple[float, ...]
     rest_radius: tuple[float, ...]
     contact: ContactLimits | None = None
+    distance_to_rest: float = math.inf
 
     def __getitem__(self, name: str) -> Inequality:
         """Return the inequality of a name; raises ParameterError with the names that exist."""
@@ -135,6 +139,7 @@ class Certificate:
             'holds': self.holds, 'grade': self.grade, 'contraction_grade': self.contraction_grade,
             'omega_max': self.omega_max, 'time_to_rest_s': _finite(self.time_to_rest),
             'time_to_walking_s': _finite(self.time_to_walking),
+            'distance_to_rest_m': _finite(self.distance_to_rest),
             'rest_phase_rad': list(self.rest_phase), 'rest_radius': list(self.rest_radius),
             'sampled': list(self.sampled), 'failing': [entry.name for entry in self.failing],
             'inequalities': {entry.name: entry.as_mapping() for entry in self.inequalities}}
@@ -208,8 +213,9 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
                                   leg.activity_rate, tick_s)
     ahead, radius = ((), ()) if analysis.rest is None else (
         tuple(analysis.rest.phase_ahead.tolist()), tuple(analysis.rest.radius.tolist()))
+    fastest = math.hypot(reference.max_speed, reference.max_lateral_speed)
     return Certificate(tuple(rows), analysis.contraction.reach, span.omega[1], stop, start, ahead,
-                       radius, contact)
+                       radius, contact, stop_distance(reference, fastest, fastest, tick_s))
 
 
 def _time_inequalities(stop: float, start: float) -> list[Inequality]:
