@@ -103,7 +103,9 @@ def _report(suite: Suite, certificate: Certificate, needed: votes.VotesNeeded) -
     voting = 'on' if suite.parameters.voting.voting else 'off'
     enough, too_weak = (', '.join(f'{gain:.4g}' for gain in gains)
                         for gains in (needed.enough, needed.too_weak))
-    return [*lines, '', f'voting is {voting}; {_votes(needed)}',
+    return [*lines, '', f'from a request on the reference goes at most '
+            f'{certificate.distance_to_rest:.4g} m, at its largest speed', '',
+            f'voting is {voting}; {_votes(needed)}',
             f'gains of each from which 1, 2, ... votes certainly stop it: {enough} 1/s; below '
             f'which they cannot: {too_weak} 1/s', '', f'certificate: {verdict}']
 

@@ -61,7 +61,7 @@ class InhibitionNode(SuiteNode):
         self._x: Any = None
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
-        self._predicted = self._bound = nan
+        self._predicted = self._bound = self._way = nan
         self._told: tuple[Any, ...] = ()
         self._publisher = self.publisher('inhibition_state')
         self._gains_writer = conversions.InhibitionGainsWriter()
@@ -159,7 +159,8 @@ class InhibitionNode(SuiteNode):
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
         most = f'at most {self._bound:.3f} s' if isfinite(self._bound) else (
             'without a bound from this state')
-        return True, f'{"at rest" if stop else "walking"} {when}, {most}; {self._words()}'
+        way = f'; the reference goes on for at most {self._way:.3f} m' if stop else ''
+        return True, f'{"at rest" if stop else "walking"} {when}, {most}; {self._words()}{way}'
 
     def _predict(self) -> None:
         """Look ahead to the rest or the walk that was just requested."""
@@ -171,11 +172,13 @@ class InhibitionNode(SuiteNode):
             self._supervisor, self._reference, self._running_gait, self._state, self._acting,
             canon, self._r, self._gate.at(self._state.time_ns),
             self.parameters_of(TickParameters).tick_ns * 1e-9, body_mode=self._body_mode)
+        running = self.certified.running_in(gait)
+        self._way = running.stop_distance(
+            self._r, self._gate.at(self._state.time_ns)) if self._state.requested else nan
         if self._state.voted:
             self._bound = self._bound_by_votes()
         elif self._state.requested:
-            self._bound = self.certified.running_in(gait).time_to_rest(
-                self._network, self._x, self._r)
+            self._bound = running.time_to_rest(self._network, self._x, self._r)
         else:
             self._bound = self.certified.certificate_in(gait).time_to_walking
 
@@ -206,7 +209,8 @@ class InhibitionNode(SuiteNode):
         told = {'requested': state.requested, 'armed': state.armed, 'automatic': state.automatic,
                 **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,
                 'request_stamp': state.request_ns * 1e-9, 'predicted_s': self._predicted,
-                'bound_s': self._bound, 'measured_s': state.measured_s, 'grade': self._words()}
+                'bound_s': self._bound, 'bound_m': self._way, 'measured_s': state.measured_s,
+                'grade': self._words()}
         if self._voting.voting.voting:
             told |= {**_by_leg('vote', state.tally.weights), 'voted': state.voted,
                      'asked': state.asked, 'cause': state.tally.cause}

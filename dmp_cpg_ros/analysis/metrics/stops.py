@@ -42,7 +42,7 @@ def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[str, Any]:
     at_rest = next((event for event in episode.events if event.message == 'at_rest'), None)
-    entry = _times(episode, at_rest)
+    entry = {**_times(episode, at_rest), 'distance_bound_m': _first(episode, 'bound_m')}
     if at_rest is None:
         return entry
     end = episodes.stands_until(recording, at_rest.time, episode.end)

@@ -7,7 +7,7 @@ Computed from the parameters that the nodes run with, for the highest cadence th
 limits allow: (a) the legs synchronise, (b) inhibition makes the network contract, (c) capture
 holds, (d) the tick is short enough, (e) reference and joints contract, (f) at rest all feet are on
 the ground, (g) unequal leg frequencies are tolerated, (h) the time to rest is bounded, (i) where
-legs can vote, a majority stops the gait and fewer do not.
+legs can vote, a majority stops the gait and fewer do not, (j) capture bears delays.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates import network as of_network
 from dmp_cpg_ros.core.certificates.inequality import Inequality, finite
 from dmp_cpg_ros.core.certificates.network import Setting
-from dmp_cpg_ros.core.certificates.step import step_inequalities
+from dmp_cpg_ros.core.certificates.step import delay_inequalities, step_inequalities
 from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest, time_to_walking
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction import hierarchy
@@ -41,6 +41,7 @@ from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, REST_ACTI
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
+from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.leg import LegParameters
@@ -55,7 +56,7 @@ class Certificate:
     Attributes
     ----------
     inequalities : tuple of Inequality
-        In the order (a) to (i).
+        In the order (a) to (j).
     contraction_grade : str
         ``global``: the inhibited network contracts from every state; ``regional``: on the set that
         capture leads into; ``none``.
@@ -70,6 +71,8 @@ class Certificate:
         |x_i| of each leg at rest.
     contact : ContactLimits or None
         What contact feedback may do; None where it is off.
+    distance_to_rest : float
+        Bound on the way of the reference after a request at the largest speed [m].
     """
 
     inequalities: tuple[Inequality, ...]
@@ -80,6 +83,7 @@ class Certificate:
     rest_phase: tuple[float, ...]
     rest_radius: tuple[float, ...]
     contact: ContactLimits | None = None
+    distance_to_rest: float = math.inf
 
     def __getitem__(self, name: str) -> Inequality:
         """Return the inequality of a name; raises ParameterError with the names that exist."""
@@ -115,6 +119,7 @@ class Certificate:
             'holds': self.holds, 'grade': self.grade, 'contraction_grade': self.contraction_grade,
             'omega_max': self.omega_max, 'time_to_rest_s': finite(self.time_to_rest),
             'time_to_walking_s': finite(self.time_to_walking),
+            'distance_to_rest_m': finite(self.distance_to_rest),
             'rest_phase_rad': list(self.rest_phase), 'rest_radius': list(self.rest_radius),
             'sampled': list(self.sampled), 'failing': [entry.name for entry in self.failing],
             'inequalities': {entry.name: entry.as_mapping() for entry in self.inequalities}}
@@ -182,7 +187,10 @@ def certificate_of(s: Setting) -> Certificate:
         # a leg that is as far behind its place as phase lock allows.
         stop += s.tick_s + LOCKED_PHASE_ERROR / s.span.omega_armed[0]
         rows.append(row)
+    reference = s.parameters.reference
+    fastest = math.hypot(reference.max_speed, reference.max_lateral_speed)
     rows += [
+        *delay_inequalities(of_network.armed_capture(s, analysis, contact), s.tick_s),
         Inequality('time_to_rest', stop, LONGEST_STOP, 's', 'bound', 'longest stop', PROVED,
                    'from a request at any phase of the locked gait, at any speed, to rest'),
         Inequality('time_to_walking', start, LONGEST_STOP, 's', 'bound', 'longest start', PROVED,
@@ -191,7 +199,8 @@ def certificate_of(s: Setting) -> Certificate:
     return Certificate(
         tuple(rows), contraction.reach, s.span.omega[1], stop, start,
         () if rest is None else tuple(rest.phase_ahead.tolist()),
-        () if rest is None else tuple(rest.radius.tolist()), contact)
+        () if rest is None else tuple(rest.radius.tolist()), contact,
+        stop_distance(reference, fastest, fastest, s.tick_s))
 
 
 GROUND = 0.01

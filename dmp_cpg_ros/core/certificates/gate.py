@@ -29,6 +29,7 @@ from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, inhibited_contraction
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
 
@@ -100,6 +101,13 @@ class Running:
         """
         return self.certificate().time_to_rest + later_arming(
             Setting.of(network, self.parameters, self.tick_s), x, r)
+
+    def stop_distance(self, r: Array, command: tuple[float, float, float]) -> float:
+        """Bound on the way of the reference r, ndarray (3,), after a stop is requested while a
+        command acts [m].
+        """
+        return stop_distance(self.parameters.reference, math.hypot(*r[:2]),
+                             math.hypot(*command[:2]), self.tick_s)
 
     def refused_now(self, before: Running, network: GaitNetwork, inhibition: Inhibition,
                     x: Array) -> str:

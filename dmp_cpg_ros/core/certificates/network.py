@@ -16,6 +16,7 @@ from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.contraction import inhibited
 from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set
 from dmp_cpg_ros.core.contraction.capture_anywhere import needed_gain_anywhere
+from dmp_cpg_ros.core.contraction.delays import Capture
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium, inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import PROVED
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound, mismatch_margin
@@ -135,6 +136,16 @@ def network_inequalities(s: Setting, analysis: NetworkAnalysis) -> list[Inequali
                    f'{EXPECTED_MISMATCH:.0%} of omega_max', 'tolerated mismatch', PROVED,
                    f'legs whose own frequencies differ stay within {LOCKED_PHASE_ERROR:g} rad of '
                    'their places', required=False)]
+
+
+def armed_capture(s: Setting, analysis: NetworkAnalysis, contact: ContactLimits | None) -> Capture:
+    """Capture at the cadences at which inhibition is armed, for its delays; contact feedback may
+    add to the frequency of a leg.
+    """
+    r0 = s.parameters.inhibition.region_radius
+    omega = s.span.omega_armed[1] + (contact.own if contact else 0.0)
+    return Capture(s.network.system, omega, analysis.capture.gains, r0,
+                   *entry_tolerances(s.network, r0))
 
 
 def _contraction(found: InhibitedContraction) -> Inequality:

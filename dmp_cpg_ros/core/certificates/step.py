@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Time step against stiffness: what the exponential step can take."""
+"""Time step against stiffness: what the exponential step can take; and delays against what capture
+bears.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +15,12 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.contraction.capture import radius_tolerance
+from dmp_cpg_ros.core.contraction.delays import (
+    Capture,
+    carried_margin,
+    held_margin,
+    late_margin,
+)
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 from dmp_cpg_ros.core.maths.roots import last_that_holds
@@ -22,6 +30,9 @@ STEP_ERROR = 0.025
 
 LARGEST_MILD_STEP = 1.4
 """Largest s = tick · ℓ for which that is so with some room."""
+
+EXPECTED_TICKS = 3
+"""Ticks that a sample should be allowed to be old: held for one, a tick late, one message lost."""
 
 
 def mild_rate(rho: float, radius: float, omega: float) -> float:
@@ -126,3 +137,36 @@ def step_inequalities(s: Setting, rate: float) -> list[Inequality]:
                    'the integration keeps the radius of the limit cycle'),
         Inequality('region_per_tick', omega * tick_s, s.arc, 'rad', 'omega_max tick', 'arc of C',
                    PROVED, 'an oscillator cannot step over the region C between two ticks')]
+
+
+def delay_inequalities(capture: Capture, tick_s: float) -> list[Inequality]:
+    """Inequalities (j): delays, held samples and lost messages against what capture bears.
+
+    Parameters
+    ----------
+    capture : Capture
+        Of the suite, at the fastest cadence at which inhibition is armed.
+    tick_s : float
+        Control tick [s].
+
+    Returns
+    -------
+    list of Inequality
+        None is required: in the suite one node has all oscillators and switches inhibition.
+    """
+    age = EXPECTED_TICKS * tick_s
+    slower = 1.0 + age * float(capture.coupling.sum(axis=1).max())
+
+    def row(name: str, margin: float, what: str, how: str) -> Inequality:
+        late = 'any number of' if math.isinf(margin) else max(0, math.floor(margin / tick_s) - 1)
+        return Inequality(name, age, margin, 's', 'held, late, one lost', what, PROVED,
+                          f'{how}, {late} ticks late or messages lost', required=False)
+
+    return [
+        row('late_inhibition', late_margin(capture), 'time to cross C',
+            'inhibition captures as it does at once when it acts'),
+        row('held_coupling', held_margin(capture), 'age of states',
+            "with an oscillator per node that holds the others' states "
+            f'(at {slower:.3g} times the period) capture would bear'),
+        row('carried_coupling', carried_margin(capture), 'age of states',
+            'with states that are carried on by their rate times their age it would bear')]

@@ -80,7 +80,7 @@ class CaptureSet:
 
 
 def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
-                region_radius: float) -> CaptureSet:
+                region_radius: float, places: float = PLACE_TOLERANCE) -> CaptureSet:
     """Build the invariant set of an inhibited network.
 
     Parameters
@@ -93,6 +93,8 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
         Inhibition gains α_i [1/s]; those above zero are switched on inside C_i.
     region_radius : float
         r0 of C_i = {|x_i − x_{i,d}| ≤ r0}.
+    places : float
+        Largest distance of a node from its place at capture, as a fraction of |x_d|.
 
     Returns
     -------
@@ -120,7 +122,7 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     u = _distances(system, L, omega, inhibited, D, region_radius, largest + D)
     pull = outward_growth(system, omega, D, u) - L @ u
     needed = np.where(inhibited, pull / region_radius, np.nan)
-    tolerance = PLACE_TOLERANCE * D
+    tolerance = places * D
     if np.any(~inhibited):
         tolerance = min(tolerance, float(u[~inhibited].min()) - region_radius)
     M = L + np.diag(gains)

@@ -17,6 +17,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 LEG, POSTURE = LegParameters(), PostureParameters()
@@ -116,3 +117,44 @@ def test_the_bound_grows_with_the_distance_to_the_speed_of_capture() -> None:
     bounds = [certify(network(), InhibitionParameters(capture_speed=speed), ReferenceParameters(),
                       LEG, POSTURE, TICK).time_to_rest for speed in (0.05, 0.1, 0.4)]
     assert bounds[0] > bounds[1] > bounds[2]
+
+
+@pytest.mark.parametrize('name', ['amble', 'walk', 'trot', 'bound'])
+@pytest.mark.parametrize(('speed', 'alpha_r'), [(0.2, 3.0), (1.0, 3.0), (3.0, 3.0), (1.0, 8.0)])
+def test_the_reference_does_not_go_farther_than_its_bound_and_nearly_as_far(
+        name: str, speed: float, alpha_r: float) -> None:
+    gait, inhibition = network(name), InhibitionParameters(auto_inhibit=False)
+    reference = ReferenceParameters(alpha_r=alpha_r)
+    case = Gait(gait, inhibition, reference, gait.locked_state(0.4),
+                np.array([speed, 0.2 * speed, 0.3]))
+    bound = stop_distance(reference, *[float(np.hypot(*case.r[:2]))] * 2, TICK)
+    way = _way_to_rest(case)
+    assert way <= bound <= 1.25 * way
+
+
+def test_a_reference_that_speeds_up_when_a_stop_is_requested_keeps_the_bound() -> None:
+    gait, reference = network(), ReferenceParameters(max_acceleration=50.0)
+    case = Gait(gait, InhibitionParameters(auto_inhibit=False), reference, gait.locked_state(),
+                np.array([0.5, 0.0, 0.0]))
+    case.command = (3.0, 0.0, 0.0)
+    bound = stop_distance(reference, 0.5, 3.0, TICK)
+    way = _way_to_rest(case)
+    assert stop_distance(reference, 0.5, 0.5, TICK) < way <= bound <= 1.25 * way
+
+
+def test_the_certificate_bounds_the_way_from_the_largest_speed() -> None:
+    reference = ReferenceParameters(max_speed=1.2, max_lateral_speed=0.5)
+    found = certify(network(), InhibitionParameters(), reference, LEG, POSTURE, TICK)
+    assert found.distance_to_rest == stop_distance(reference, 1.3, 1.3, TICK)
+    assert found.as_mapping()['distance_to_rest_m'] == found.distance_to_rest
+
+
+def _way_to_rest(case: Gait) -> float:
+    """Way of the reference from a request to rest [m]."""
+    case.stop, way = case.supervisor.request(case.stop, True), 0.0
+    for _ in range(2000):
+        case.tick()
+        way += float(np.hypot(*case.r[:2])) * TICK
+        if case.stop.word == 'at_rest':
+            return way
+    raise AssertionError('it does not come to rest')

@@ -1,0 +1,344 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What capture bears of delay: messages that come late, are held, or are lost (Section 4.2).
+
+With samples of the others, ŷ_j of an age of at most d that may differ from edge to edge and vary
+in any way, the distances from the target obey in locked coordinates
+
+    u̇_i ≤ g_i(u_i) + Σ_j k_ij û_j − (Σ_j k_ij + α_i) u_i.
+
+This is a comparison system with no negative feedback that is late: a box is invariant when it is
+without delay and the samples lie in it too (Halanay's inequality; Smith 1995, *Monotone Dynamical
+Systems*, chapter 5), and differences of solutions vanish whenever those of the undelayed system
+do. What limits d are the samples from before the capture and, where states are carried on by
+ẋ times their age, ŷ_j = (1 − d (Σ_l k_jl + α_j)) y_j + d (F(y_j) + Σ_l k_jl ŷ_l + α_j y_d), which
+leads out of the box; without damping from 1/λ_max(k) on, where the equation is not stable at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from math import acos, asin, cos, exp, inf, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.contraction.capture import (
+    CaptureSet,
+    capture_set,
+    outward_growth,
+    outward_growth_within,
+)
+from dmp_cpg_ros.core.contraction.hopf_bounds import growth
+from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian, slowest_rate
+from dmp_cpg_ros.core.maths.roots import last_that_holds
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 7  # of a bisection
+_PRESENT, _ENTRY, _CARRIED = range(3)  # what the largest sample is of
+_ROOM = 1.02  # factor on distances for which what grows with them is taken
+
+
+@dataclass(frozen=True)
+class Capture:
+    """A capture whose delays are asked for; all oscillators have one radius r = |x_d|.
+
+    Attributes
+    ----------
+    system : CanonicalSystem
+        Oscillators, coupled by K_ij = k_ij I.
+    omega : float
+        Largest angular frequency from arming to rest [rad/s].
+    gains : ndarray (N,)
+        Inhibition gains α_i that act together [1/s].
+    region_radius : float
+        r0 of C.
+    places, radii : float
+        How far legs may be from each other's places, and radii from r, when C is entered.
+    """
+
+    system: CanonicalSystem
+    omega: float
+    gains: Array
+    region_radius: float
+    places: float
+    radii: float
+
+    @cached_property
+    def undelayed(self) -> CaptureSet:
+        """The capture set without delays."""
+        return capture_set(self.system, self.omega, self.gains, self.region_radius)
+
+    @cached_property
+    def coupling(self) -> Array:
+        """k_ij, ndarray (N, N) [1/s]."""
+        L = comparison_laplacian(self.system.graph)
+        return np.asarray(np.diag(np.diag(L)) - L)
+
+    @property
+    def radius(self) -> float:
+        """Radius r of the limit cycle."""
+        return float(self.system.radius[0])
+
+    @property
+    def held(self) -> NDArray[np.bool_]:
+        """Which nodes are inhibited."""
+        return self.gains > 0.0
+
+    @cached_property
+    def _global(self) -> bool:
+        M = np.diag(self.coupling.sum(axis=1) + self.gains) - self.coupling
+        return slowest_rate(M - np.diag(growth(self.system.rho, self.system.radius))) > 0.0
+
+    def contracts(self, places: float) -> bool:
+        """Whether captured trajectories approach each other whatever the delays of held samples,
+        for entries with nodes this far from their places: the comparison matrix is the undelayed
+        one.
+        """
+        if self._global:
+            return True
+        found = capture_set(self.system, self.omega, self.gains, self.region_radius,
+                            places / self.radius)
+        return found.rate > 0.0 and found.tolerance >= places * (1.0 - 1e-12)
+
+    def growth_out(self, u: Array) -> Array:
+        """Largest g_i within distances u_i, ndarray (N,) [1/s]."""
+        return outward_growth_within(self.system, np.asarray(self.omega), self.radius, u)
+
+    def room(self, pull: Array) -> Array:
+        """What is left to an inhibited node against a pull from outside on the edge of C [1/s]."""
+        r0 = self.region_radius
+        out = outward_growth(self.system, np.asarray(self.omega), self.radius,
+                             np.full(len(self.gains), r0))
+        return (self.gains * r0 - out - pull)[self.held]
+
+
+    def outweighs(self, pull: float, behind: float, off: float = 0.0) -> bool:
+        """Whether rotation outweighs a pull by samples from before the capture, which are outside
+        of C by at most ``behind``, and off the cycle by ``off`` more than the gate allows.
+
+        Such a sample pulls outwards along n where rotation leads back: with an angle of at most χ
+        between the sample's direction from x_d and the flow there, −ω r cos(n, flow) + pull
+        cos(n, sample) ≤ ω r (2 sin(χ/2) + max(0, pull/ω r − 1)), not above ω r where this is 1.
+        """
+        r, r0 = self.radius, self.region_radius
+        off = self.radii + off
+        sine = off * (1.0 + off / (2.0 * r)) / r0 + (r0 + behind) / (2.0 * r)
+        more = max(0.0, pull / (self.omega * r) - 1.0)
+        return sine <= 1.0 and 2.0 * sin(0.5 * asin(sine)) + more <= 1.0
+
+
+def late_margin(capture: Capture) -> float:
+    """Longest time from entering C until inhibition acts, for capture as without that delay [s].
+
+    Meanwhile the legs run freely and none goes ahead of the foremost, which turns at ω: they are
+    still inside C when it acts, and what the gate allowed has grown by exp(∫ρ(r² − |x|²)).
+
+    Parameters
+    ----------
+    capture : Capture
+        What is to be captured.
+
+    Returns
+    -------
+    float
+        0 without a certificate.
+    """
+    r, r0, omega, found = (capture.radius, capture.region_radius, capture.omega,
+                           capture.undelayed)
+    if not found.holds:
+        return 0.0
+    degree, rho = float(capture.coupling.sum(axis=1).max()), float(capture.system.rho.max())
+    room = min(2.0 * capture.places, float(found.distance[~capture.held].min(initial=inf)) - r0)
+    inwards = degree * room**2 / (2.0 * r)                                   # of radii [1/s]
+    off = capture.radii + inwards * 4.0 * asin(min(1.0, r0 / (2.0 * r))) / omega
+    arc = min(2.0 * acos(min(1.0, max(-1.0, (R * R + r * r - r0 * r0) / (2.0 * R * r))))
+              for R in (max(r - off, 1e-9), r + off))
+    crossing = (arc - 2.0 * asin(min(1.0, capture.places / (2.0 * max(r - off, 1e-9))))) / omega
+
+    def bears(delay: float) -> bool:
+        apart = capture.places * exp(rho * delay * max(0.0, r * r - (r - off)**2 + room**2))
+        return apart <= room * (1.0 + 1e-12) and capture.contracts(apart)
+
+    return _longest(bears, crossing) if off < r else 0.0
+
+
+def held_margin(capture: Capture) -> float:
+    """Largest age of held samples ŷ_j = y_j(t − d) with which capture holds [s].
+
+    The samples from before the capture are up to ω r d behind. A node that does not turn
+    backwards is pulled back by no more than ω r and what nodes ahead of it add, Σ_j k_ij p: later
+    samples pull less, so that no age is too long where rotation makes up for that. Else those of
+    free nodes must lie in the box, the largest that the inhibition holds, and those of inhibited
+    ones at most ω r/k outside of it.
+
+    Parameters
+    ----------
+    capture : Capture
+        What is to be captured, by nodes that for as long before were in their places and turned
+        neither backwards nor faster than ω.
+
+    Returns
+    -------
+    float
+        0 without a certificate, infinite where capture does not depend on delays.
+    """
+    r, r0, omega, held = capture.radius, capture.region_radius, capture.omega, capture.held
+    if not capture.undelayed.holds:
+        return 0.0
+    k = capture.coupling
+    pulled = omega * r + float(k.sum(axis=1).max()) * capture.places
+    lag = asin(min(1.0, pulled / (float(k[k > 0.0].min(initial=inf)) * (r - capture.radii))))
+    farthest = 2.0 * r * sin(0.5 * lag) + capture.radii
+    if (capture.outweighs(pulled / cos(0.5 * lag), farthest)
+            and capture.contracts(capture.places + farthest)):
+        return inf
+    edge, nearest = _largest_box(capture)
+    together = capture.places if np.count_nonzero(held) > 1 else 0.0
+    most = float(k[:, held].sum(axis=1).max())
+
+    def bears(age: float) -> bool:
+        behind = omega * r * age
+        beyond = r0 + behind + together - edge
+        return (r0 + behind + capture.places <= nearest * (1.0 + 1e-12)
+                and (beyond <= 0.0 or capture.outweighs(most * beyond, behind + together))
+                and capture.contracts(capture.places + behind))
+
+    return _longest(bears, min(nearest - r0 - capture.places, 0.5 * pi * r) / (omega * r))
+
+
+def carried_margin(capture: Capture) -> float:
+    """Largest age of samples ŷ_j = y_j(t − d) + d ẏ_j(t − d) with which capture holds [s].
+
+    Parameters
+    ----------
+    capture : Capture
+        What is to be captured, by nodes that for twice as long before were in their places and
+        turned no faster than ω.
+
+    Returns
+    -------
+    float
+        0 without a certificate; always below :func:`longest_carried`.
+    """
+    if not capture.undelayed.holds:
+        return 0.0
+    return _longest(lambda age: _carries(capture, age), longest_carried(capture.system))
+
+
+def longest_carried(system: CanonicalSystem) -> float:
+    """1/λ_max(k), the age from which on states that are carried on by ẋ times a constant age
+    oscillate ever faster [s].
+
+    ẏ_i − d Σ_j k_ij ẏ_j(t − d) is the difference operator of a neutral equation, which is not
+    stable for λ_max(k) d ≥ 1 (Hale & Verduyn Lunel 1993, chapter 9).
+    """
+    L = comparison_laplacian(system.graph)
+    return 1.0 / max(float(np.abs(np.linalg.eigvals(np.diag(np.diag(L)) - L)).max()), 1e-300)
+
+
+def _longest(bears: Callable[[float], bool], most: float) -> float:
+    """Longest delay that is borne, not above ``most``; 0 when there is none [s]."""
+    if not most > 0.0:
+        return 0.0
+    return most if bears(most) else last_that_holds(bears, 0.0, most, _ROUNDS)
+
+
+def _largest_box(capture: Capture) -> tuple[float, float]:
+    """Largest distance R that inhibited nodes may show to the others while those that see them
+    there cannot pull them out of C, and the smallest ū_f of the free nodes then.
+    """
+    k, held, r0 = capture.coupling, capture.held, capture.region_radius
+    free, base = ~held, capture.undelayed.distance
+    if not free.any():
+        return r0 + float((capture.room(0.0 * base) / k.sum(axis=1)).min()), inf
+    grounded = (np.diag(k.sum(axis=1)) - k)[np.ix_(free, free)]
+    if slowest_rate(grounded) <= 1e-9 * float(k.max()):
+        return r0, float(base[free].min())
+    edge, u = r0, base
+    for _ in range(6):
+        most = _ROOM * u
+        beyond = np.zeros(len(k))
+        beyond[free] = np.linalg.solve(grounded, capture.growth_out(most)[free])
+        edge = r0 + float((capture.room(k @ beyond) / k.sum(axis=1)[held]).min())
+        u = edge + beyond
+        if edge > r0 and np.all(u <= most):
+            return edge, float(u[free].min())
+    return r0, float(base[free].min())
+
+
+def _carries(capture: Capture, age: float) -> bool:
+    """Whether box and contraction have room for carried samples of an age."""
+    system, r, r0, omega = capture.system, capture.radius, capture.region_radius, capture.omega
+    k, held, rho = capture.coupling, capture.held, float(capture.system.rho.max())
+    degree, size = k.sum(axis=1), len(k)
+    kept = 1.0 - age * (degree + capture.gains)
+    bent = 0.5 * r * (omega * age) ** 2
+    off = float(degree.max()) * (capture.places + bent) + 3.0 * rho * r**2 * capture.radii
+    beyond = bent + 2.0 * age * off + capture.places * (np.count_nonzero(held) > 1)
+    aside = capture.outweighs(float(k[:, held].sum(axis=1).max()) * beyond, beyond, beyond)
+    entry = np.where(held & aside, r0, r0 + capture.places + bent + 2.0 * age * off)
+    u, choice = capture.undelayed.distance, np.where(held, _CARRIED, _PRESENT)
+    for _ in range(8):
+        least, most = u / _ROOM, u * _ROOM
+        out = capture.growth_out(most)
+        way = age * np.hypot(omega * (r + most), rho * np.maximum(
+            0.385 * r**3, (2.0 * r + most) * most * (r + most)))          # d |F|
+        along = np.abs(kept) * least + np.where(kept >= 0.0, age * out, way)
+        more = np.hypot(np.maximum(along, way), way) - np.abs(kept) * least
+        more += age * beyond * aside * k[:, held].sum(axis=1)
+        bound = _bound(k, age, degree, np.where(held, r0, out), np.abs(kept), more, entry, held,
+                       choice)
+        if bound is None or bound[0].max() > 10.0 * r:
+            return False
+        u, samples, choice = bound
+        if np.all(u <= most) and np.all(u >= least):
+            break
+    else:
+        return False
+    if not np.all(capture.room(k @ samples - degree * r0) > 0.0):
+        return False
+    reach = 2.0 * rho * (r + u) ** 2
+    grows = growth(system.rho, system.radius, np.maximum(0.0, r - u))
+    turned = age * omega
+    norm = np.sqrt(np.maximum(np.abs(kept + age * grows), np.abs(kept - 1.5 * age * reach)) ** 2
+                   + turned**2 + turned * age * reach)                     # |(1 - dk) I + d A|
+    none = np.zeros(size)
+    return _bound(k, age, degree + capture.gains - grows, none + 1.0, norm, none, none,
+                  np.zeros(size, dtype=bool), np.full(size, _PRESENT)) is not None
+
+
+def _bound(k: Array, age: float, decay: Array, fed: Array, kept: Array, more: Array,
+           entry: Array, given: NDArray[np.bool_], choice: NDArray[np.int_]
+           ) -> tuple[Array, Array, NDArray[np.int_]] | None:
+    """Least u > 0 and û with decay u = fed + k û (u = fed where it is given) and
+    û = max(u, entry, kept u + more + age k û), found by improving the choice of the largest; None
+    when there is none, as no solution with a Z-matrix is positive that is not stable.
+    """
+    size, unit, none, every = len(k), np.eye(len(k)), 0.0 * k, np.arange(len(k))
+    matrix = np.empty((2 * size, 2 * size))
+    matrix[:size] = np.where(given[:, None], np.hstack([unit, none]),
+                             np.hstack([np.diag(decay), -k]))
+    rows = np.stack([np.hstack([-unit, unit]), np.hstack([none, unit]),
+                     np.hstack([-np.diag(kept), unit - age * k])])
+    right = np.stack([0.0 * entry, entry, more])
+    for _ in range(3 * size):
+        matrix[size:] = rows[choice, every]
+        try:
+            x = np.linalg.solve(matrix, np.concatenate([fed, right[choice, every]]))
+        except np.linalg.LinAlgError:
+            return None
+        if not (np.all(np.isfinite(x)) and np.all(x > 0.0)):
+            return None
+        u, samples = x[:size], x[size:]
+        options = np.stack([u, entry, kept * u + more + age * (k @ samples)])
+        better = options.max(axis=0) > options[choice, every] * (1.0 + 1e-12)
+        if not better.any():
+            return u, samples, choice
+        choice = np.where(better, options.argmax(axis=0), choice)
+    return None

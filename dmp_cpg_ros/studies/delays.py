@@ -1,0 +1,244 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Delays that capture bears: what is certified against what fails in simulation.
+
+``python -m dmp_cpg_ros.studies.delays`` prints the table of doc/certificate.md: the gaits of the
+suite at slow and fast cadences with weak and strong gains, and random networks. Samples are of one
+age, of other ages on each edge, or kept until they are that old, on all edges or those from the
+inhibited nodes; the states before the capture turn as fast as such samples let them. Where a leg
+turned backwards within that age before the entry nothing is certified. Where nothing is known to
+fail, ages of up to 0.2 s are tried.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.core.canonical.graph import CouplingGraph, topology
+from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.contraction.capture import capture_set, place_tolerance, radius_tolerance
+from dmp_cpg_ros.core.contraction.delays import (
+    Capture,
+    carried_margin,
+    held_margin,
+    late_margin,
+)
+from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+MARGINS: dict[str, Callable[[Capture], float]] = {
+    'late': late_margin, 'held': held_margin, 'carried': carried_margin}
+"""Kinds of delay, and what is certified."""
+
+PATTERNS = ('one age', 'edges', 'kept', 'kept from inhibited')
+"""How ages are distributed and vary."""
+
+AGES = 0.999 * 1.2 ** np.arange(-1, 15)
+"""Ages that are tried, in units of the certified one."""
+
+GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
+
+
+@dataclass(frozen=True)
+class Row:
+    """One network under one kind of delay.
+
+    Attributes
+    ----------
+    kind, network : str
+        Kind of delay, and what was captured.
+    certified, fails : float
+        Age that is certified, and the smallest that fails [s]; infinite where none of ``AGES``
+        does.
+    """
+
+    kind: str
+    network: str
+    certified: float
+    fails: float
+
+    @property
+    def share(self) -> float:
+        """Share of what works that is certified; 1 is tight, more would be wrong."""
+        return 1.0 if self.certified == self.fails else self.certified / self.fails
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table; returns 1 where something fails that is certified."""
+    parser = argparse.ArgumentParser(prog='delays', description=__doc__.splitlines()[0])
+    parser.add_argument('--networks', type=int, default=100, metavar='N',
+                        help='random networks beside the gaits (default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=1, help='of the random networks')
+    options = parser.parse_args(arguments)
+    rows = list(measured(options.networks, options.seed))
+    print('| delay | networks | none certified | nothing fails | share of what fails: least | '
+          'median | most |')
+    print('|---|---|---|---|---|---|---|')
+    for kind in MARGINS:
+        for group in ('gait', 'random'):
+            of = [row for row in rows if row.kind == kind and row.network.startswith(group)]
+            shares = [row.share for row in of if row.certified > 0.0 and np.isfinite(row.fails)]
+            told = [f'{np.quantile(shares, share):.2f}' for share in (0.0, 0.5, 1.0)
+                    ] if shares else ['-'] * 3
+            print(f'| {kind} | {len(of)} {group}s | {sum(row.certified == 0.0 for row in of)} | '
+                  f'{sum(np.isinf(row.fails) for row in of)} | ' + ' | '.join(told) + ' |')
+    return int(any(row.share > 1.0 for row in rows))
+
+
+def measured(networks: int, seed: int) -> Iterator[Row]:
+    """All rows: gaits first, then random networks."""
+    rng = np.random.default_rng(seed)
+    cases = [*gait_captures(), *random_captures(rng, networks)]
+    for name, capture in cases:
+        for kind, margin in MARGINS.items():
+            certified = margin(capture)
+            yield Row(kind, name, certified, failing_age(capture, kind, certified, rng)
+                      if certified > 0.0 else np.inf)
+
+
+def gait_captures() -> Iterator[tuple[str, Capture]]:
+    """Four legs on every graph, at cadences from a slow walk to a fast trot."""
+    for graph in GRAPHS:
+        for omega in (9.0, 20.0):
+            for k, room in ((40.0, 1.2), (100.0, 1.2), (100.0, 2.0)):
+                found = capture_of(_four(graph, k), 8.0, 1.0, omega, 0.3, room, (0,))
+                if found is not None:
+                    yield f'gait {graph} {omega:g} rad/s, k {k:g} 1/s, {room:g} k_inh', found
+
+
+def random_captures(rng: np.random.Generator, count: int) -> Iterator[tuple[str, Capture]]:
+    """Certified captures of random weighted networks of 2 to 8 oscillators."""
+    made = 0
+    while made < count:
+        size = int(rng.integers(2, 9))
+        pairs = {(i, int(rng.integers(i))) for i in range(1, size)}
+        pairs |= {(int(i), int(j)) for i, j in rng.integers(size, size=(size, 2)) if i != j}
+        edges = tuple(sorted(pairs | {(j, i) for i, j in pairs}))
+        weights = np.exp(rng.uniform(np.log(20.0), np.log(200.0), len(edges)))
+        graph = CouplingGraph(size, edges, weights[:, None, None] * np.eye(2), np.zeros(size))
+        rho, omega = np.exp(rng.uniform(np.log([0.5, 2.0]), np.log([20.0, 20.0])))
+        region, room = rng.uniform(0.15, 0.8), 1.0 + 10.0 ** rng.uniform(-2.0, 0.5)
+        held = tuple(rng.choice(size, 1 + int(size > 2 and rng.random() < 0.3), replace=False))
+        found = capture_of(graph, rho, 1.0, omega, region, room, held)
+        if found is not None:
+            made += 1
+            yield f'random {made}', found
+
+
+def capture_of(graph: CouplingGraph, rho: float, radius: float, omega: float, region: float,
+               room: float, held: tuple[int, ...]) -> Capture | None:
+    """Capture with some room over the gain that is needed; None where it is not certified."""
+    system = CanonicalSystem(graph, AndronovHopf(rho, radius), state_at(graph.phases, radius))
+    gains = np.zeros(graph.size)
+    gains[list(held)] = 1.0
+    gains *= room * float(np.nanmax(capture_set(system, omega, gains, region).needed_gain))
+    found = capture_set(system, omega, gains, region)
+    if not found.holds or inhibited_contraction(system, found).reach == NONE:
+        return None
+    degree = max(-float(graph.coupling_matrix()[2 * i, 2 * i]) for i in range(graph.size))
+    return Capture(system, omega, gains, region, place_tolerance(omega, degree, radius),
+                   radius_tolerance(radius, region))
+
+
+def failing_age(capture: Capture, kind: str, certified: float, rng: np.random.Generator
+                ) -> float:
+    """Smallest of ``AGES`` times the certified one at which a pattern fails [s]."""
+    ages = np.asarray(certified * AGES if np.isfinite(certified) else np.geomspace(
+        2e-3, 0.2, len(AGES)), dtype=float)
+    patterns = ('one age', 'kept') if kind == 'late' else PATTERNS
+    failed = np.any([fails(capture, kind, ages, pattern, rng) for pattern in patterns], axis=0)
+    return float(ages[failed][0]) if failed.any() else np.inf
+
+
+def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random.Generator
+          ) -> NDArray[np.bool_]:
+    """Whether C is left or rest is not reached, for all ages at once.
+
+    Locked coordinates as complex numbers that turn anticlockwise; the pull of coupling and
+    inhibition is integrated exactly for samples that are held for one small step.
+    """
+    k, held, r0, r = capture.coupling, capture.held, capture.region_radius, capture.radius
+    count, size, omega = len(ages), len(k), capture.omega
+    rho = float(capture.system.rho.max())
+    step = min(float(ages[0]) / 10.0, 0.1 / omega, 0.1 / float(k.sum(axis=1).max()))
+    most = np.maximum(0, np.floor(ages / step).astype(int) - 1)  # a sample is held for a step
+    rest = 8.0 * float(ages[-1]) + 6.0 / max(capture.undelayed.rate, 1.0)
+    steps = int(rest / step)
+    fastest = np.zeros((4, count))
+    length = int(most.max()) + 2
+    start = -2.0 * np.arcsin(min(1.0, r0 / (2.0 * r))) - 0.5 * step * omega
+    before = omega / (1.0 + k.sum(axis=1).max() * ages * (kind == 'held'))
+    turn = np.exp(1j * step * np.arange(1 - length, 1)[:, None] * before)[:, :, None]
+    apart = rng.uniform(-0.5, 0.5, (count, size)) * capture.places / r
+    apart[:, held] = 0.0
+    past = r * np.exp(1j * (start + apart)) * turn
+    rates = 1j * before[:, None] * past
+    backwards = np.full(count, -length)
+    z, now = past[-1], length - 1
+    fixed = np.where(pattern == 'edges', rng.random((size, size)), 1.0) * most[:, None, None]
+    acted, bad, aside = np.zeros((3, count), dtype=bool)
+    age = (rng.random((count, size, size)) * most[:, None, None]).astype(int)
+    row, column = np.arange(count)[:, None, None], np.arange(size)[None, None, :]
+    seen_age = np.zeros(count, dtype=int)
+    for tick in range(steps):
+        if pattern in ('one age', 'edges'):
+            age = fixed.astype(int)
+            seen_age = most
+        else:
+            age = np.where(age >= most[:, None, None], 0, age + 1)
+            seen_age = np.where(seen_age >= most, 0, seen_age + 1)
+            if pattern == 'kept from inhibited':
+                age[:, :, ~held] = 0
+        late = kind == 'late'
+        samples = np.broadcast_to(z[:, None, :], age.shape)
+        if not late:
+            index = (now - age) % length
+            samples = past[index, row, column]
+            if kind == 'carried':
+                samples = samples + rates[index, row, column] * (age * step)
+        judged = past[(now - seen_age) % length, np.arange(count)] if late else z
+        acts = np.all(np.abs(judged[:, held] - r) <= r0, axis=1)
+        entered = acts & ~acted
+        backwards[np.any((rates[now] * np.conj(z)).imag < 0.0, axis=1)] = tick
+        aside |= entered & (tick - backwards <= most)
+        acted |= acts
+        bad |= acted & (np.any(np.abs(z[:, held] - r) > r0 * (1.0 + 1e-9), axis=1) | ~acts)
+        gains = np.where(acts[:, None], capture.gains, 0.0)
+        decay = k.sum(axis=1) + gains
+        pulled = np.einsum('ij,bij->bi', k, samples) + gains * r
+        faded = np.exp(-decay * step)
+        feed = np.divide(1.0 - faded, decay, out=np.full_like(decay, step), where=decay > 0.0)
+
+        def field(z: Complex, pulled: Complex = pulled) -> Complex:
+            return np.asarray((rho * (r * r - np.abs(z) ** 2) + 1j * omega) * z + pulled)
+
+        bad |= ~np.all(np.abs(z) < 1e3, axis=1)
+        z = np.where(np.abs(z) < 1e3, z, 0.0)
+        ahead = faded * z + feed * field(z)
+        z = faded * z + 0.5 * feed * (field(z) + field(ahead))
+        now = (now + 1) % length
+        past[now], rates[now] = z, field(z) - decay * z
+        quarter = fastest[4 * tick // steps]
+        np.maximum(quarter, np.abs(rates[now]).max(axis=1), out=quarter)
+    moves = (fastest[3] > 0.9 * fastest[1]) & (fastest[3] > 1e-3 * omega * r)
+    return (bad | ~acted | moves) & ~aside
+
+
+def _four(graph: str, k: float) -> CouplingGraph:
+    edges = topology(graph, 4)
+    return CouplingGraph(4, edges, np.repeat(k * np.eye(2)[None], len(edges), axis=0),
+                         np.zeros(4))
+
+
+if __name__ == '__main__':
+    sys.exit(main())
