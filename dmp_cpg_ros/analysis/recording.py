@@ -13,12 +13,10 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
-
-Array = NDArray[np.float64]
 
 N_JOINTS, N_LEGS = len(JOINT_NAMES), len(LEGS)
 

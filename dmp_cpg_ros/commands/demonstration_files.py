@@ -26,14 +26,13 @@ from dmp_cpg_ros.commands.run_folder import read_json, run_context
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.core.transformation.learned_motion import FootSamples
 from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale, nominal_foothold
-
-Array = NDArray[np.float64]
 
 _TIME_NAMES = ('t', 'time', 'time_s', 'timestamp', 'stamp')
 _ARRAYS = {'positions': '', 'velocities': '_velocity', 'accelerations': '_acceleration'}

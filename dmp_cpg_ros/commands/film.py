@@ -26,7 +26,6 @@ from dmp_cpg_ros.commands.run_folder import read_json, run_context
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.robot.camera import Camera
 
-Array = NDArray[np.float64]
 Frame = NDArray[np.uint8]
 
 LOOK_WINDOW, SPEED_WINDOW = 1.2, 0.8

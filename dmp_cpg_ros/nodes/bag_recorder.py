@@ -43,7 +43,7 @@ class RecorderParameters(Parameters):
         (ALL,), 'topics to record', choices=(ALL, *(topic.name for topic in RECORDED)))
     flush_period: float = parameter(
         0.25, 'time between flushes to disk; older messages survive when the recorder is killed',
-        unit='s', minimum=0.02, maximum=60.0)
+        0.02, 60.0, unit='s')
     stamped_cmd_vel: bool = parameter(False, 'whether cmd_vel is TwistStamped')
 
 

@@ -13,11 +13,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.maths import Array
 
-Array = NDArray[np.float64]
 Field = Callable[[Array], Array]
 
 _COMPLEX_STEP = 1e-30

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
@@ -21,9 +20,8 @@ from dmp_cpg_ros.core.certificates.step import longest_step
 from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
-
-Array = NDArray[np.float64]
 
 WEAKENED = ('capture', 'contraction', 'time_step')
 """Inequalities that can be weakened here to see whether the search notices."""

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import phase
@@ -22,6 +21,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
 from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -39,7 +39,6 @@ LONGEST = 12.0
 STRIDE = np.radians(200.0)
 """Turn of a leg at rest that counts as a stride [rad]: more than it may rest ahead."""
 
-Array = NDArray[np.float64]
 GAITS = load_gaits()
 Case = dict[str, Any]
 

@@ -32,8 +32,8 @@ from dmp_cpg_ros.core.contraction.delays import (
     late_margin,
 )
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
+from dmp_cpg_ros.core.maths import Array
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 MARGINS: dict[str, Callable[[Capture], float]] = {

@@ -16,7 +16,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates.certify import Certificate, certificate_of
@@ -29,11 +28,10 @@ from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, inhibited_contraction
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
-
-Array = NDArray[np.float64]
 
 UNCERTIFIED = frozenset(
     ('auto_inhibit', 'auto_delay', 'start_inhibited', 'cmd_vel_timeout', 'allow_uncertified',

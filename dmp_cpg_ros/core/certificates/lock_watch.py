@@ -18,14 +18,12 @@ from itertools import combinations
 from math import asin, exp, inf, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH, free_synchronisation
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import locked
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
-
-Array = NDArray[np.float64]
 
 LOCKED, DISTURBED, LOST = 0, 1, 2
 """Within the bound; beyond it and coming back as it must; beyond it and not coming back."""

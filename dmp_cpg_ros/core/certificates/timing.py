@@ -26,9 +26,8 @@ from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, comparison_laplacian
 from dmp_cpg_ros.core.inhibition import supervisor
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import phi_functions
-
-Array = NDArray[np.float64]
 
 DELAY_TICKS = 6
 """Ticks that requests, arming and sampling may add to the continuous bound."""

@@ -14,7 +14,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.inequality import Inequality
@@ -32,10 +31,9 @@ from dmp_cpg_ros.core.contraction.voting import (
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.voting import VoteClamp, vote_clamp
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -34,8 +34,8 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
     slowest_rate,
 )
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 RADIUS_TOLERANCE = 0.02

@@ -15,13 +15,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian
 from dmp_cpg_ros.core.errors import DataError
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 _BOXES = 512
 _ROUNDS = 40

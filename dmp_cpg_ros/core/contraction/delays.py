@@ -35,9 +35,8 @@ from dmp_cpg_ros.core.contraction.capture import (
 )
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian, slowest_rate
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.roots import last_that_holds
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 7  # of a bisection
 _PRESENT, _ENTRY, _CARRIED = range(3)  # what the largest sample is of

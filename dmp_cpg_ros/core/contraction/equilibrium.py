@@ -14,12 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.phase import phase, wrapped
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 _CONVERGED = 1e-11
 _SMALLEST_STEP = 1e-3  # of ω, on the way from zero

@@ -14,14 +14,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.contraction.capture_anywhere import Interval, stack
 from dmp_cpg_ros.core.contraction.finding import PROVED, Finding
 from dmp_cpg_ros.core.contraction.region import Annulus
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 
 def growth(rho: ArrayLike, radius: ArrayLike, smallest_radius: ArrayLike = 0.0) -> Array:

@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
@@ -27,8 +26,7 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
     slowest_rate,
 )
 from dmp_cpg_ros.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 GLOBAL, REGIONAL, NONE = 'global', 'regional', 'none'
 

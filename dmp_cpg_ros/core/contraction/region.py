@@ -7,12 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.contraction.capture_anywhere import Interval
 from dmp_cpg_ros.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.graph import CouplingGraph
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 
 @dataclass(frozen=True)

@@ -15,15 +15,13 @@ from dataclasses import dataclass
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 MOST_PERMUTED = 5
 """Nodes of which all permutations are tried in search of symmetries."""

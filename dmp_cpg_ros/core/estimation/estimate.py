@@ -6,13 +6,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import RobotState
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from math import exp, isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.estimation import leg_odometry, terrain_plane, velocity_filter
 from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
@@ -27,15 +26,13 @@ from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.terrain_plane import TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.velocity_filter import FilterNoise, FilterState
-from dmp_cpg_ros.core.maths import vec3
+from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.rotations import levelled
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 BLIND = 0.02
 """Time for which the last turn rate is held without IMU and feet [s]; then the body counts as not

@@ -18,13 +18,11 @@ from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, minus, times, triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
-
-Array = NDArray[np.float64]
 
 
 class FootMotion(NamedTuple):

@@ -30,31 +30,25 @@ class EstimationParameters(Parameters):
     """
 
     gyro_noise: float = parameter(
-        2e-3, 'noise density of the gyroscope', unit='rad/s/sqrt(Hz)', minimum=1e-6, maximum=1.0)
+        2e-3, 'noise density of the gyroscope', 1e-6, 1.0, unit='rad/s/sqrt(Hz)')
     accelerometer_noise: float = parameter(
-        0.05, 'noise density of the accelerometer', unit='m/s^2/sqrt(Hz)', minimum=1e-5,
-        maximum=10.0)
+        0.05, 'noise density of the accelerometer', 1e-5, 10.0, unit='m/s^2/sqrt(Hz)')
     gyro_bias_walk: float = parameter(
-        1e-5, "random walk of the gyroscope's bias", unit='rad/s^2/sqrt(Hz)', minimum=0.0,
-        maximum=1.0)
+        1e-5, "random walk of the gyroscope's bias", 0.0, 1.0, unit='rad/s^2/sqrt(Hz)')
     accelerometer_bias_walk: float = parameter(
-        1e-4, "random walk of the accelerometer's bias", unit='m/s^3/sqrt(Hz)', minimum=0.0,
-        maximum=10.0)
+        1e-4, "random walk of the accelerometer's bias", 0.0, 10.0, unit='m/s^3/sqrt(Hz)')
     foot_noise: float = parameter(
-        0.1, 'standard deviation of the velocity of a standing foot', unit='m/s', minimum=1e-4,
-        maximum=10.0)
+        0.1, 'standard deviation of the velocity of a standing foot', 1e-4, 10.0, unit='m/s')
     foot_freedom: float = parameter(
         4.0, "degrees of freedom of Student's t distribution of a foot's velocity; fewer: "
-        'slipping feet count less', minimum=1.0, maximum=1e6)
+        'slipping feet count less', 1.0, 1e6)
     contact_share: float = parameter(
         0.25, 'normal force from which a foot has full weight in the estimate, as a fraction of '
-        'the body weight', minimum=1e-3, maximum=1.0)
+        'the body weight', 1e-3, 1.0)
     contact_settling: float = parameter(
-        0.06, 'time after touchdown over which the weight of a foot in the estimate rises',
-        unit='s', minimum=1e-3, maximum=1.0)
+        0.06, 'time after touchdown over which the weight of a foot in the estimate rises', 1e-3,
+        1.0, unit='s')
     terrain_time: float = parameter(
-        0.3, "time constant of the filter on the ground's plane", unit='s', minimum=0.01,
-        maximum=10.0)
+        0.3, "time constant of the filter on the ground's plane", 0.01, 10.0, unit='s')
     estimate_rate: float = parameter(
-        50.0, 'rate at which estimated_odom is published; 0: never', unit='Hz', minimum=0.0,
-        maximum=2000.0)
+        50.0, 'rate at which estimated_odom is published; 0: never', 0.0, 2000.0, unit='Hz')

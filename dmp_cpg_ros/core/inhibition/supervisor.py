@@ -28,12 +28,11 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState, RunningGait
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
 from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import activities_step
-
-Array = NDArray[np.float64]
 
 STATES = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing')
 """What ``inhibition_state`` can say."""

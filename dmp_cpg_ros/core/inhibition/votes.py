@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
-Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 
 OWN_SOURCES = ('footing', 'collision', 'tilt', 'silence')

@@ -15,7 +15,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
@@ -31,11 +30,10 @@ from dmp_cpg_ros.core.inhibition.voting_parameters import (
     VoteSourceParameters,
     VotingParameters,
 )
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
-
-Array = NDArray[np.float64]
 
 FRESH_NS = 20_000_000
 """Age up to which contacts are compared with the phase of the tick [ns]."""

@@ -36,14 +36,12 @@ class VotingParameters(VotingSwitch):
         SUM, 'whether every vote acts on its own oscillator, or only the largest vote acts',
         choices=(SUM, WINNER_TAKE_ALL))
     vote_majority: int = parameter(
-        3, 'number of voting legs that stops the gait; one leg fewer does not',
-        minimum=1, maximum=4)
+        3, 'number of voting legs that stops the gait; one leg fewer does not', 1, 4)
     vote_limit: float = _weight(
         0.0, 'largest weight of one leg, as a fraction of inhibition_gain; 0: computed such that '
         'vote_majority legs are needed')
     vote_fade: float = parameter(
-        1.0, 'time over which a vote that is not renewed fades to zero', unit='s',
-        minimum=0.01, maximum=60.0)
+        1.0, 'time over which a vote that is not renewed fades to zero', 0.01, 60.0, unit='s')
     vote_resume: bool = parameter(
         False, 'whether a stop by votes ends by itself when the votes have faded; else the '
         'service resumes')
@@ -67,18 +65,17 @@ class VoteSourceParameters(Parameters):
     collision_load: float = _weight(
         0.3, 'load above which a swinging foot has hit something, as a fraction of the weight')
     collision_time: float = parameter(
-        0.03, 'time of such a load after which the leg votes', unit='s', minimum=0.0, maximum=10.0)
+        0.03, 'time of such a load after which the leg votes', 0.0, 10.0, unit='s')
     judged_share: float = _share(
         0.7, 'central fraction of stance and swing in which contact is evaluated')
     judged_after: float = parameter(
-        1.0, 'time of walking after which contact is evaluated', unit='s', minimum=0.0,
-        maximum=60.0)
+        1.0, 'time of walking after which contact is evaluated', 0.0, 60.0, unit='s')
     tilt_weight: float = _weight(1.0, 'weight with which every leg votes when the body tilts')
     tilt_limit: float = parameter(
-        0.6, "angle between the vertical and the body's z axis beyond which all legs vote",
-        unit='rad', minimum=0.01, maximum=3.1)
+        0.6, "angle between the vertical and the body's z axis beyond which all legs vote", 0.01,
+        3.1, unit='rad')
     silence_weight: float = _weight(
         1.0, 'weight of a leg without contact sensor, and of every leg without imu')
     silence_time: float = parameter(
-        0.5, 'time without a valid value after which a sensor counts as dead', unit='s',
-        minimum=0.02, maximum=60.0)
+        0.5, 'time without a valid value after which a sensor counts as dead', 0.02, 60.0,
+        unit='s')

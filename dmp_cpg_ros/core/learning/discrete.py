@@ -8,18 +8,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.learning import learning
 from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, Demonstrations, FitOptions
 from dmp_cpg_ros.core.learning.regression import Indices, Rows, Task
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.basis import Bases, GaussianBases
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive
 from dmp_cpg_ros.core.primitives.responses import Force, transient_responses
 from dmp_cpg_ros.core.primitives.time_scaling import Form
-
-Array = NDArray[np.float64]
 
 FINAL_PHASE = 0.01
 """Phase x at the end of the demonstration, the usual choice; it fixes α_x = −ln(0.01)/T."""

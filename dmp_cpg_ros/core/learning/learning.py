@@ -19,14 +19,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, columns, vector
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, default_gains
 from dmp_cpg_ros.core.primitives.time_scaling import Form
 
-Array = NDArray[np.float64]
 Demonstrations = Demonstration | Iterable[Demonstration]
 Method = Literal['response', 'joint', 'local']
 

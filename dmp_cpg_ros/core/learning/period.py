@@ -7,12 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-
-Array = NDArray[np.float64]
 
 WANDERING = 0.03
 """Share of the variance above which what no period explains must be noise, that is, must not be

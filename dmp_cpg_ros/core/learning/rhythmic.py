@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
@@ -17,13 +17,12 @@ from dmp_cpg_ros.core.learning import learning
 from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, Demonstrations, FitOptions
 from dmp_cpg_ros.core.learning.period import find_period, fourier_series, phase_lead
 from dmp_cpg_ros.core.learning.regression import Task
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.basis import VonMisesBases
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, columns, vector
 from dmp_cpg_ros.core.primitives.responses import Force, periodic_responses
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput, RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.time_scaling import Form
-
-Array = NDArray[np.float64]
 
 _OVERLAP = 0.2
 _SERIES = 12

@@ -7,9 +7,6 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.balance.controller import (
     PostureController,
@@ -18,13 +15,12 @@ from dmp_cpg_ros.core.balance.controller import (
     PostureState,
 )
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.modes.manager import ModeManager, ModeParameters, ModeState
 from dmp_cpg_ros.core.modes.requests import ModeAnswer, request
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from math import acos, inf
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import dot, triple, upward
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
-
-Array = NDArray[np.float64]
 
 CERTAIN_SUPPORT = 0.5
 """Share of the weight on the contact sensors from which the joint torques need not be asked."""
@@ -118,19 +116,18 @@ class FallParameters(Parameters):
     """Limits beyond which the robot counts as fallen."""
 
     fall_tilt: float = parameter(
-        0.9, 'tilt beyond which the robot has fallen', unit='rad', minimum=0.1, maximum=3.2)
+        0.9, 'tilt beyond which the robot has fallen', 0.1, 3.2, unit='rad')
     fall_height: float = parameter(
         0.5, 'height over its feet below which a robot that should stand has fallen, as a '
-        'fraction of the standing height', minimum=0.0, maximum=0.95)
+        'fraction of the standing height', 0.0, 0.95)
     fall_delay: float = parameter(
-        0.1, 'time with a large tilt or a low body after which a robot has fallen', unit='s',
-        minimum=0.0, maximum=5.0)
+        0.1, 'time with a large tilt or a low body after which a robot has fallen', 0.0, 5.0,
+        unit='s')
     fall_support: float = parameter(
         0.08, 'load on the legs below which a robot that should stand has lost ground contact, as '
-        'a fraction of the weight; 0: never', minimum=0.0, maximum=0.9)
+        'a fraction of the weight; 0: never', 0.0, 0.9)
     fall_support_delay: float = parameter(
-        0.6, 'time without ground contact after which a robot has fallen', unit='s',
-        minimum=0.05, maximum=10.0)
+        0.6, 'time without ground contact after which a robot has fallen', 0.05, 10.0, unit='s')
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,11 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.modes.motion_library import BASES, Movements, learned, unit_movement
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive, DiscreteState
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
@@ -31,8 +31,6 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, JointTargets
 from dmp_cpg_ros.core.transformation.foot_motion import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

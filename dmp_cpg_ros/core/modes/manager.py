@@ -14,12 +14,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.balance.body_command import BALANCED, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase_rate
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY, REST_PHASE_RATE, REST_SPEED
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.modes import falls
 from dmp_cpg_ros.core.modes.motion_library import SIDES, Movements, phase_at, unit_movement
@@ -28,8 +28,6 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.transformation.leg import body_scale
-
-Array = NDArray[np.float64]
 
 UPRIGHT_TILT = 0.5
 """Tilt up to which a robot on the ground can rise without rolling over [rad]."""
@@ -53,8 +51,7 @@ class ModeParameters(falls.FallParameters):
 
     start_mode: str = parameter(
         'standing', 'mode of the body at the start', choices=('standing', 'lying', 'damped'))
-    recovery_tries: int = parameter(
-        5, 'number of attempts to roll onto the belly', minimum=1, maximum=100)
+    recovery_tries: int = parameter(5, 'number of attempts to roll onto the belly', 1, 100)
 
 
 @dataclass(frozen=True)

@@ -29,10 +29,10 @@ from functools import cache
 from math import asin, atan2, cos, hypot, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.learning.discrete import learn_discrete
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, minimum_jerk
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
@@ -40,7 +40,6 @@ from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescripti
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.transformation.leg import body_scale, nominal_foothold
 
-Array = NDArray[np.float64]
 LegPosture = tuple[float, float, float]
 
 LIMIT_MARGIN = 0.08

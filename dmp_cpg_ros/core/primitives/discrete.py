@@ -7,12 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.demonstration import vector
 from dmp_cpg_ros.core.primitives.primitive import Primitive, check_positive
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,16 +11,15 @@ from math import ceil
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.basis import Bases
 from dmp_cpg_ros.core.primitives.demonstration import Trajectory, columns, vector
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.primitives.time_scaling import Form, StepGrid, TimeScaling
-
-Array = NDArray[np.float64]
 
 LONGEST_STEP = 0.01
 """Longest step of a rollout, as a share of the time that a movement or cycle takes."""

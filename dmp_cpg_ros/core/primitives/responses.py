@@ -7,11 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.spring_damper import quadratic_drive_step, spring_exponential
 
-Array = NDArray[np.float64]
 Force = Callable[[Array], Array]
 
 

@@ -23,11 +23,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import exponential
 from dmp_cpg_ros.core.primitives.demonstration import columns
 from dmp_cpg_ros.core.primitives.time_scaling import Form, StepGrid
-
-Array = NDArray[np.float64]
 
 FORMS: tuple[Form, ...] = ('scaled', 'printed')
 """The readings of τ that are valid."""

@@ -6,10 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 LEGS = ('fl', 'fr', 'rl', 'rr')
 """Leg names in the order of every array over legs."""

@@ -16,12 +16,11 @@ from math import cos, radians, sin, tan
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter, shown
-
-Array = NDArray[np.float64]
 
 PATCH = 0.7
 """The ground is flat from behind the robot to here, about 1 m around its feet [m]."""
@@ -65,8 +64,7 @@ class World(Parameters):
     """A flat floor; the base of all worlds."""
 
     friction: float = parameter(
-        0.0, "sliding friction of all contacts; 0: the model's own, 0.3 on low_friction",
-        minimum=0.0, maximum=2.0)
+        0.0, "sliding friction of all contacts; 0: the model's own, 0.3 on low_friction", 0.0, 2.0)
 
     @property
     def floor(self) -> float:
@@ -105,7 +103,7 @@ class World(Parameters):
 class LowFriction(World):
     """A flat, slippery floor."""
 
-    friction: float = parameter(0.3, 'sliding friction of all contacts', minimum=0.02, maximum=2.0)
+    friction: float = parameter(0.3, 'sliding friction of all contacts', 0.02, 2.0)
 
 
 @dataclass(frozen=True)
@@ -113,7 +111,7 @@ class Slope(World):
     """A slope, and level ground at both of its ends."""
 
     degrees: float = parameter(
-        10.0, 'slope: its angle; negative: downhill', unit='deg', minimum=-40.0, maximum=40.0)
+        10.0, 'slope: its angle; negative: downhill', -40.0, 40.0, unit='deg')
 
     @property
     def floor(self) -> float:
@@ -147,10 +145,10 @@ class Slope(World):
 class Blocks(World):
     """A field of square blocks of random heights."""
 
-    height: float = parameter(0.05, 'blocks: height of the highest; steps: height of each',
-                              unit='m', minimum=0.0, maximum=1.0)
-    size: float = parameter(0.2, 'blocks: side of each', unit='m', minimum=0.05, maximum=2.0)
-    seed: int = parameter(0, 'blocks: seed of their heights', minimum=0)
+    height: float = parameter(
+        0.05, 'blocks: height of the highest; steps: height of each', 0.0, 1.0, unit='m')
+    size: float = parameter(0.2, 'blocks: side of each', 0.05, 2.0, unit='m')
+    seed: int = parameter(0, 'blocks: seed of their heights', 0)
 
     def heights(self) -> Array:
         """Heights of the blocks, uniform in [0, ``height``], ndarray (along x, along y) [m]."""
@@ -185,10 +183,9 @@ class Steps(World):
     """Steps up, a platform, and as many steps down."""
 
     height: float = _as_of(Blocks, 'height')
-    depth: float = parameter(0.35, 'steps: depth of each', unit='m', minimum=0.05, maximum=4.0)
-    count: int = parameter(1, 'steps: how many up, and down', minimum=1, maximum=50)
-    platform: float = parameter(
-        2.0, 'steps: length of the platform on top', unit='m', minimum=0.1, maximum=20.0)
+    depth: float = parameter(0.35, 'steps: depth of each', 0.05, 4.0, unit='m')
+    count: int = parameter(1, 'steps: how many up, and down', 1, 50)
+    platform: float = parameter(2.0, 'steps: length of the platform on top', 0.1, 20.0, unit='m')
 
     def _ends(self) -> list[tuple[float, float]]:
         """Where each layer begins and ends along x [m], the lowest first."""

@@ -10,12 +10,10 @@ from typing import Any
 import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.errors import DataError
-
-Array = NDArray[np.float64]
+from dmp_cpg_ros.core.maths import Array
 
 NS = 1_000_000_000
 """Nanoseconds of a second."""
