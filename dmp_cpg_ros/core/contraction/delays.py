@@ -223,11 +223,12 @@ def carried_margin(capture: Capture) -> float:
     Returns
     -------
     float
-        0 without a certificate; always below :func:`longest_carried`.
+        0 without a certificate; below :func:`longest_carried`, and at most a quarter of a turn.
     """
     if not capture.undelayed.holds:
         return 0.0
-    return _longest(lambda age: _carries(capture, age), longest_carried(capture.system))
+    most = min(longest_carried(capture.system), 0.5 * pi / max(abs(capture.omega), 1e-3))
+    return _longest(lambda age: _carries(capture, age), most)
 
 
 def longest_carried(system: CanonicalSystem) -> float:
@@ -255,7 +256,7 @@ def _largest_box(capture: Capture) -> tuple[float, float]:
     k, held, r0 = capture.coupling, capture.held, capture.region_radius
     free, base = ~held, capture.undelayed.distance
     if not free.any():
-        return r0 + float((capture.room(0.0 * base) / k.sum(axis=1)).min()), inf
+        return r0 + _least_room(capture.room(0.0 * base), k), inf
     grounded = (np.diag(k.sum(axis=1)) - k)[np.ix_(free, free)]
     if slowest_rate(grounded) <= 1e-9 * float(k.max()):
         return r0, float(base[free].min())
@@ -264,11 +265,17 @@ def _largest_box(capture: Capture) -> tuple[float, float]:
         most = _ROOM * u
         beyond = np.zeros(len(k))
         beyond[free] = np.linalg.solve(grounded, capture.growth_out(most)[free])
-        edge = r0 + float((capture.room(k @ beyond) / k.sum(axis=1)[held]).min())
+        edge = r0 + _least_room(capture.room(k @ beyond), k[held])
         u = edge + beyond
         if edge > r0 and np.all(u <= most):
             return edge, float(u[free].min())
     return r0, float(base[free].min())
+
+
+def _least_room(room: Array, k: Array) -> float:
+    """Smallest of rooms (M,) over the sums of couplings (M, N); a node that feels none has any."""
+    degree = k.sum(axis=1)
+    return float(np.divide(room, degree, out=np.full(len(room), inf), where=degree > 0.0).min())
 
 
 def _carries(capture: Capture, age: float) -> bool:
