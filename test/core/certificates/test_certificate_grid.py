@@ -16,6 +16,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from checkout import ROOT
 from contraction_batches import Batch, Setting, locked, random_graph
 from core_examples import GAITS, TICK, quadruped
 
@@ -174,6 +175,13 @@ def test_the_grid_has_every_kind_of_setting_certified_and_not() -> None:
     unequal = sum(np.ptp(case.setting.omega) > 0.01 * case.setting.omega.max()
                   for case in cases if case.certificate.holds)
     assert unequal > 200
+
+
+def test_the_readme_states_how_many_are_certified() -> None:
+    cases = grid()
+    certified = sum(case.certificate.holds for case in cases)
+    stated = f'{certified} of {len(cases):,} settings certified'
+    assert stated in (ROOT / 'README.md').read_text(encoding='utf-8')
 
 
 def test_the_batch_is_the_canonical_system() -> None:
