@@ -59,6 +59,19 @@ def test_json_has_every_inequality_and_the_suggestion(
     assert main([better]) == 0
 
 
+def test_the_file_and_the_namespace_of_the_ros_arguments_are_certified(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = file_with(tmp_path, inhibition_gain=120.0)
+    assert main(['--ros-args', '--params-file', path]) == 1
+    assert 'is not < k_inh = 120' in capsys.readouterr().err
+    path = file_with(tmp_path)
+    with Path(path).open('a', encoding='utf-8') as file:
+        file.write('\n/robot1/canonical_oscillators: {ros__parameters: {gait: trot}}\n')
+    for namespace, gait in (('', 'amble'), ('/robot1', 'trot')):
+        assert main([path, '--ros-args', '-r', f'__ns:={namespace or "/"}']) == 0
+        assert f': {gait} at up to' in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(('arguments', 'said'), [
     (['there_is_none.yaml'], 'does not exist'),
     (['--gait', 'gallop'], 'valid are amble'),
