@@ -4,7 +4,14 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
+import pty
+import select
 import signal
+import subprocess
+import sys
+import termios
 from pathlib import Path
 
 import pytest
@@ -18,7 +25,8 @@ from ros_processes import NodeProcess, Processes, Ros, wait_until
 from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.suite_run import alone_in_domain
-from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError
+from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.nodes.framework.claims import AlreadyRunningError, claim
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
@@ -125,6 +133,24 @@ def test_a_node_that_runs_already_is_not_started_again(processes: Processes, ros
     assert third.running
 
 
+def test_a_walk_reads_the_sections_of_its_namespace(processes: Processes, tmp_path: Path) -> None:
+    """It is refused before a node starts: for a section, or because others have the domain."""
+    path = tmp_path / 'parameters.yaml'
+    path.write_text(
+        find_config('suite.yaml').read_text(encoding='utf-8')
+        + '\n/robot1/canonical_oscillators: {ros__parameters: {gait: gallop}}\n', encoding='utf-8')
+    given = (scenario(tmp_path, 0.5), '--parameters', str(path), '--out', str(tmp_path / 'run'))
+    inside = walk(processes, *given, '--namespace', '/robot1')
+    assert inside.wait() == 2, inside
+    assert "no gait 'gallop'" in inside.output, inside
+    with claim('/inhibition', processes.domain):
+        outside = walk(processes, *given)
+        assert outside.wait() == 2, outside
+    assert ("section '/robot1/canonical_oscillators' means no node in namespace '/'"
+            in outside.output), outside
+    assert 'nodes /inhibition' in outside.output, outside
+
+
 @pytest.mark.parametrize('options', [
     ('--lock-step',), ('--lock-step', '--composed'), ('--composed',)])
 def test_a_walk_in_a_namespace_is_the_walk_without(
@@ -166,6 +192,36 @@ def test_whatever_ends_walk_ends_its_nodes_and_closes_the_bag(
                what=lambda: f'the end of {[pid for pid in nodes if alive(pid)]}')
     assert (tmp_path / 'run' / 'bag' / 'metadata.yaml').is_file()
     assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
+
+
+def test_a_terminal_that_is_closed_ends_walk_in_order(
+        processes: Processes, tmp_path: Path) -> None:
+    """What walk has to say then goes nowhere, and is no reason to end otherwise."""
+    end, inside = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'dmp_cpg_ros', 'walk', scenario(tmp_path, 600.0), '--lock-step',
+         '--composed', '--no-report', '--out', str(tmp_path / 'run')],
+        stdin=inside, stdout=inside, stderr=inside, env=processes.environment,
+        start_new_session=True, preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0))
+    os.close(inside)
+    said: list[bytes] = []
+
+    def read() -> None:
+        if select.select([end], [], [], 0.02)[0]:
+            said.append(os.read(end, 4096))
+
+    try:
+        wait_until(lambda: b'  walking\r\n' in b''.join(said), RUN_S, between=read,
+                   what=lambda: repr(said))
+        nodes = children(process.pid)
+        assert len(nodes) == 2
+        os.close(end)
+        assert process.wait(RUN_S) == 128 + signal.SIGHUP
+        wait_until(lambda: not any(map(alive, nodes)), RUN_S)
+    finally:
+        process.kill()
+        process.wait()
+    assert (tmp_path / 'run' / 'bag' / 'metadata.yaml').is_file()
 
 
 def test_ctrl_c_while_modules_are_imported_ends_quietly(processes: Processes) -> None:
