@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -101,6 +102,29 @@ def test_a_stopped_recorder_has_every_byte(processes: Processes, ros: Ros, tmp_p
     assert offered['/inhibition_state'].durability.name == 'TRANSIENT_LOCAL'
     assert offered['/joint_states'].durability.name == 'VOLATILE'
     assert {profile.reliability.name for profile in offered.values()} == {'RELIABLE'}
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_second_signal_does_not_break_into_the_end_of_a_recording(
+        processes: Processes, tmp_path: Path, number: int) -> None:
+    """Under launch a node gets the Ctrl-C of the terminal and that of launch."""
+    program = (
+        'import os, sys\n'
+        'from dmp_cpg_ros.nodes.bag_recorder import BagRecorder\n'
+        'from dmp_cpg_ros.nodes.framework.execution import run_node\n'
+        'complete = BagRecorder.cleanup\n'
+        'def cleanup(node):\n'
+        f'    os.kill(os.getpid(), {int(number)})\n'
+        '    complete(node)\n'
+        'BagRecorder.cleanup = cleanup\n'
+        "sys.exit(run_node('bag_recorder'))\n")
+    process = processes.python(
+        '-c', program, '--ros-args', '-p', f'output:={tmp_path / "bag"}')
+    process.wait_for_output('active')
+    process.signal(number)
+    assert process.wait() == 0, process
+    assert 'Traceback' not in process.output, process
+    assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
 
 
 def test_a_killed_recorder_leaves_what_it_had_flushed(
