@@ -211,6 +211,40 @@ def test_a_real_time_recording_is_as_long_as_the_robot_walked(processes: Process
     assert duration == 99 * TICK_NS
 
 
+def test_the_time_of_a_command_is_that_of_its_reception(
+        processes: Processes, ros: Ros, tmp_path: Path) -> None:
+    """Even where its own stamp is one of the recording."""
+    joints, push = (publisher(ros, name) for name in ('joint_states', 'push'))
+    counts = interface('~/recorded')
+    told = ros.collect(counts.type, 'bag_recorder/recorded', counts.reader_qos)
+    process = started(processes, ros, tmp_path / 'bag', flush_period=0.05)
+    ros.spin_until(push.get_subscription_count, what=lambda: f'matching with {process}')
+
+    def recorded(topic: str) -> float:
+        return dict(zip(told[-1].name, told[-1].position, strict=True))[topic] if told else 0.0
+
+    for k in range(50):
+        joints.publish(joint_state(k))
+    ros.spin_until(lambda: recorded('/joint_states') == 50, what=lambda: str(process))
+    early = WrenchStamped()
+    set_stamp(early.header.stamp, 2 * TICK_NS)
+    push.publish(early)
+    ros.spin_until(lambda: recorded('/push') == 1, what=lambda: str(process))
+    process.interrupt()
+    assert process.wait() == 0, process
+    (time_ns, _), = read(tmp_path / 'bag')['/push']
+    assert time_ns == 50 * TICK_NS
+
+
+def test_the_gate_is_not_in_the_bag(processes: Processes, ros: Ros, tmp_path: Path) -> None:
+    process = started(processes, ros, tmp_path / 'bag')
+    process.interrupt()
+    assert process.wait() == 0, process
+    topics = read(tmp_path / 'bag').keys()
+    assert '/joint_states' in topics
+    assert not [topic for topic in topics if topic.startswith('/mujoco_robot/')]
+
+
 def test_a_node_outside_the_table_is_refused(processes: Processes, tmp_path: Path) -> None:
     process = processes.node('bag_recorder', output=tmp_path / 'bag', topics=['joint_stats'])
     assert process.wait() == 2
