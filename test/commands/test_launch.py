@@ -19,7 +19,7 @@ pytest.importorskip('rclpy')
 import ros_processes
 import yaml
 from checkout import ROOT
-from ros_processes import Processes, Ros
+from ros_processes import Processes, Ros, wait_until
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -148,6 +148,15 @@ def test_a_bag_that_exists_is_an_error_before_any_node(
         launch_file: ModuleType, tmp_path: Path) -> None:
     with pytest.raises(FileExistsError, match='bag:=FOLDER'):
         launch_file.nodes({**ARGUMENTS, 'record': 'true', 'bag': str(tmp_path)})
+
+
+def test_the_bag_is_where_its_argument_says(
+        launch_file: ModuleType, processes: Processes, tmp_path: Path) -> None:
+    bag = tmp_path / 'outing'
+    described = launch_file.nodes({**ARGUMENTS, 'record': 'true', 'bag': str(bag)})
+    recorder, = (node for node in described if node.name == RECORDER)
+    start(processes, recorder, tmp_path)
+    wait_until(bag.is_dir)
 
 
 def test_the_arguments_are_declared(launch_file: ModuleType) -> None:
