@@ -43,6 +43,7 @@ from std_srvs.srv import SetBool, Trigger
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import LARGEST_FORCE
+from dmp_cpg_ros.nodes.framework import certified
 from dmp_cpg_ros.nodes.framework.gaits import follow_gait, known_gaits
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
@@ -51,6 +52,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, publishe
 from dmp_cpg_ros.nodes.messages.robot_state import read_imu
 from dmp_cpg_ros.nodes.messages.values import set_stamp
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
+from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
 from dmp_cpg_ros.suite_table import KINDS
 
 processes, ros, ros_domain = (
@@ -187,6 +189,43 @@ def test_false_news_of_parameters_are_refused(
     kept = answer.values[0]
     assert kept.string_value == 'amble' if name == 'gait' else 0.0 < kept.double_value < 2.0
     ended(process)
+
+
+def test_every_false_news_of_parameters_is_counted(ros: Ros) -> None:
+    node = ReferenceFilter(context=ros.context)
+    node.start()
+    ros.executor.add_node(node)
+    publisher = ros.node.create_publisher(
+        ParameterEvent, '/parameter_events', qos_profile_parameter_events)
+    ros.spin_until(lambda: publisher.get_subscription_count() > 0)
+    counted = node.health.rejected
+    for number, false in enumerate(
+            (ParameterValue(type=77), ParameterValue(type=4, string_value='gallop')), 1):
+        publisher.publish(ParameterEvent(node='/canonical_oscillators', changed_parameters=[
+            ParameterMessage(name='gait', value=false)]))
+        ros.spin_until(lambda number=number: counted.get('/parameter_events') == number,
+                       what=lambda: str(counted))
+    assert node.get_parameter('gait').value == 'amble'
+    node.close()
+    ros.executor.remove_node(node)
+    node.destroy_node()
+
+
+def test_a_false_answer_about_parameters_is_refused(
+        ros: Ros, monkeypatch: pytest.MonkeyPatch) -> None:
+    def answer(request: Any, response: Any) -> Any:
+        response.values = [ParameterValue(type=77) for _ in request.names]
+        return response
+
+    monkeypatch.setattr(certified, 'ASK_EVERY_S', 0.05)
+    ros.node.create_service(GetParameters, 'canonical_oscillators/get_parameters', answer)
+    node = ReferenceFilter(context=ros.context)
+    node.start()
+    ros.executor.add_node(node)
+    ros.spin_until(lambda: node.health.rejected.get('canonical_oscillators/get_parameters', 0) > 1)
+    node.close()
+    ros.executor.remove_node(node)
+    node.destroy_node()
 
 
 @pytest.mark.parametrize('kind', KINDS)

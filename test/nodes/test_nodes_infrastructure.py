@@ -46,6 +46,7 @@ from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.nodes.framework import execution
 from dmp_cpg_ros.nodes.framework.execution import make_executor, spin
 from dmp_cpg_ros.nodes.framework.health import LOG_EVERY_S, NodeHealth
+from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery
 from dmp_cpg_ros.nodes.framework.parameters import (
     LockStepParameters,
     NodeParameters,
@@ -482,6 +483,28 @@ def test_a_request_that_fails_is_answered(ros: Ros, started: Relay) -> None:
     assert not answer.success
     assert 'a bug' in answer.message
     assert started.health.rejected['~/ready'] >= 1
+
+
+def test_a_timer_that_fails_goes_on_and_is_counted(ros: Ros, started: Relay) -> None:
+    def look() -> None:
+        raise KeyError('a bug')
+
+    started.create_steady_timer(0.01, look)
+    ros.spin_until(lambda: started.health.rejected.get('timer look', 0) > 1)
+    assert "KeyError: 'a bug'" in started.health.status('active', {}, periodic=False
+                                                        ).status[0].message
+
+
+def test_a_message_from_the_same_process_is_refused_like_any_other(ros: Ros) -> None:
+    node = relay(ros)
+    node.local = LocalDelivery(('mujoco_robot',))
+    node.start()
+    message = JointState()
+    message.header.stamp.sec = -1
+    node.local.publish('joint_states', message)
+    assert node.health.rejected == {'joint_states': 1}
+    node.close()
+    node.destroy_node()
 
 
 def test_commands_of_a_wrong_type_are_told(
