@@ -19,7 +19,7 @@ pytest.importorskip('rclpy')
 import ros_processes
 import yaml
 from checkout import ROOT
-from ros_processes import Processes, Ros, wait_until
+from ros_processes import NodeProcess, Processes, Ros, wait_until
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -68,7 +68,7 @@ def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return module
 
 
-def start(processes: Processes, node: Any, folder: Path) -> None:
+def start(processes: Processes, node: Any, folder: Path) -> NodeProcess:
     """Start a node with the command line that launch_ros makes of its description."""
     rules = [('__node', node.name), *([('__ns', node.namespace)] if node.namespace else []),
              *node.remappings]
@@ -82,7 +82,7 @@ def start(processes: Processes, node: Any, folder: Path) -> None:
             path.write_text(yaml.dump(content), encoding='utf-8')
             given = path
         words += ['--params-file', str(given)]
-    processes.node(node.executable, *words)
+    return processes.node(node.executable, *words)
 
 
 def test_launched_nodes_are_those_of_the_table(launch_file: ModuleType) -> None:
@@ -124,6 +124,13 @@ def test_what_is_launched_becomes_ready_and_ticks(
 def test_a_lock_step_robot_says_what_it_waits_for(processes: Processes) -> None:
     robot = processes.node(ROBOT, lock_step=True)
     robot.wait_for_output('waiting for .*joint_targets is not published by leg_transformation_fl')
+
+
+def test_a_lock_step_robot_that_is_recorded_waits_for_the_recorder(
+        launch_file: ModuleType, processes: Processes, tmp_path: Path) -> None:
+    given = {**ARGUMENTS, 'lock_step': 'true', 'record': 'true', 'bag': str(tmp_path / 'bag')}
+    robot, = (node for node in launch_file.nodes(given) if node.name == ROBOT)
+    start(processes, robot, tmp_path).wait_for_output(f'waiting for .*{RECORDER}')
 
 
 def test_arguments_left_empty_override_nothing_and_given_ones_reach_the_nodes(
