@@ -237,10 +237,11 @@ class BodyEstimator:
         """Integrate the position, follow the ground, and put the estimate together."""
         last = memory.estimate
         dt = (time_ns - last.time_ns) * 1e-9
-        R, R_before = (vec3.rotation(of.quaternion.tolist()) for of in (state, last))
-        v, u = (vec3.times(frame, vec3.triple(of.velocity_in_base.tolist()))
-                for frame, of in ((R, state), (R_before, last)))
-        velocity = vec3.triple([0.5 * (now + before) for now, before in zip(v, u, strict=True)])
+        R = vec3.rotation(state.quaternion.tolist())
+        v = vec3.times(R, vec3.triple(state.velocity_in_base.tolist()))
+        u = vec3.times(vec3.rotation(last.quaternion.tolist()),
+                       vec3.triple(last.velocity_in_base.tolist()))
+        velocity = 0.5 * (v[0] + u[0]), 0.5 * (v[1] + u[1]), 0.5 * (v[2] + u[2])
         position = vec3.moved(vec3.triple(last.position_in_world.tolist()), velocity, dt)
         contact = [vec3.times(R, place) for place in motion.contact_in_base]
         terrain = terrain_plane.terrain_step(

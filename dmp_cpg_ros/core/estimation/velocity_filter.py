@@ -26,13 +26,14 @@ inverse (3, 3), however many feet stand.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.rotations import turned
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, minus, moved, triple
 
@@ -165,8 +166,9 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float, n
     turn = (turning[0] * dt, turning[1] * dt, turning[2] * dt)
     # in the base half-way, as the mean force is
     tilted, fallen = cross(turn, up), GRAVITY * dt
-    change = triple([f * dt - fallen * (u - 0.5 * t)
-                     for f, u, t in zip(force, up, tilted, strict=True)])
+    change = (force[0] * dt - fallen * (up[0] - 0.5 * tilted[0]),
+              force[1] * dt - fallen * (up[1] - 0.5 * tilted[1]),
+              force[2] * dt - fallen * (up[2] - 0.5 * tilted[2]))
     # The new velocity is seen from the new orientation.
     back, twice = cross(turn, moved(v, change, 0.5)), cross(turn, cross(turn, v))
     velocity = np.array(moved(minus(vec3.plus(v, change), back), twice, 0.5))
@@ -209,7 +211,7 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
     """
     P = state.covariance
     predicted = P[VELOCITY, VELOCITY].tolist()
-    spread = [predicted[i][i] for i in range(3)]
+    spread_x, spread_y, spread_z = predicted[0][0], predicted[1][1], predicted[2][2]
     turning = triple((rate - state.gyro_bias).tolist())
     v, nu = triple(state.velocity_in_base.tolist()), noise.freedom
     total, pull, distances = 0.0, (0.0, 0.0, 0.0), []
@@ -219,7 +221,9 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
             continue
         off = minus(minus(measured, v), cross(turning, contact))
         variance = (noise.foot / share) ** 2
-        distance = sum([o * o / (s + variance) for o, s in zip(off, spread, strict=True)])
+        x, y, z = off
+        distance = (x * x / (spread_x + variance) + y * y / (spread_y + variance)
+                    + z * z / (spread_z + variance))
         distances.append(distance)
         weight = 1.0 / (variance * max((nu + distance) / (nu + 3.0), 1.0))
         total, pull = total + weight, moved(pull, off, weight)
@@ -262,7 +266,7 @@ def settle(state: FilterState, rate: Array, deviation: float) -> FilterState:
     P[GYRO_BIAS] = after
     P[:, GYRO_BIAS] = after.T
     bias = rate - left.dot(rate - state.gyro_bias)
-    return replace(state, gyro_bias=bias, covariance=0.5 * (P + P.T))
+    return replace_unchecked(state, gyro_bias=bias, covariance=0.5 * (P + P.T))
 
 
 def _with_diagonal(M: list[list[float]], more: float) -> Matrix:

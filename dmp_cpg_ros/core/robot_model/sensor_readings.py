@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from math import isnan
 
 from dmp_cpg_ros.core.robot_model.state import LEGS, Array, RobotState
@@ -31,6 +30,10 @@ class SensorReadings:
         Gyroscope [rad/s] and accelerometer [m/s^2] at the origin of ``base_link``.
     foot_force : ndarray (4,)
         Normal force of each foot [N].
+    imu_is_usable : bool
+        Whether gyroscope and accelerometer both say something possible.
+    usable_legs, usable_contacts : tuple of 4 bool
+        Whether angles and velocities of each leg's joints, and each foot's force, are possible.
     """
 
     time_ns: int
@@ -41,24 +44,23 @@ class SensorReadings:
     specific_force_in_base: Array
     foot_force: Array
 
-    @cached_property
-    def imu_is_usable(self) -> bool:
-        """Whether gyroscope and accelerometer both say something possible."""
-        return _within(self.rate_in_base.tolist(), FASTEST_TURN) and _within(
-            self.specific_force_in_base.tolist(), HARDEST_BLOW)
+    imu_is_usable: bool = field(init=False)
+    usable_legs: tuple[bool, ...] = field(init=False)
+    usable_contacts: tuple[bool, ...] = field(init=False)
 
-    @cached_property
-    def usable_legs(self) -> tuple[bool, ...]:
-        """Whether angles and velocities of each leg's joints are possible."""
+    def __post_init__(self) -> None:
+        """Judge the readings, once for all who ask."""
         q, q_dot = self.joint_position.tolist(), self.joint_velocity.tolist()
-        if _within(q, FASTEST_JOINT) and _within(q_dot, FASTEST_JOINT):
-            return (True,) * len(LEGS)
-        return tuple(_within(q[i:i + 3] + q_dot[i:i + 3], FASTEST_JOINT) for i in range(0, 12, 3))
-
-    @cached_property
-    def usable_contacts(self) -> tuple[bool, ...]:
-        """Whether each foot's force is possible."""
-        return tuple(abs(force) <= LARGEST_FORCE for force in self.foot_force.tolist())
+        legs = (True,) * len(LEGS)
+        if not (_within(q, FASTEST_JOINT) and _within(q_dot, FASTEST_JOINT)):
+            legs = tuple(
+                _within(q[i:i + 3] + q_dot[i:i + 3], FASTEST_JOINT) for i in range(0, 12, 3))
+        vars(self).update(
+            imu_is_usable=_within(self.rate_in_base.tolist(), FASTEST_TURN) and _within(
+                self.specific_force_in_base.tolist(), HARDEST_BLOW),
+            usable_legs=legs,
+            usable_contacts=tuple(
+                abs(force) <= LARGEST_FORCE for force in self.foot_force.tolist()))
 
 
 def _within(values: list[float], limit: float) -> bool:
