@@ -37,7 +37,7 @@ from dmp_cpg_ros.studies.adversary_suite import (
 )
 from dmp_cpg_ros.suite import load_suite
 
-WEAKENED = (*adversary_networks.WEAKENED, *CONDITIONS)
+WEAKENED = tuple(dict.fromkeys((*adversary_networks.WEAKENED, *CONDITIONS)))
 """Inequalities and conditions that can be left out, to see whether the search notices."""
 
 
@@ -61,13 +61,16 @@ def search(seed: int, seconds: float, weaken: str = '', robot: str = '') -> Iter
     rng, end = np.random.default_rng(seed), time.monotonic() + seconds
     description = load_description(robot or load_suite().robot_file)
     guided: list[tuple[float, Case]] = []
+    close: list[tuple[float, Case]] = []
+    sizes = np.arange(2, 13)
     while time.monotonic() < end:
         counts: Counter[str] = Counter()
         failures: list[Case] = []
         if weaken in ('', *adversary_networks.WEAKENED):
-            run, failures = adversary_networks.attack(rng, int(rng.integers(2, 13)), 40, weaken)
-            counts.update(networks=run, network_runs=run * adversary_networks.STARTS)
-        for _ in range(0 if weaken in adversary_networks.WEAKENED else 4):
+            size = int(rng.choice(sizes, p=1.0 / sizes / np.sum(1.0 / sizes)))
+            _, failures = adversary_networks.attack(rng, size, 250, weaken, close, counts)
+            failures = [_smallest(one, weaken) for one in failures[:1]] + failures[1:]
+        for _ in range(1 if weaken in ('', *CONDITIONS) else 0):
             if time.monotonic() > end:
                 break
             case = varied(rng, guided[rng.integers(len(guided))][1]) if (
@@ -89,6 +92,15 @@ def _is_certified(description: RobotDescription, case: Case) -> bool:
         return Oscillators(description, case).certified()
     except DmpCpgError:
         return False
+
+
+def _smallest(failure: Case, weaken: str) -> Case:
+    """The smallest network that fails in the same way."""
+    case, happened = dict(failure), adversary_networks.happened
+    what = case.pop('happened')
+    del case['attack']
+    case = adversary_networks.smaller(case, lambda one: happened(one, weaken)[:9] == what[:9])
+    return {'attack': 'network', 'happened': happened(case, weaken), **case}
 
 
 def _written(description: RobotDescription, case: Case, what: str, weaken: str) -> Case:
@@ -114,6 +126,9 @@ def _work(arguments: tuple[int, float, str, int]) -> tuple[Counter[str], list[Ca
     for counts, found in search(seed, seconds, weaken):
         total += counts
         failures += found
+        if sys.stderr.isatty():
+            print(f"{total['networks']} networks, {total['suites']} suites, {len(failures)} "
+                  'failures', end='\r', file=sys.stderr)
         if len(failures) >= most:
             break
     return total, failures
@@ -151,11 +166,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _row(total: Counter[str], options: argparse.Namespace, failures: int) -> str:
     """Row of the table in ``doc/certificate.md``."""
-    changes = total['set'] + total['gait']
+    requests = sum(total[name] for name in ('stop', 'start', 'request', 'release', 'edge', 'box'))
+    changes = sum(total[name] for name in ('set', 'gait', 'change', 'cadence'))
     return (f'| {options.seed} | {options.workers} x {options.seconds:g} s '
-            f'| {options.weaken or "nothing"} | {total["networks"]} | {total["network_runs"]} '
-            f'| {total["suites"]} | {total["stop"] + total["start"]} '
-            f'| {changes} ({total["accepted"]}) | {failures} |')
+            f'| {options.weaken or "nothing"} | {total["networks"]} ({total["settings"]}) '
+            f'| {total["networks"] * adversary_networks.STARTS} | {total["suites"]} '
+            f'| {requests} | {changes} ({total["accepted"]}) | {failures} |')
 
 
 if __name__ == '__main__':

@@ -7,6 +7,7 @@ releases and accepted changes at random times and from the edges of what is cert
 from __future__ import annotations
 
 import math
+import time
 from collections import Counter, defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -43,6 +44,8 @@ WEAKENED = ('synchronisation', 'contraction', 'capture', 'time_step', 'cycle_rad
 """Inequalities and conditions that can be left out here to see whether the search notices."""
 
 TICKS = 900
+STARTS = 3
+"""Sequences of events that each network is run through."""
 KINDS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'sparse', 'directed', 'unbalanced')
 EVENTS = {'request': 0.3, 'release': 0.2, 'change': 0.22, 'cadence': 0.08, 'scatter': 0.05,
           'gather': 0.04, 'edge': 0.07, 'box': 0.04}
@@ -199,11 +202,13 @@ def attack(rng: np.random.Generator, size: int, count: int, weaken: str = '',
     draws = [_varied(rng, alike[rng.integers(len(alike))], weaken) if alike and rng.random() < 0.3
              else _draw(rng, size, weaken) for _ in range(count)]
     networks = [one for one in draws if one is not None]
-    told, closest = _run(networks, weaken, counts) if networks else ({}, np.zeros(0))
     counts.update(networks=len(networks), settings=sum(len(one.settings) for one in networks))
+    runs = networks + [Network({**one.case, 'events': _events(rng)}, one.settings)
+                       for one in networks for _ in range(1, STARTS)]
+    told, closest = _run(runs, weaken, counts) if runs else ({}, np.zeros(0))
     near[:] = sorted([*near, *((float(closest[k]), one.case) for k, one in enumerate(networks))],
                      key=lambda one: -one[0])[:200]
-    return len(networks), [{'attack': 'network', 'happened': what, **networks[k].case}
+    return len(networks), [{'attack': 'network', 'happened': what, **runs[k].case}
                            for k, what in sorted(told.items())]
 
 
@@ -213,12 +218,14 @@ def happened(case: Case, weaken: str = '') -> str:
     return '' if one is None else _run([one], weaken, Counter())[0].get(0, '')
 
 
-def smaller(case: Case, fails: Callable[[Case], bool]) -> Case:
+def smaller(case: Case, fails: Callable[[Case], bool], seconds: float = 20.0) -> Case:
     """A case with fewer nodes, edges, settings and events and rounder numbers that still fails."""
-    again = True
+    again, end = True, time.monotonic() + seconds
     while again:
         again = False
         for trial in _simpler(case):
+            if time.monotonic() > end:
+                return case
             if fails(trial):
                 case, again = trial, True
                 break
@@ -316,7 +323,8 @@ def _draw(rng: np.random.Generator, size: int, weaken: str) -> Network | None:
     least = case['rho'] * max(radii) ** 2 / free.connectivity
     settings: list[Certified] = []
     for _ in range(rng.integers(2, 5)):
-        k = least * (1.0 + 10.0 ** rng.uniform(-4.0, 1.5))
+        k = least * (1.0 + 10.0 ** (
+            rng.uniform(-4.0, 0.0) if rng.random() < 0.35 else rng.uniform(0.0, 1.5)))
         held = [0 if rng.random() < 0.5 else int(rng.integers(size))]
         if rng.random() < 0.3:
             held.append(int(rng.integers(size)))
@@ -418,8 +426,8 @@ class _Run:
             for net, dt in zip(networks, self.dt, strict=True)])
         self.requested, self.armed, self.acting, self.gathered, self.entered = np.zeros(
             (5, count), dtype=bool)
-        self.since, self.began = np.zeros((2, count), dtype=int)
-        self.measure, self.closest = np.zeros((2, count))
+        self.since = np.zeros(count, dtype=int)
+        self.measure, self.closest, self.turned = np.zeros((3, count))
         self.share, self.y = np.ones((count, size)), np.ones((count, size), dtype=complex)
         self.told: dict[int, str] = {}
         self.row = self.first.copy()
@@ -440,6 +448,8 @@ class _Run:
                 self.check(k)
                 self.do(k, kind, value)
                 self.stale = True
+            if len(self.told) == len(self.networks):
+                break
             self.advance()
 
     def advance(self) -> None:
@@ -455,7 +465,7 @@ class _Run:
         if len(arriving):
             good = self.in_places(arriving)
             self.armed[arriving[good]] = True
-            self.began[arriving[good]] = self.tick
+            self.turned[arriving[good]] = 0.0
             self.tell(arriving[~good & self.gathered[arriving]], 'is not in its places')
         distance = np.abs(self.y - self.D)
         inside = np.all(~self.held | (distance <= self.region), axis=1)
@@ -465,8 +475,9 @@ class _Run:
             self.clock(int(k))
         going = np.flatnonzero(self.armed & ~self.acting)
         if len(going):
-            turned = (self.tick - self.began[going]) * self.dt[going] * self.batch.omega[going, 0]
-            late = turned > 2.0 * np.pi + 0.05 + 2.0 * self.dt[going] * self.batch.omega[going, 0]
+            ahead = self.dt[going] * self.batch.omega[going, 0]
+            self.turned[going] += ahead
+            late = self.turned[going] > 2.0 * np.pi + 0.05 + 2.0 * ahead
             self.tell(going[late], 'is not captured within a turn')
         x = np.conj(self.y * self.turn).view(float).reshape(*self.y.shape, 2)
         x = self.batch.step(x, self.armed)
@@ -533,7 +544,8 @@ class _Run:
 
     def do(self, k: int, kind: str, value: int) -> None:
         """Do what an event says."""
-        self.counts[kind] += 1
+        self.counts[kind] += (kind not in ('request', 'release')
+                              or bool(self.requested[k]) == (kind == 'release'))
         y, D, one = self.y[k], self.D[k, 0], self.certificate(k)
         rng, size = np.random.default_rng(value), len(self.y[k])
         if kind == 'request' and not self.requested[k]:
@@ -541,15 +553,18 @@ class _Run:
         elif kind == 'release':
             self.requested[k] = self.armed[k] = self.acting[k] = False
         elif kind == 'change':
-            self.change(k, int(self.first[k]) + value % len(self.networks[k].settings))
+            others = max(1, len(self.networks[k].settings) - 1)
+            before = int(self.row[k] - self.first[k])
+            self.change(k, (before + 1 + value % others) % (others + 1))
         elif kind == 'cadence':
+            self.counts['accepted'] += 1
             self.share[k] = rng.uniform(0.2, 1.0, size) ** rng.integers(0, 3)
         elif kind in ('scatter', 'gather', 'edge', 'box'):
             self.gathered[k] = kind == 'gather' and self.networks[k].like_oscillators
             self.requested[k] &= kind != 'gather'
             self.requested[k] |= kind in ('edge', 'box')
             self.armed[k], self.acting[k] = kind in ('edge', 'box'), False
-            self.entered[k], self.began[k] = kind != 'box', self.tick
+            self.entered[k], self.turned[k] = kind != 'box', 0.0
             disc = np.sqrt(rng.random(size)) * np.exp(6.3j * rng.random(size))
             r, region = self.r[k], one.setting.region_radius
             if kind == 'scatter':
@@ -567,13 +582,13 @@ class _Run:
         if kind != 'request' or self.acting[k]:
             self.clock(k)
 
-    def change(self, k: int, row: int) -> None:
+    def change(self, k: int, at: int) -> None:
         """Change to another certified setting where the suite would accept it."""
-        if row == self.row[k]:
+        settings = self.networks[k].settings
+        if len(settings) == 1:
             return
         if self.acting[k]:
-            new, distance = self.networks[k].settings[row - self.first[k]], np.abs(
-                self.y[k] - self.D[k])
+            new, distance = settings[at], np.abs(self.y[k] - self.D[k])
             x = np.conj(self.y[k] * self.turn[k])
             speed = np.abs(self.certificate(k).setting.system.field(
                 np.stack([x.real, x.imag], axis=1), self.share[k] * self.certificate(
@@ -585,7 +600,7 @@ class _Run:
             self.entered[k] = False
         else:
             self.armed[k] = False
-        self.row[k] = row
+        self.row[k] = self.first[k] + at
         self.counts['accepted'] += 1
 
 

@@ -177,10 +177,9 @@ def outward_growth_within(system: CanonicalSystem, omega: Array, D: float, u: Ar
     r = system.radius
     reach = r / np.sqrt(3.0)
     root = np.sqrt(np.maximum(4.0 * D**2 + 3.0 * (r**2 - D**2), 0.0))
-    places = (0.0 * r, reach - D, reach + D, (root - 2.0 * D) / 3.0, (root + 2.0 * D) / 3.0,
-              (2.0 * D - root) / 3.0)
-    radial = np.maximum.reduce([_radial_growth(system, D, np.clip(v, 0.0, u))
-                                for v in (u, *places)])
+    places = np.stack([u, 0.0 * r, reach - D, reach + D, (root - 2.0 * D) / 3.0,
+                       (root + 2.0 * D) / 3.0, (2.0 * D - root) / 3.0])
+    radial = _radial_growth(system, D, np.clip(places, 0.0, u)).max(axis=0)
     return np.abs(omega) * D + np.maximum(radial, 0.0)
 
 
@@ -232,6 +231,8 @@ def _grounded_solution(L: Array, g: Array, u: Array, free: Mask) -> Array:
     """Solve (L u)_i = g_i at the free nodes, u kept at the others; ∞ where unbounded."""
     solved, heard = u.copy(), ~free
     for _ in range(len(u)):
+        if np.all(heard):
+            break
         heard = heard | ((L < 0.0) @ heard)
     solved[~heard] = np.inf                                 # no kept node acts on these
     free = free & heard
