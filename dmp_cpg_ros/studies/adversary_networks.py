@@ -233,7 +233,7 @@ def smaller(case: Case, fails: Callable[[Case], bool], seconds: float = 20.0) ->
 
 
 def _simpler(case: Case) -> Any:
-    for node in reversed(range(len(case['phases']))):
+    for node in reversed(range(len(case['phases']) if len(case['phases']) > 1 else 0)):
         yield _without(case, node)
     for name in ('events', 'settings', 'edges'):
         for k in reversed(range(len(case[name]))):
@@ -429,6 +429,7 @@ class _Run:
         self.since = np.zeros(count, dtype=int)
         self.measure, self.closest, self.turned = np.zeros((3, count))
         self.share, self.y = np.ones((count, size)), np.ones((count, size), dtype=complex)
+        self.alike = np.array([net.like_oscillators for net in networks])
         self.told: dict[int, str] = {}
         self.row = self.first.copy()
         self.tick, self.stale = 0, True
@@ -473,7 +474,7 @@ class _Run:
             self.acting[k], self.gathered[k], self.share[k] = True, False, self.share[k, 0]
             self.counts['captures'] += 1
             self.clock(int(k))
-        going = np.flatnonzero(self.armed & ~self.acting)
+        going = np.flatnonzero(self.armed & ~self.acting & self.alike)
         if len(going):
             ahead = self.dt[going] * self.batch.omega[going, 0]
             self.turned[going] += ahead
@@ -490,7 +491,7 @@ class _Run:
         self.tell(np.flatnonzero(~np.isfinite(distance).all(axis=1)), 'diverges')
 
     def in_places(self, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
-        """Whether networks are as close to their places and cycles as capture takes for granted."""
+        """Whether networks are as near to places and cycle as capture takes for granted."""
         y = self.y[rows]
         apart = np.abs(y[:, :, None] - y[:, None, :]).max(axis=(1, 2))
         off = np.abs(np.abs(y) - self.r[rows]).max(axis=1)
@@ -560,7 +561,7 @@ class _Run:
             self.counts['accepted'] += 1
             self.share[k] = rng.uniform(0.2, 1.0, size) ** rng.integers(0, 3)
         elif kind in ('scatter', 'gather', 'edge', 'box'):
-            self.gathered[k] = kind == 'gather' and self.networks[k].like_oscillators
+            self.gathered[k] = kind == 'gather' and bool(self.alike[k])
             self.requested[k] &= kind != 'gather'
             self.requested[k] |= kind in ('edge', 'box')
             self.armed[k], self.acting[k] = kind in ('edge', 'box'), False
