@@ -91,46 +91,44 @@ class Network:
         return set(self.case['radius']) == {self.case['target_radius']}
 
 
-def certified(case: Case, entry: Case, free: Synchronisation | None = None, weaken: str = ''
-              ) -> Certified | None:
+def certified(case: Case, entry: Case, system: CanonicalSystem, free: Synchronisation,
+              weaken: str = '') -> Certified | None:
     """Certificate of one setting of a network; None where it has none.
 
     Parameters
     ----------
     case, entry : dict
         The network, and one of its ``settings``.
-    free : Synchronisation, optional
-        Of the couplings at gain 1, when it is known.
+    system : CanonicalSystem
+        What they describe.
+    free : Synchronisation
+        Of the couplings at gain 1.
     weaken : str
         One of ``WEAKENED``, or empty.
     """
-    phases, radius, rho = np.array(case['phases']), np.array(case['radius']), case['rho']
-    k, size, r0 = entry['coupling'], len(phases), entry['region_radius']
-    graph = CouplingGraph(size, tuple((i, j) for i, j in case['edges']),
-                          k * np.reshape(case['gains'], (-1, 2, 2)), phases)
-    free = free or synchronisation(_graph_of(case), 0.0)
+    radius, rho, k, size = system.radius, case['rho'], entry['coupling'], system.graph.size
     free_rate = k * free.connectivity - rho * float(radius.max()) ** 2
-    system = CanonicalSystem(graph, AndronovHopf(rho, radius),
-                             state_at(phases, case['target_radius']))
     held = np.isin(np.arange(size), entry['held']).astype(float)
     if free_rate <= 0.0 and weaken != 'synchronisation' or not held.any():
         return None
     gains = held * entry['inhibition'] * (0.8 if weaken == 'capture' else 1.0)
-    capture = capture_set(system, entry['omega'], gains, r0)
+    capture = capture_set(system, entry['omega'], gains, entry['region_radius'])
     found = inhibited_contraction(system, capture)
     if not (capture.holds or weaken == 'capture') or capture.tolerance <= 0.0 or (
             found.reach == NONE and weaken not in ('contraction', 'capture')):
         return None
-    inner, shape, rate = capture.smallest_radius, None, found.rate
+    inner, rate = capture.smallest_radius, found.rate
+    shape: Array | None = None
     from_box = bool(np.all(inner <= np.maximum(0.0, case['target_radius'] - capture.distance)))
-    M = comparison_laplacian(graph) + np.diag(gains) - np.diag(growth(rho, radius, inner))
+    M = comparison_laplacian(system.graph) + np.diag(gains) - np.diag(growth(rho, radius, inner))
     if capture.rate > 0.0:
         rate = 0.99 * capture.rate
-        shape = np.linalg.solve(M - rate * np.eye(size), np.ones(size))
+        shape = np.asarray(np.linalg.solve(M - rate * np.eye(size), np.ones(size)))
     if weaken == 'contraction':
         rate, shape = found.inhibition_rate, None
     if weaken == 'synchronisation':
         free_rate = k * free.connectivity
+    r0 = entry['region_radius']
     return Certified(Setting(system, np.full(size, entry['omega']), gains, r0), capture,
                      radius_tolerance(float(radius.min()), r0), rate, shape,
                      from_box or found.reach == GLOBAL and capture.rate <= 0.0, free_rate,
@@ -141,7 +139,8 @@ def network(case: Case, weaken: str = '') -> Network | None:
     """Network with the certificates of all its settings; None where one has none."""
     try:
         free = synchronisation(_graph_of(case), 0.0)
-        found = [certified(case, entry, free, weaken) for entry in case['settings']]
+        found = [certified(case, entry, _system(case, entry), free, weaken)
+                 for entry in case['settings']]
     except DmpCpgError:
         return None
     settings = [one for one in found if one is not None]
@@ -322,7 +321,7 @@ def _draw(rng: np.random.Generator, size: int, weaken: str) -> Network | None:
         return None
     least = case['rho'] * max(radii) ** 2 / free.connectivity
     settings: list[Certified] = []
-    for _ in range(rng.integers(2, 5)):
+    for _ in range(rng.integers(3, 8)):
         k = least * (1.0 + 10.0 ** (
             rng.uniform(-4.0, 0.0) if rng.random() < 0.35 else rng.uniform(0.0, 1.5)))
         held = [0 if rng.random() < 0.5 else int(rng.integers(size))]
@@ -332,9 +331,10 @@ def _draw(rng: np.random.Generator, size: int, weaken: str) -> Network | None:
                        'held': sorted(set(held)), 'inhibition': 1.0, 'omega': _spread(
                            rng, *((15.0, 60.0) if coarse else (0.5, 30.0))),
                        'region_radius': radius * _spread(rng, 0.05, 0.3 if coarse else 1.2)}
-        entry['inhibition'] = _needed(case, entry) * (1.0 + 10.0 ** rng.uniform(
+        system = _system(case, entry)
+        entry['inhibition'] = _needed(system, entry) * (1.0 + 10.0 ** rng.uniform(
             -6.0, math.log10(0.05) if rng.random() < 0.7 else 1.0))
-        one = certified(case, entry, free, weaken)
+        one = certified(case, entry, system, free, weaken)
         if one is not None:
             case['settings'].append(entry)
             settings.append(one)
@@ -345,14 +345,18 @@ def _spread(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(math.log(low), math.log(high))))
 
 
-def _needed(case: Case, entry: Case) -> float:
+def _system(case: Case, entry: Case) -> CanonicalSystem:
+    unit = _graph_of(case)
+    graph = CouplingGraph(unit.size, unit.edges, entry['coupling'] * unit.gains, unit.phases)
+    return CanonicalSystem(graph, AndronovHopf(case['rho'], np.array(case['radius'])),
+                           state_at(graph.phases, case['target_radius']))
+
+
+def _needed(system: CanonicalSystem, entry: Case) -> float:
     """Gain that capture needs [1/s]."""
-    graph, held = _graph_of(case), np.isin(np.arange(len(case['phases'])), entry['held'])
-    scaled = CouplingGraph(graph.size, graph.edges, entry['coupling'] * graph.gains, graph.phases)
-    system = CanonicalSystem(scaled, AndronovHopf(case['rho'], np.array(case['radius'])),
-                             state_at(graph.phases, case['target_radius']))
-    needed = capture_set(system, entry['omega'], held.astype(float), entry['region_radius'])
-    return max(float(np.nanmax(needed.needed_gain)), 1e-6)
+    held = np.isin(np.arange(system.graph.size), entry['held']).astype(float)
+    needed = capture_set(system, entry['omega'], held, entry['region_radius']).needed_gain
+    return max(float(np.nanmax(needed)), 1e-6)
 
 
 def _finished(rng: np.random.Generator, case: Case, settings: list[Certified], weaken: str
@@ -388,10 +392,11 @@ def _varied(rng: np.random.Generator, case: Case, weaken: str) -> Network | None
     case = {**case, 'rho': near(case['rho']), 'settings': [
         {**entry, **{name: near(entry[name]) for name in ('coupling', 'omega', 'region_radius')}}
         for entry in case['settings']]}
-    settings = []
+    settings, free = [], synchronisation(_graph_of(case), 0.0)
     for entry in case['settings']:
-        entry['inhibition'] = _needed(case, entry) * (1.0 + 10.0 ** rng.uniform(-6.0, -1.0))
-        settings.append(certified(case, entry, None, weaken))
+        system = _system(case, entry)
+        entry['inhibition'] = _needed(system, entry) * (1.0 + 10.0 ** rng.uniform(-6.0, -1.0))
+        settings.append(certified(case, entry, system, free, weaken))
     good = [one for one in settings if one is not None]
     case['settings'] = [entry for entry, one in zip(case['settings'], settings, strict=True)
                         if one is not None]
