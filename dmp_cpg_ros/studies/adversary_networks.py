@@ -538,7 +538,9 @@ class _Run:
             distance = np.abs(self.y[k] - self.D[k])
             self.closest[k] = max(self.closest[k], float((distance / one.capture.distance).max()))
         rate = one.rate if self.acting[k] else one.free_rate
-        bound = self.measure[k] * (math.exp(-rate * self.dt[k]) + self.slip[k]) ** ticks
+        # The step keeps decay, but no faster one than its own error in a tick.
+        factor = math.exp(-min(rate * self.dt[k], 1.0)) + self.slip[k]
+        bound = self.measure[k] * factor ** ticks
         floor = 1e-7 * self.D[k, 0] * (1e3 if self.acting[k] else 1.0)
         if math.isfinite(bound) and bound > floor:
             self.counts['bounds'] += 1
