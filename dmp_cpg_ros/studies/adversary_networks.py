@@ -44,7 +44,7 @@ WEAKENED = ('synchronisation', 'contraction', 'capture', 'time_step', 'cycle_rad
 """Inequalities and conditions that can be left out here to see whether the search notices."""
 
 TICKS = 900
-STARTS = 3
+STARTS = 2
 """Sequences of events that each network is run through."""
 KINDS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'sparse', 'directed', 'unbalanced')
 EVENTS = {'request': 0.3, 'release': 0.2, 'change': 0.22, 'cadence': 0.08, 'scatter': 0.05,
@@ -321,7 +321,7 @@ def _draw(rng: np.random.Generator, size: int, weaken: str) -> Network | None:
         return None
     least = case['rho'] * max(radii) ** 2 / free.connectivity
     settings: list[Certified] = []
-    for _ in range(rng.integers(3, 8)):
+    for _ in range(rng.integers(4, 10)):
         k = least * (1.0 + 10.0 ** (
             rng.uniform(-4.0, 0.0) if rng.random() < 0.35 else rng.uniform(0.0, 1.5)))
         held = [0 if rng.random() < 0.5 else int(rng.integers(size))]
