@@ -193,7 +193,7 @@ def test_false_news_of_parameters_are_refused(
 
 
 def test_every_false_news_of_parameters_is_counted(ros: Ros) -> None:
-    node = ReferenceFilter(context=ros.context)
+    node = ReferenceFilter('follower', context=ros.context)
     node.start()
     ros.executor.add_node(node)
     publisher = ros.node.create_publisher(
@@ -220,7 +220,7 @@ def test_a_false_answer_about_parameters_is_refused(
 
     monkeypatch.setattr(certified, 'ASK_EVERY_S', 0.05)
     ros.node.create_service(GetParameters, 'canonical_oscillators/get_parameters', answer)
-    node = ReferenceFilter(context=ros.context)
+    node = ReferenceFilter('follower', context=ros.context)
     node.start()
     ros.executor.add_node(node)
     ros.spin_until(lambda: node.health.rejected.get('canonical_oscillators/get_parameters', 0) > 1)

@@ -155,6 +155,6 @@ def _way_to_rest(case: Gait) -> float:
     for _ in range(2000):
         case.tick()
         way += float(np.hypot(*case.r[:2])) * TICK
-        if case.stop.word == 'at_rest':
+        if case.stop.state == 'at_rest':
             return way
     raise AssertionError('it does not come to rest')
