@@ -33,6 +33,8 @@ _dmp_cpg_ros_restore () {  # called by deactivate
 # The runs see only this machine, on a domain that nobody else has by default.
 _dmp_cpg_ros_default ROS_DOMAIN_ID 87
 _dmp_cpg_ros_default ROS_AUTOMATIC_DISCOVERY_RANGE LOCALHOST
+# The matrices are small: threads cost more than they save, several times as much on busy cores.
+_dmp_cpg_ros_default OPENBLAS_NUM_THREADS 1
 # Without a screen: pictures offscreen, figures to files.
 if [ -z "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
     _dmp_cpg_ros_default MUJOCO_GL egl
