@@ -24,8 +24,8 @@ EXECUTABLES = (
     'reference_filter', 'canonical_oscillators', 'inhibition', 'posture_control',
     'leg_transformation', 'mujoco_robot', 'bag_recorder',
     # The commands.
-    'walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client', 'study_stops',
-    'benchmark_walking', 'study_recovery',
+    'walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client', 'composed_suite',
+    'study_stops', 'benchmark_walking', 'study_recovery',
 )
 
 WRAPPER = """\

@@ -89,6 +89,18 @@ WALKING_NODES: tuple[str, ...] = tuple(name for kind in WALKING for name in kind
 """Names in the graph of all nodes but the recorder's."""
 
 
+COMPOSED = 'composed_suite'
+"""Executable that runs several nodes in one process."""
+
+PROCESSES: dict[str, dict[str, tuple[str, ...]]] = {
+    'each': {name: (name,) for name in WALKING_NODES},
+    'blocks': {'gait': (core.REFERENCE, core.CANONICAL, core.INHIBITION), POSTURE: (POSTURE,),
+               'legs': tuple(KINDS[LEG].instances), ROBOT: (ROBOT,)},
+    'composed': {COMPOSED: WALKING_NODES},
+}
+"""How the nodes that walk share processes: names of the nodes by process, in starting order."""
+
+
 def instances() -> Iterator[tuple[Kind, str, Mapping[str, str]]]:
     """Every node of the suite, the recorder first: its kind, its name, its own parameters."""
     for kind in (KINDS[RECORDER], *WALKING):

@@ -14,7 +14,15 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from dmp_cpg_ros.suite import load_suite
-from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, instances, namespace_rules
+from dmp_cpg_ros.suite_table import (
+    COMPOSED,
+    KINDS,
+    PROCESSES,
+    RECORDER,
+    ROBOT,
+    instances,
+    namespace_rules,
+)
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -34,6 +42,9 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             'namespace', default_value='',
             description='namespace of all nodes and topics, /clock and /diagnostics included'),
+        DeclareLaunchArgument(
+            'processes', default_value='each', choices=list(PROCESSES),
+            description='a process for every node, for every block of them, or one for all'),
         DeclareLaunchArgument(
             'record', default_value='false', choices=['true', 'false'],
             description='whether to record all topics of the suite in a bag'),
@@ -63,19 +74,25 @@ def nodes(context: LaunchContext) -> list[Node]:
         shared['expected_nodes'] = list(KINDS)
         if Path(given('bag')).exists():
             raise FileExistsError(f"'{given('bag')}' exists; name another folder with bag:=FOLDER")
+    table = {name: (kind.name, own) for kind, name, own in instances()}
     described = []
-    for kind, name, own in instances():
-        if kind.name == RECORDER:
-            if not recording:
-                continue
-            parameters = {'output': given('bag')}
+    for process, names in {**({RECORDER: (RECORDER,)} if recording else {}),
+                           **PROCESSES[given('processes')]}.items():
+        kind, own = table[names[0]]
+        parameters = {'output': given('bag')} if kind == RECORDER else dict(shared)
+        if len(names) == 1:
+            place = {'executable': kind, 'name': process}
+            parameters.update(own)
         else:
-            parameters = {**shared, **own}
+            rules = [f'{name}:{key}:={value}' for name in names
+                     for key, value in table[name][1].items()]
+            place = {'executable': COMPOSED, 'arguments': list(names),
+                     'ros_arguments': [word for rule in rules for word in ('-p', rule)]}
         described.append(Node(
-            package='dmp_cpg_ros', executable=kind.name, name=name, namespace=namespace or None,
+            package='dmp_cpg_ros', namespace=namespace or None, **place,
             parameters=[str(suite.file), *([parameters] if parameters else [])],
             remappings=[rule for rule in namespace_rules(namespace) if rule[0] != '__ns'],
             output='screen', emulate_tty=True,
             # Without the robot there is nothing to walk: the others end with it.
-            on_exit=Shutdown() if kind.name == ROBOT else None))
+            on_exit=Shutdown() if ROBOT in names else None))
     return described

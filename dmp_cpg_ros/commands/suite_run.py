@@ -24,13 +24,14 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
+from dmp_cpg_ros.commands import composed_suite
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.nodes.framework import claims, execution, health
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
-from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES, instances
+from dmp_cpg_ros.suite_table import PROCESSES, RECORDER, ROBOT, WALKING_NODES, instances
 
 READY_WITHIN_S = 120.0
 """How long nodes may take to come up and find each other [s]."""
@@ -122,7 +123,7 @@ def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
 
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say, *,
-              lock_step: bool, composed: bool) -> None:
+              lock_step: bool, processes: str) -> None:
     """Run the suite from nothing to nothing.
 
     Parameters
@@ -137,8 +138,10 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         Folder for the output of the processes.
     say : callable (time_s, text)
         Told what happens.
-    lock_step, composed : bool
-        How to run.
+    lock_step : bool
+        Whether the robot waits for the targets of every tick.
+    processes : str
+        How nodes share processes, a key of :data:`~dmp_cpg_ros.suite_table.PROCESSES`.
 
     Raises
     ------
@@ -153,12 +156,13 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
     with _interrupt() as interrupted:
         rclpy.init(args=['walk', *arguments], signal_handler_options=SignalHandlerOptions.NO)
         try:
-            if composed:
-                group.start('composed_suite', 'dmp_cpg_ros.commands.composed_suite', arguments)
-            for kind, name, _ in instances():
-                if kind.name == RECORDER or not composed:
-                    group.start(
-                        name, 'dmp_cpg_ros', [kind.name, *arguments, '-r', f'__node:={name}'])
+            kinds = {name: kind.name for kind, name, _ in instances()}
+            for process, nodes in {RECORDER: (RECORDER,), **PROCESSES[processes]}.items():
+                if len(nodes) == 1:
+                    node = ('-r', f'__node:={nodes[0]}')
+                    group.start(process, 'dmp_cpg_ros', [kinds[nodes[0]], *arguments, *node])
+                else:
+                    group.start(process, composed_suite.__name__, [*nodes, *arguments])
             player = ScenarioPlayer(scenario, tick_ns, lock_step, say)
             executor = execution.make_executor('events')
             executor.add_node(player)

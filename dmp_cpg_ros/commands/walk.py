@@ -32,6 +32,10 @@ ended it.
 """
 
 
+SHARED = {'each': 'a process per node', 'blocks': 'a process per block', 'composed': 'one process'}
+"""What is said of the processes of a run."""
+
+
 @dataclass(frozen=True)
 class _Plan:
     """A run that nothing speaks against."""
@@ -100,7 +104,7 @@ def _walk(plan: _Plan) -> int:
     folder = run_folder.make_run_folder(options.out)
     print(f'{plan.scenario.name}: {plan.scenario.duration_s:g} s, {plan.suite.gait.name}, '
           f'{"lock-step" if options.lock_step else "real time"}, '
-          f'{"one process" if options.composed else "a process per node"}, '
+          f'{SHARED[options.processes]}, '
           f'{1e9 / plan.suite.tick_ns:g} Hz', flush=True)
     print(f'certificate: {plan.certificate.explained()}; {plan.certificate.contraction_grade} '
           f'grade; at rest at most {plan.certificate.time_to_rest:.3f} s after a request',
@@ -156,7 +160,7 @@ def _run(plan: _Plan, folder: Path) -> int:
                  *(word for name, to in rules for word in ('-r', f'{name}:={to}'))]
     try:
         run_suite(plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say,
-                  lock_step=options.lock_step, composed=options.composed)
+                  lock_step=options.lock_step, processes=options.processes)
         return OK
     except InterruptedRunError as error:
         print(f'walk: {error}; the recording up to here is complete', file=sys.stderr)
@@ -175,7 +179,7 @@ def _analyze(plan: _Plan, folder: Path) -> int:
             certificate=[entry.as_mapping() for entry in plan.certificate.inequalities],
             seeds={'robot': plan.suite.robot.seed}, lock_step=lock_step,
             report=not plan.options.no_report, scenario=plan.scenario.name,
-            composed=plan.options.composed)
+            processes=plan.options.processes)
     except DmpCpgError as error:
         print(f'walk: cannot analyze the recording: {error}', file=sys.stderr)
         return FAILED
@@ -213,7 +217,12 @@ def _parser() -> argparse.ArgumentParser:
         help='scenario file, by its path or in config/scenarios (default: %(default)s)')
     add('--lock-step', action='store_true',
         help='wait for every target, so that the run does not depend on the speed of the machine')
-    add('--composed', action='store_true', help='all nodes in one process and one executor')
+    sharing = parser.add_mutually_exclusive_group()
+    sharing.add_argument(
+        '--processes', choices=('each', 'blocks'), default='each',
+        help='a process for every node (default), or for every block: gait, posture, legs, robot')
+    sharing.add_argument('--composed', dest='processes', action='store_const', const='composed',
+                         help='all nodes in one process and one executor')
     add('--robot', metavar='FILE', help='robot file (default: the one of the parameter file)')
     add('--motion', metavar='FILE', help='motion of the feet, from learn --motion')
     add('--parameters', metavar='FILE', help='parameter file (default: config/suite.yaml)')

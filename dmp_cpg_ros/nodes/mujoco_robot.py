@@ -122,8 +122,6 @@ class MujocoRobotNode(SuiteNode):
 
     def readers(self, topic: Interface) -> tuple[str, ...]:
         """Count those among the readers of a topic that read it with these parameters."""
-        if self.local is not None:
-            return super().readers(topic)
         name, options = topic.name, self._options
         reads = {
             LEG: name == 'joint_states' and options.reading == 'torque',
@@ -131,7 +129,7 @@ class MujocoRobotNode(SuiteNode):
             core.INHIBITION: name in VOTING_TOPICS and self.parameters_of(VotingSwitch).voting,
             core.CANONICAL: name == 'foot_contacts' and options.contact_feedback,
         }
-        return (*super().readers(topic), *(kind for kind, does in reads.items() if does))
+        return (*super().readers(topic), *self.outside(kind for kind in reads if reads[kind]))
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the robot has fallen or stands by itself."""

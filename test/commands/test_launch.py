@@ -30,7 +30,7 @@ from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, WALKING_NODES
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
 ARGUMENTS = {'parameters': '', 'robot': '', 'lock_step': '', 'namespace': '', 'record': 'false',
-             'bag': 'bag'}
+             'processes': 'each', 'bag': 'bag'}
 
 UP_S = 90.0
 """How long nine processes may take to start and to find each other on a loaded machine [s]."""
@@ -70,19 +70,22 @@ def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 
 def start(processes: Processes, node: Any, folder: Path) -> NodeProcess:
     """Start a node with the command line that launch_ros makes of its description."""
-    rules = [('__node', node.name), *([('__ns', node.namespace)] if node.namespace else []),
-             *node.remappings]
+    named = getattr(node, 'name', None)
+    rules = [*([('__node', named)] if named else []),
+             *([('__ns', node.namespace)] if node.namespace else []), *node.remappings]
     words = [word for name, to in rules for word in ('-r', f'{name}:={to}')]
+    words += getattr(node, 'ros_arguments', [])
     for number, given in enumerate(node.parameters):
         if isinstance(given, dict):
-            path = folder / f'{node.name}_{number}.yaml'
+            path = folder / f'{named or "_".join(node.arguments)}_{number}.yaml'
             values = {key: tuple(value) if isinstance(value, list) else value
                       for key, value in given.items()}
-            content = {f'{node.namespace or ""}/{node.name}': {'ros__parameters': values}}
+            content = {f'{node.namespace or ""}/{named or "**"}': {'ros__parameters': values}}
             path.write_text(yaml.dump(content), encoding='utf-8')
             given = path
         words += ['--params-file', str(given)]
-    return processes.node(node.executable, *words)
+    return processes.python('-m', 'dmp_cpg_ros', node.executable, *getattr(node, 'arguments', ()),
+                            '--ros-args', *words)
 
 
 def test_launched_nodes_are_those_of_the_table(launch_file: ModuleType) -> None:
@@ -97,12 +100,13 @@ def test_launched_nodes_are_those_of_the_table(launch_file: ModuleType) -> None:
     assert sections - {'**'} <= {*WALKING_NODES, RECORDER}
 
 
-@pytest.mark.parametrize(('lock_step', 'namespace'), [('', ''), ('true', ''), ('true', 'robot1')])
+@pytest.mark.parametrize(('lock_step', 'namespace', 'shared'), [
+    ('', '', 'each'), ('true', '', 'blocks'), ('true', 'robot1', 'each')])
 def test_what_is_launched_becomes_ready_and_ticks(
         launch_file: ModuleType, processes: Processes, ros: Ros, tmp_path: Path,
-        lock_step: str, namespace: str) -> None:
+        lock_step: str, namespace: str, shared: str) -> None:
     given = {**ARGUMENTS, 'lock_step': lock_step, 'namespace': namespace, 'record': 'true',
-             'bag': str(tmp_path / 'bag')}
+             'processes': shared, 'bag': str(tmp_path / 'bag')}
     space = f'/{namespace}' if namespace else ''
     ticks = ros.collect(Clock, f'{space}/clock')
     for node in launch_file.nodes(given):

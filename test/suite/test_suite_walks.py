@@ -127,6 +127,8 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
     finally:
         stop.set()
     composed = walked(processes, scenario, tmp_path / 'composed', '--lock-step', '--composed')
+    blocks = walked(processes, scenario, tmp_path / 'blocks', '--lock-step',
+                    '--processes', 'blocks')
     digests = payload_digests(first / 'bag')
     assert {
         'joint_states',
@@ -135,6 +137,7 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
     } <= set(digests)
     assert payload_digests(loaded / 'bag') == digests
     assert payload_digests(composed / 'bag') == digests
+    assert payload_digests(blocks / 'bag') == digests
     manifest = json.loads((first / 'manifest.json').read_text(encoding='utf-8'))
     assert manifest['digests'] == digests
 

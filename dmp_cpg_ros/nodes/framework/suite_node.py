@@ -9,7 +9,7 @@ node overrides the hooks that it needs: ``configure``, ``activate``, ``deactivat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, ClassVar, TypeVar, cast
 
@@ -109,8 +109,12 @@ class SuiteNode(GuardedLifecycleNode):
 
     def readers(self, topic: Interface) -> tuple[str, ...]:
         """Kinds of nodes that read one of this node's topics, for :meth:`missing`."""
+        return self.outside(partners(topic, readers=True))
+
+    def outside(self, kinds: Iterable[str]) -> tuple[str, ...]:
+        """Those of some kinds of nodes that are not in this process."""
         inside = self.local.kinds if self.local is not None else ()
-        return tuple(kind for kind in partners(topic, readers=True) if kind not in inside)
+        return tuple(kind for kind in kinds if kind not in inside)
 
     def on_parameters(self) -> None:
         """Take over changed parameters from :meth:`parameters_of`, at the start of a tick."""
