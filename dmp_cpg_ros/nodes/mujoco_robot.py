@@ -221,6 +221,8 @@ class MujocoRobotNode(SuiteNode):
     # Lock-step -----------------------------------------------------------------------------------
 
     def _start_when_connected(self) -> None:
+        if self._timer is None:                                  # was due when it was destroyed
+            return
         # A tick that one of the others loses would be waited for for ever.
         missing = self.missing() + self._others.missing()
         if not missing:
@@ -258,6 +260,8 @@ class MujocoRobotNode(SuiteNode):
 
     def _on_timer(self) -> None:
         """Run the tick that is due, and one more when the process was kept from running before."""
+        if self._timer is None:                                  # was due when it was destroyed
+            return
         for _ in range(2):
             behind = time.monotonic_ns() - self._begun - self._state.time_ns
             if behind < self._tick_ns // 2:
