@@ -56,6 +56,7 @@ from dmp_cpg_ros.suite import load_gait, load_gaits
 
 FLOATS = st.floats(-LARGEST, LARGEST)
 STAMPS = st.integers(0, 2**31 * 10**9 - 1)
+GAITS = load_gaits()
 
 
 def numbers(*shape: int) -> st.SearchStrategy[np.ndarray]:
@@ -88,7 +89,7 @@ def test_stamps_that_are_no_time_are_refused(stamp: Time) -> None:
 
 @given(STAMPS, numbers(4, 2), numbers(4, 2))
 def test_canonical_state(time_ns: int, x: np.ndarray, x_dot: np.ndarray) -> None:
-    known = KnownGaits(load_gaits())
+    known = KnownGaits(GAITS)
     gait = known.transition(known.named('trot'), known.named('amble')).at(0.3, 0.0).scaled(1.25)
     message = wire(canonical_writer().fill(time_ns, x, x_dot, gait, -0.5))
     assert list(message.name[:3]) == ['fl_x1', 'fl_x2', 'fr_x1'] and not message.header.frame_id
@@ -103,7 +104,7 @@ def test_canonical_state(time_ns: int, x: np.ndarray, x_dot: np.ndarray) -> None
 
 def test_a_gait_that_is_not_known_to_the_reader_is_refused() -> None:
     message = wire(canonical_writer().fill(0, np.ones((4, 2)), np.ones((4, 2)), load_gait('trot')))
-    others = {name: gait for name, gait in load_gaits().items() if name != 'trot'}
+    others = {name: gait for name, gait in GAITS.items() if name != 'trot'}
     with pytest.raises(DataError, match='shares of gaits'):
         CanonicalStateReader(KnownGaits(others)).read(message)
 
