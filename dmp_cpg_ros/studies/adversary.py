@@ -16,7 +16,7 @@ import multiprocessing
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -41,9 +41,9 @@ WEAKENED = tuple(dict.fromkeys((*adversary_networks.WEAKENED, *CONDITIONS)))
 """Inequalities and conditions that can be left out, to see whether the search notices."""
 
 
-def search(seed: int, seconds: float, weaken: str = '', robot: str = '') -> Iterator[
-        tuple[Counter[str], list[Case]]]:
-    """Attack until the time is over; counts and failures of each round.
+def search(seed: int, seconds: float, weaken: str = '', most: int = 3
+           ) -> tuple[Counter[str], list[Case]]:
+    """Attack until the time is over or enough was found.
 
     Parameters
     ----------
@@ -53,26 +53,29 @@ def search(seed: int, seconds: float, weaken: str = '', robot: str = '') -> Iter
         How long.
     weaken : str
         What is left out; empty for an honest search.
-    robot : str
-        Robot file; that of the suite without.
+    most : int
+        Failures that are enough.
+
+    Returns
+    -------
+    counts : Counter
+        What was tried.
+    failures : list of dict
+        The smallest cases that fail in the same way as those that were met.
     """
     from dmp_cpg_ros.robot.model_reader import load_description
 
     rng, end = np.random.default_rng(seed), time.monotonic() + seconds
-    description = load_description(robot or load_suite().robot_file)
+    description, sizes = load_description(load_suite().robot_file), np.arange(2, 13)
     guided: list[tuple[float, Case]] = []
     close: list[tuple[float, Case]] = []
-    sizes = np.arange(2, 13)
-    while time.monotonic() < end:
-        counts: Counter[str] = Counter()
-        failures: list[Case] = []
+    counts, failures = Counter[str](), list[Case]()
+    while time.monotonic() < end and len(failures) < most:
         if weaken in ('', *adversary_networks.WEAKENED):
             size = int(rng.choice(sizes, p=1.0 / sizes / np.sum(1.0 / sizes)))
-            _, failures = adversary_networks.attack(rng, size, 250, weaken, close, counts)
-            failures = [_smallest(one, weaken) for one in failures[:1]] + failures[1:]
-        for _ in range(1 if weaken in ('', *CONDITIONS) else 0):
-            if time.monotonic() > end:
-                break
+            _, met = adversary_networks.attack(rng, size, 250, weaken, close, counts)
+            failures += [_smallest(one, weaken) for one in met[:1]] + met[1:]
+        if weaken in ('', *CONDITIONS) and time.monotonic() < end:
             case = varied(rng, guided[rng.integers(len(guided))][1]) if (
                 guided and rng.random() < 0.5) else setting(rng)
             if not case['events']:
@@ -83,8 +86,11 @@ def search(seed: int, seconds: float, weaken: str = '', robot: str = '') -> Iter
             what, closest = play(description, case, weaken, counts)
             guided = sorted([*guided, (closest, case)], key=lambda one: -one[0])[:16]
             if what:
-                failures.append(_written(description, case, what, weaken))
-        yield counts, failures
+                failures.append(_smallest_suite(description, case, what, weaken))
+        if sys.stderr.isatty():
+            print(f"{counts['networks']} networks, {counts['suites']} suites, {len(failures)} "
+                  'failures', end='\r', file=sys.stderr)
+    return counts, failures
 
 
 def _is_certified(description: RobotDescription, case: Case) -> bool:
@@ -103,35 +109,10 @@ def _smallest(failure: Case, weaken: str) -> Case:
     return {'attack': 'network', 'happened': happened(case, weaken), **case}
 
 
-def _written(description: RobotDescription, case: Case, what: str, weaken: str) -> Case:
-    """The smallest case that fails in the same way."""
-    def fails(one: Case) -> bool:
-        return (_is_certified(description, one)
-                and play(description, one, weaken)[0][:9] == what[:9])
-
-    case = smaller(case, fails)
-    plain = {name: list(value) if isinstance(value, tuple) else value
-             for name, value in case['parameters'].items()}
-    return {'attack': 'suite', 'happened': play(description, case, weaken)[0], **case,
-            'parameters': plain, 'events': [
-                [wait, kind, {name: list(entry) if isinstance(entry, tuple) else entry
-                              for name, entry in value.items()} if isinstance(value, dict)
-                 else value] for wait, kind, value in case['events']]}
-
-
-def _work(arguments: tuple[int, float, str, int]) -> tuple[Counter[str], list[Case]]:
-    seed, seconds, weaken, most = arguments
-    total: Counter[str] = Counter()
-    failures: list[Case] = []
-    for counts, found in search(seed, seconds, weaken):
-        total += counts
-        failures += found
-        if sys.stderr.isatty():
-            print(f"{total['networks']} networks, {total['suites']} suites, {len(failures)} "
-                  'failures', end='\r', file=sys.stderr)
-        if len(failures) >= most:
-            break
-    return total, failures
+def _smallest_suite(description: RobotDescription, case: Case, what: str, weaken: str) -> Case:
+    case = smaller(case, lambda one: _is_certified(description, one)
+                   and play(description, one, weaken)[0][:9] == what[:9])
+    return {'attack': 'suite', 'happened': play(description, case, weaken)[0], **case}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -147,16 +128,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     jobs = [(1000 * options.seed + k, options.seconds, options.weaken, options.failures)
             for k in range(options.workers)]
     if options.workers == 1:
-        results = [_work(jobs[0])]
+        results = [search(*jobs[0])]
     else:
         with multiprocessing.get_context('spawn').Pool(options.workers) as pool:
-            results = pool.map(_work, jobs)
+            results = pool.starmap(search, jobs)
     total = sum((counts for counts, _ in results), Counter())
     failures = [case for _, found in results for case in found]
     row = _row(total, options, len(failures))
     print(row)
     if failures:
-        plain = json.loads(json.dumps(failures, default=float))
+        plain = json.loads(json.dumps(failures, default=float))  # no tuples, no types of NumPy
         print(yaml.safe_dump(plain, sort_keys=False, allow_unicode=True))
     if options.record is not None:
         text = options.record.read_text(encoding='utf-8').rstrip('\n')

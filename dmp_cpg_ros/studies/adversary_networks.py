@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -169,19 +169,15 @@ def happened(case: Case, weaken: str = '') -> str:
 
 def smaller(case: Case, fails: Callable[[Case], bool], seconds: float = 10.0) -> Case:
     """A case with fewer nodes, edges, settings and events and rounder numbers that still fails."""
-    again, end = True, time.monotonic() + seconds
-    while again:
-        again = False
-        for trial in _simpler(case):
-            if time.monotonic() > end:
-                return case
-            if fails(trial):
-                case, again = trial, True
-                break
+    end = time.monotonic() + seconds
+    simpler = _simpler(case)
+    while time.monotonic() < end and (trial := next(simpler, None)) is not None:
+        if fails(trial):
+            case, simpler = trial, _simpler(trial)
     return case
 
 
-def _simpler(case: Case) -> Any:
+def _simpler(case: Case) -> Iterator[Case]:
     for node in reversed(range(len(case['phases']) if len(case['phases']) > 1 else 0)):
         yield _without(case, node)
     for name in ('events', 'settings', 'edges'):
@@ -191,18 +187,14 @@ def _simpler(case: Case) -> Any:
                 rest['gains'] = case['gains'][:k] + case['gains'][k + 1:]
             yield {**case, **rest}
     for digits in (1, 2, 3):
-        for name in ('rho', 'tick_s', 'phases', 'gains'):
-            yield from _changed(case, {**case, name: _rounded(case[name], digits)})
+        rounded = [{**case, name: _rounded(case[name], digits)}
+                   for name in ('rho', 'tick_s', 'phases', 'gains')]
         for k, entry in enumerate(case['settings']):
             for name in ('coupling', 'inhibition', 'region_radius', 'omega'):
-                settings = [*case['settings']]
-                settings[k] = {**entry, name: _rounded(entry[name], digits)}
-                yield from _changed(case, {**case, 'settings': settings})
-
-
-def _changed(case: Case, trial: Case) -> Any:
-    if trial != case:
-        yield trial
+                short = {**entry, name: _rounded(entry[name], digits)}
+                settings = [*case['settings'][:k], short, *case['settings'][k + 1:]]
+                rounded.append({**case, 'settings': settings})
+        yield from (trial for trial in rounded if trial != case)
 
 
 def _rounded(value: Any, digits: int) -> Any:
@@ -266,29 +258,21 @@ def _draw(rng: np.random.Generator, size: int, weaken: str) -> Network | None:
     case = {'edges': [list(edge) for edge in graph.edges], 'gains': graph.gains.tolist(),
             'phases': graph.phases.tolist(), 'rho': rate / radius**2, 'radius': radii,
             'target_radius': D, 'tick_s': 0.0, 'settings': [], 'events': []}
-    free = synchronisation(graph, 0.0)
-    if not free.connectivity > 0.0:
+    connectivity = synchronisation(graph, 0.0).connectivity
+    if not connectivity > 0.0:
         return None
-    least = case['rho'] * max(radii) ** 2 / free.connectivity
-    settings: list[Certified] = []
+    least, entries = case['rho'] * max(radii) ** 2 / connectivity, []
     for _ in range(rng.integers(4, 10)):
         k = least * (1.0 + 10.0 ** (
             rng.uniform(-4.0, 0.0) if rng.random() < 0.35 else rng.uniform(0.0, 1.5)))
-        held = [0 if rng.random() < 0.5 else int(rng.integers(size))]
+        held = {0 if rng.random() < 0.5 else int(rng.integers(size))}
         if rng.random() < 0.3:
-            held.append(int(rng.integers(size)))
-        entry: Case = {'coupling': k * (0.7 if weaken == 'synchronisation' else 1.0),
-                       'held': sorted(set(held)), 'inhibition': 1.0, 'omega': _spread(
-                           rng, *((15.0, 60.0) if coarse else (0.5, 30.0))),
-                       'region_radius': radius * _spread(rng, 0.05, 0.3 if coarse else 1.2)}
-        system = _system(case, entry)
-        entry['inhibition'] = _needed(system, entry) * (1.0 + 10.0 ** rng.uniform(
-            -6.0, math.log10(0.05) if rng.random() < 0.7 else 1.0))
-        one = certified(case, entry, system, free, weaken)
-        if one is not None:
-            case['settings'].append(entry)
-            settings.append(one)
-    return _finished(rng, case, settings, weaken)
+            held.add(int(rng.integers(size)))
+        entries.append({
+            'coupling': k * (0.7 if weaken == 'synchronisation' else 1.0), 'held': sorted(held),
+            'inhibition': 1.0, 'omega': _spread(rng, *((15.0, 60.0) if coarse else (0.5, 30.0))),
+            'region_radius': radius * _spread(rng, 0.05, 0.3 if coarse else 1.2)})
+    return _just_certified(rng, case, entries, weaken)
 
 
 def _spread(rng: np.random.Generator, low: float, high: float) -> float:
@@ -302,18 +286,23 @@ def _system(case: Case, entry: Case) -> CanonicalSystem:
                            state_at(graph.phases, case['target_radius']))
 
 
-def _needed(system: CanonicalSystem, entry: Case) -> float:
-    """Gain that capture needs [1/s]."""
-    held = np.isin(np.arange(system.graph.size), entry['held']).astype(float)
-    needed = capture_set(system, entry['omega'], held, entry['region_radius']).needed_gain
-    return max(float(np.nanmax(needed)), 1e-6)
-
-
-def _finished(rng: np.random.Generator, case: Case, settings: list[Certified], weaken: str
-              ) -> Network | None:
-    """Network with a tick that it bears, and events."""
+def _just_certified(rng: np.random.Generator, case: Case, entries: list[Case], weaken: str
+                    ) -> Network | None:
+    """Network with those settings that are certified, inhibited by hardly more than capture needs,
+    a tick that they bear, and events.
+    """
+    free, found = synchronisation(_graph_of(case), 0.0), []
+    for entry in entries:
+        system = _system(case, entry)
+        held = np.isin(np.arange(system.graph.size), entry['held']).astype(float)
+        needed = capture_set(system, entry['omega'], held, entry['region_radius']).needed_gain
+        entry['inhibition'] = max(float(np.nanmax(needed)), 1e-6) * (1.0 + 10.0 ** rng.uniform(
+            -6.0, math.log10(0.05) if rng.random() < 0.7 else 1.0))
+        found.append(certified(case, entry, system, free, weaken))
+    settings = [one for one in found if one is not None]
     if not settings:
         return None
+    case['settings'] = [entry for entry, one in zip(entries, found, strict=True) if one]
     longest = min(0.01, _longest(case, settings, weaken)) * rng.uniform(0.5, 1.0)
     if weaken == 'time_step':
         longest = rng.uniform(0.02, 0.12)
@@ -339,18 +328,10 @@ def _varied(rng: np.random.Generator, case: Case, weaken: str) -> Network | None
     def near(value: float) -> float:
         return value * math.exp(0.1 * rng.normal())
 
-    case = {**case, 'rho': near(case['rho']), 'settings': [
-        {**entry, **{name: near(entry[name]) for name in ('coupling', 'omega', 'region_radius')}}
-        for entry in case['settings']]}
-    settings, free = [], synchronisation(_graph_of(case), 0.0)
-    for entry in case['settings']:
-        system = _system(case, entry)
-        entry['inhibition'] = _needed(system, entry) * (1.0 + 10.0 ** rng.uniform(-6.0, -1.0))
-        settings.append(certified(case, entry, system, free, weaken))
-    good = [one for one in settings if one is not None]
-    case['settings'] = [entry for entry, one in zip(case['settings'], settings, strict=True)
-                        if one is not None]
-    return _finished(rng, case, good, weaken)
+    entries = [{**entry, **{name: near(entry[name])
+                            for name in ('coupling', 'omega', 'region_radius')}}
+               for entry in case['settings']]
+    return _just_certified(rng, {**case, 'rho': near(case['rho'])}, entries, weaken)
 
 
 def _run(networks: list[Network], weaken: str, counts: Counter[str]

@@ -13,9 +13,11 @@ The robot is the MuJoCo one in the plain loop, which is identical to the nodes i
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import dataclass
+from functools import partial
 from itertools import product
 from math import isnan, nan, pi
 from multiprocessing import Pool
@@ -26,16 +28,16 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.analysis.stop_outcome import StopSummary
-from dmp_cpg_ros.commands.ros_arguments import parse_arguments
-from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.core.errors import MissingFileError
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies import walking_trials as trials
 from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
-Results = list[tuple[Any, Any]]
-"""Cases with their outcomes."""
+Results = list[tuple[dict[str, Any], Any]]
+"""Cases, as the arguments of their trials, with the outcomes."""
 
 DIRECTIONS = {'ahead': 0.0, 'ahead left': 0.25 * pi, 'left': 0.5 * pi, 'back left': 0.75 * pi,
               'back': pi, 'back right': 1.25 * pi, 'right': 1.5 * pi, 'ahead right': 1.75 * pi}
@@ -105,49 +107,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         help='seeds for each rough ground (default: 50)')
     parser.add_argument('--phases', type=output.at_least_one, default=16, metavar='N',
                         help='phases of the pushes, evenly over a cycle (default: 16)')
-    options, _ = parse_arguments(parser, arguments)
+    return run_command(parser, arguments, _benchmark)
+
+
+def _benchmark(options: argparse.Namespace, _: RosArguments) -> int:
     results: dict[str, Any] = {}
     with Pool(options.jobs) as pool:
         for name in options.tables:
-            try:
-                table = TABLES[name](pool, options.seeds, options.phases)
-            except DmpCpgError as error:
-                print(f'benchmark_walking: {error}', file=sys.stderr)
-                return 2
+            table = TABLES[name](pool, options.seeds, options.phases)
             print(f'{table.title}\n\n{output.markdown_table(table.columns, table.rows)}\n',
                   flush=True)
-            results[name] = [asdict(case) | asdict(outcome) for case, outcome in table.results]
+            results[name] = [case | (outcome if isinstance(outcome, dict) else vars(outcome))
+                             for case, outcome in table.results]
     output.write_results(options.json, results)
     return 0
 
 
-def _run(pool: Processes, trial: Callable[[Any], Any], cases: Sequence[Any], chunk: int = 1
-         ) -> Results:
+def _run(pool: Processes, trial: Callable[..., Any], cases: Sequence[dict[str, Any]],
+         chunk: int = 1) -> Results:
     """Cases with their outcomes, on several processes."""
-    return list(zip(cases, pool.map(trial, cases, chunksize=chunk), strict=True))
+    return list(zip(cases, pool.map(partial(_tried, trial), cases, chunk), strict=True))
 
 
-@dataclass(frozen=True)
-class SpeedCase:
-    """A velocity to hold: v_x, v_y [m/s], γ [rad/s]; robot None is the suite's own."""
-
-    gait: str
-    velocity: trials.Velocity
-    robot: str | None = None
+def _tried(trial: Callable[..., Any], case: dict[str, Any]) -> Any:
+    return trial(**case)
 
 
 def speeds(pool: Processes, seeds: int, phases: int) -> Table:
     """Steady velocities in all gaits."""
-    straight = [SpeedCase(gait, (v, 0.0, 0.0)) for gait, vs in STRAIGHT.items() for v in vs]
-    results = _run(pool, _steady, straight + [SpeedCase(*other) for other in OTHERS])
-    rows = [(case.gait, _velocity(case.velocity), *steady_cells(case.velocity, outcome))
+    walks = [*((gait, (v, 0.0, 0.0)) for gait, vs in STRAIGHT.items() for v in vs), *OTHERS]
+    results = _run(pool, trials.steady, [{'gait': gait, 'velocity': v} for gait, v in walks])
+    rows = [(case['gait'], _velocity(case['velocity']), *steady_cells(case['velocity'], outcome))
             for case, outcome in results]
     return Table('Speeds', ('gait', 'asked m/s, rad/s', 'reached', 'error %',
                             'yaw drift deg/10 m', 'cost of transport'), rows, results)
-
-
-def _steady(case: SpeedCase) -> trials.SteadyOutcome:
-    return trials.steady(*astuple(case))
 
 
 def steady_cells(velocity: trials.Velocity, outcome: trials.SteadyOutcome) -> tuple[str, ...]:
@@ -169,16 +162,17 @@ def _number(value: float, digits: int) -> str:
 
 def pushes(pool: Processes, seeds: int, phases: int) -> Table:
     """Largest pushes survived, the least and the median over the phases."""
-    results = _run(pool, trials.survived_pushes, [
-        trials.PushCase(*walking, i / phases, tuple(DIRECTIONS.values()))
-        for walking, i in product(PUSHED, range(phases))])
+    cases = [{'gait': gait, 'speed': speed, 'phase': i / phases,
+              'directions': tuple(DIRECTIONS.values())}
+             for (gait, speed), i in product(PUSHED, range(phases))]
+    survived = [changes for _, changes in _run(pool, trials.survived_pushes, cases)]
     rows = []
-    for gait, speed in PUSHED:
-        of = np.array([outcome.speed_change for case, outcome in results
-                       if (case.gait, case.speed) == (gait, speed)])
+    for k, (gait, speed) in enumerate(PUSHED):
+        of = np.array(survived[k * phases:(k + 1) * phases])
         rows.append((f'{gait} {speed:g} m/s', *(
             f'{low:.1f} / {middle:.1f}'
             for low, middle in zip(of.min(axis=0), np.median(of, axis=0), strict=True))))
+    results = [(case, {'speed_change': of}) for case, of in zip(cases, survived, strict=True)]
     return Table(f'Pushes: speed change in m/s that is survived at every one of {phases} phases / '
                  'at half of them; times the mass it is the impulse in N s',
                  ('walking', *DIRECTIONS), rows, results)
@@ -189,7 +183,7 @@ def rough(pool: Processes, seeds: int, phases: int) -> Table:
     results, rows = _crossings(pool, seeds, product(ROUGH, ROUGH_GAITS, [()])), []
     for case, words, of, shares in _groups(results, seeds):
         times = [outcome.time for outcome in of if outcome.crossed]
-        rows.append((case.kind, words, case.gait, *shares,
+        rows.append((case['kind'], words, case['gait'], *shares,
                      f'{np.median(times):.1f}' if times else '-'))
     return Table('Rough ground, blind, at 0.5 m/s within a tenth', (
         'ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s'), rows, results)
@@ -199,7 +193,7 @@ def contacts(pool: Processes, seeds: int, phases: int) -> Table:
     """Crossings of rough ground with each of ``FEELING``."""
     results, rows = _crossings(pool, seeds, product(FELT_GROUNDS, ROUGH_GAITS, FEELING)), []
     for case, words, of, shares in _groups(results, seeds):
-        rows.append((f'{case.kind}, {words}', case.gait, FEELING[case.values], *shares,
+        rows.append((f'{case["kind"]}, {words}', case['gait'], FEELING[case['values']], *shares,
                      f'{np.mean([outcome.distance for outcome in of]):.2f}',
                      f'{np.mean([outcome.distance / outcome.time for outcome in of]):.3f}',
                      f'{np.nanmean([outcome.tilt for outcome in of]):.2f}'))
@@ -211,16 +205,16 @@ def contacts(pool: Processes, seeds: int, phases: int) -> Table:
 def _crossings(pool: Processes, seeds: int, walks: Iterator[tuple[Any, ...]]) -> Results:
     """Crossings of ground, gait and parameters with every seed, the seeds innermost."""
     return _run(pool, trials.cross, [
-        trials.CrossingCase(gait, kind, ((name, number),), seed, values=values)
+        {'gait': gait, 'kind': kind, 'numbers': {name: number}, 'seed': seed, 'values': values}
         for ((kind, name, number), gait, values), seed in product(walks, range(seeds))], 2)
 
 
 def _groups(results: Results, seeds: int) -> Iterator[tuple[
-        trials.CrossingCase, str, list[trials.CrossingOutcome], tuple[str, str, str]]]:
+        dict[str, Any], str, list[trials.CrossingOutcome], tuple[str, str, str]]]:
     """One case of all seeds, the ground's numbers in words, the outcomes, and how many crossed."""
     for i in range(0, len(results), seeds):
         case, of = results[i][0], [outcome for _, outcome in results[i:i + seeds]]
-        words = ', '.join(f'{name} {value:g}' for name, value in case.numbers)
+        words = ', '.join(f'{name} {value:g}' for name, value in case['numbers'].items())
         crossed, fell = (sum(getattr(outcome, what) for outcome in of)
                          for what in ('crossed', 'fell'))
         yield case, words, of, (str(seeds), output.percent(crossed, seeds), str(fell))
@@ -229,12 +223,12 @@ def _groups(results: Results, seeds: int) -> Iterator[tuple[
 def gaits(pool: Processes, seeds: int, phases: int) -> Table:
     """Every ordered pair of gaits changed while moving, at a quarter of the phases."""
     walks = _run(pool, trials.run_changes, [
-        trials.ChangeCase(before, speed, max(1, phases // 4))
+        {'before': before, 'speed': speed, 'phases': max(1, phases // 4)}
         for before, speed in product(load_gaits(), trials.CHANGE_SPEEDS)])
     results = [(case, one) for case, of in walks for one in of]
     rows = []
-    for before, after in sorted({(case.before, one.after) for case, one in results}):
-        of = [one for case, one in results if (case.before, one.after) == (before, after)]
+    for before, after in sorted({(case['before'], one.after) for case, one in results}):
+        of = [one for case, one in results if (case['before'], one.after) == (before, after)]
         upright = [one for one in of if not one.fell]
         worst = [f'{max(getattr(one, name) for one in upright):{form}}' if upright else '-'
                  for name, form in (('duration', '.2f'), ('cycles', '.1f'),
@@ -246,14 +240,6 @@ def gaits(pool: Processes, seeds: int, phases: int) -> Table:
                  ('change', 'cases', 'fell', 'phase error in bound 3 cycles after', 'longest s',
                   'in cycles', 'largest phase error rad', 'largest roll or pitch deg'),
                  rows, results)
-
-
-@dataclass(frozen=True)
-class RobotCase:
-    """A robot by its file, and the number of phases of its stops and pushes."""
-
-    file: str
-    phases: int
 
 
 @dataclass(frozen=True)
@@ -285,22 +271,20 @@ class RobotOutcome:
     pushed: float
 
 
-def run_robot(case: RobotCase) -> RobotOutcome:
-    """Walk, trot faster and faster, stop, start, and be pushed."""
+def run_robot(file: str, phases: int) -> RobotOutcome:
+    """Walk, trot faster and faster, stop, start, and be pushed, the latter at some phases."""
     # a zero command is no request here, but the first command starts the gait
-    suite = load_suite(None, {'robot': case.file, 'cmd_vel_timeout': 0.0})
+    suite = load_suite(None, {'robot': file, 'cmd_vel_timeout': 0.0})
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
-    phases = [i / case.phases for i in range(case.phases)]
+    shares = [i / phases for i in range(phases)]
     stops = StopSummary(list(run_trials(
-        robot, [StopCase('amble', 0.5, phase) for phase in phases], suite.parameters)))
+        robot, [StopCase('amble', 0.5, phase) for phase in shares], suite.parameters)))
     stood, walked_on, fell = map(stops.number, ('standing', 'walked_on', 'fell'))
-    pushed = [trials.survived_pushes(trials.PushCase('amble', 0.5, phase, SIDES), case.file)
-              for phase in phases]
     return RobotOutcome(
-        robot.description.mass, trials.steady('amble', (0.5, 0.0, 0.0), case.file),
-        trials.steady('trot', (1.0, 0.0, 0.0), case.file), _top_speed(case.file),
-        len(phases), stood, walked_on, fell,
-        min(change for outcome in pushed for change in outcome.speed_change))
+        robot.description.mass, trials.steady('amble', (0.5, 0.0, 0.0), file),
+        trials.steady('trot', (1.0, 0.0, 0.0), file), _top_speed(file), phases,
+        stood, walked_on, fell,
+        min(min(trials.survived_pushes('amble', 0.5, phase, SIDES, file)) for phase in shares))
 
 
 def _top_speed(file: str) -> float:
@@ -317,13 +301,13 @@ def _top_speed(file: str) -> float:
 
 def robots(pool: Processes, seeds: int, phases: int) -> Table:
     """All robots that are there, with their files alone."""
-    results = _run(
-        pool, run_robot, [RobotCase(file, phases) for file in ROBOTS if _is_there(file)])
+    results = _run(pool, run_robot, [
+        {'file': file, 'phases': phases} for file in ROBOTS if _is_there(file)])
     rows = []
     for case, of in results:
         amble, trot = (steady_cells((v, 0.0, 0.0), outcome)
                        for v, outcome in ((0.5, of.amble), (1.0, of.trot)))
-        rows.append((Path(case.file).stem, f'{of.mass:.1f}', amble[1], amble[3], trot[1], trot[3],
+        rows.append((Path(case['file']).stem, f'{of.mass:.1f}', *amble[1::2], *trot[1::2],
                      _number(of.top_speed, 1), f'{of.stood}/{of.stops}',
                      f'{of.walked_on}/{of.stops}', str(of.stop_falls), _number(of.pushed, 1)))
     return Table('Robots; CoT is positive joint work over m g d, the push is survived at every '

@@ -16,28 +16,26 @@ import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical.graph import CouplingGraph, topology
+from dmp_cpg_ros.core.canonical.graph import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.contraction import delays
 from dmp_cpg_ros.core.contraction.capture import capture_set, place_tolerance, radius_tolerance
-from dmp_cpg_ros.core.contraction.delays import (
-    Capture,
-    carried_margin,
-    held_margin,
-    late_margin,
-)
+from dmp_cpg_ros.core.contraction.delays import Capture
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.studies.output import markdown_table
 
 Complex = NDArray[np.complex128]
 
 MARGINS: dict[str, Callable[[Capture], float]] = {
-    'late': late_margin, 'held': held_margin, 'carried': carried_margin}
+    'late': delays.late_margin, 'held': delays.held_margin, 'carried': delays.carried_margin}
 """Kinds of delay, and what is certified."""
 
 PATTERNS = ('one age', 'edges', 'kept', 'kept from inhibited')
@@ -45,6 +43,9 @@ PATTERNS = ('one age', 'edges', 'kept', 'kept from inhibited')
 
 AGES = 0.999 * 1.2 ** np.arange(-1, 15)
 """Ages that are tried, in units of the certified one."""
+
+COLUMNS = ('delay', 'networks', 'none certified', 'nothing fails', 'share of what fails: least',
+           'median', 'most')
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 
@@ -81,17 +82,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--seed', type=int, default=1, help='of the random networks')
     options = parser.parse_args(arguments)
     rows = list(measured(options.networks, options.seed))
-    print('| delay | networks | none certified | nothing fails | share of what fails: least | '
-          'median | most |')
-    print('|---|---|---|---|---|---|---|')
-    for kind in MARGINS:
-        for group in ('gait', 'random'):
-            of = [row for row in rows if row.kind == kind and row.network.startswith(group)]
-            shares = [row.share for row in of if row.certified > 0.0 and np.isfinite(row.fails)]
-            told = [f'{np.quantile(shares, share):.2f}' for share in (0.0, 0.5, 1.0)
-                    ] if shares else ['-'] * 3
-            print(f'| {kind} | {len(of)} {group}s | {sum(row.certified == 0.0 for row in of)} | '
-                  f'{sum(np.isinf(row.fails) for row in of)} | ' + ' | '.join(told) + ' |')
+    table = []
+    for kind, group in product(MARGINS, ('gait', 'random')):
+        of = [row for row in rows if row.kind == kind and row.network.startswith(group)]
+        shares = [row.share for row in of if row.certified > 0.0 and np.isfinite(row.fails)]
+        told = [f'{share:.2f}' for share in np.quantile(shares, (0.0, 0.5, 1.0))
+                ] if shares else '---'
+        table.append((kind, f'{len(of)} {group}s', str(sum(row.certified == 0.0 for row in of)),
+                      str(sum(np.isinf(row.fails) for row in of)), *told))
+    print(markdown_table(COLUMNS, table))
     return int(any(row.share > 1.0 for row in rows))
 
 
@@ -108,12 +107,12 @@ def measured(networks: int, seed: int) -> Iterator[Row]:
 
 def gait_captures() -> Iterator[tuple[str, Capture]]:
     """Four legs on every graph, at cadences from a slow walk to a fast trot."""
-    for graph in GRAPHS:
-        for omega in (9.0, 20.0):
-            for k, room in ((40.0, 1.2), (100.0, 1.2), (100.0, 2.0)):
-                found = capture_of(_four(graph, k), 8.0, 1.0, omega, 0.3, room, (0,))
-                if found is not None:
-                    yield f'gait {graph} {omega:g} rad/s, k {k:g} 1/s, {room:g} k_inh', found
+    for graph, omega, (k, room) in product(
+            GRAPHS, (9.0, 20.0), ((40.0, 1.2), (100.0, 1.2), (100.0, 2.0))):
+        legs = graph_from_edges(4, topology(graph, 4), k)
+        found = capture_of(legs, 8.0, 1.0, omega, 0.3, room, (0,))
+        if found is not None:
+            yield f'gait {graph} {omega:g} rad/s, k {k:g} 1/s, {room:g} k_inh', found
 
 
 def random_captures(rng: np.random.Generator, count: int) -> Iterator[tuple[str, Capture]]:
@@ -185,21 +184,18 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
     rates = 1j * before[:, None] * past
     backwards = np.full(count, -length)
     z, now = past[-1], length - 1
-    fixed = np.where(pattern == 'edges', rng.random((size, size)), 1.0) * most[:, None, None]
+    edges, each = rng.random((size, size)), rng.random((count, size, size))
+    shares = {'one age': np.ones((size, size)), 'edges': edges}.get(pattern, each)
+    age = (shares * most[:, None, None]).astype(int)
     acted, bad, aside = np.zeros((3, count), dtype=bool)
-    age = (rng.random((count, size, size)) * most[:, None, None]).astype(int)
     row, column = np.arange(count)[:, None, None], np.arange(size)[None, None, :]
-    seen_age = np.zeros(count, dtype=int)
+    late, kept, seen_age = kind == 'late', pattern.startswith('kept'), most
     for tick in range(steps):
-        if pattern in ('one age', 'edges'):
-            age = fixed.astype(int)
-            seen_age = most
-        else:
+        if kept:
             age = np.where(age >= most[:, None, None], 0, age + 1)
             seen_age = np.where(seen_age >= most, 0, seen_age + 1)
             if pattern == 'kept from inhibited':
                 age[:, :, ~held] = 0
-        late = kind == 'late'
         samples = np.broadcast_to(z[:, None, :], age.shape)
         if not late:
             index = (now - age) % length
@@ -232,12 +228,6 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
         np.maximum(quarter, np.abs(rates[now]).max(axis=1), out=quarter)
     moves = (fastest[3] > 0.9 * fastest[1]) & (fastest[3] > 1e-3 * omega * r)
     return (bad | ~acted | moves) & ~aside
-
-
-def _four(graph: str, k: float) -> CouplingGraph:
-    edges = topology(graph, 4)
-    return CouplingGraph(4, edges, np.repeat(k * np.eye(2)[None], len(edges), axis=0),
-                         np.zeros(4))
 
 
 if __name__ == '__main__':

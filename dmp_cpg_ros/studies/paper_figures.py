@@ -16,7 +16,7 @@ from dmp_cpg_ros.analysis import paper_figures
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import over_time, style
 from dmp_cpg_ros.analysis.recording import Recording
-from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -36,17 +36,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
     parser.add_argument('--out', type=Path, default=Path('paper_figures'), metavar='DIR',
                         help='folder for the PNG files (default: paper_figures)')
-    options = parser.parse_args(arguments)
-    try:
-        suite = load_suite(options.file, {'cmd_vel_timeout': 0.0})
-        options.out.mkdir(parents=True, exist_ok=True)
-        with style.applied():
-            for name, figure in figures(suite):
-                FigureCanvasAgg(figure).print_png(options.out / f'{name}.png')
-                print(options.out / f'{name}.png')
-    except (DmpCpgError, OSError) as error:
-        print(f'paper_figures: {error}', file=sys.stderr)
-        return 2
+    return run_command(parser, arguments, _draw)
+
+
+def _draw(options: argparse.Namespace, _: RosArguments) -> int:
+    suite = load_suite(options.file, {'cmd_vel_timeout': 0.0})
+    options.out.mkdir(parents=True, exist_ok=True)
+    with style.applied():
+        for name, figure in figures(suite):
+            FigureCanvasAgg(figure).print_png(options.out / f'{name}.png')
+            print(options.out / f'{name}.png')
     return 0
 
 
@@ -75,15 +74,15 @@ def experiment(suite: Suite, robot: MujocoRobot) -> Recording:
     """Amble, inhibit, release: the paper's experiment in the plain loop."""
     loop, state = WalkingLoop(robot.description, suite.gait, suite.parameters), robot.reset()
     loop.command(SPEED)
-    tick_s = suite.tick_ns * 1e-9
-    requests = {round(INHIBITED_AT / tick_s): True, round(RELEASED_AT / tick_s): False}
     states, ticks = [], []
-    for k in range(round(END / tick_s)):
-        if k in requests:
-            loop.request(requests[k])
-        states.append(state)
-        ticks.append(loop.tick(state))
-        state = robot.step(ticks[-1].targets)
+    for stopped, seconds in ((None, INHIBITED_AT), (True, RELEASED_AT - INHIBITED_AT),
+                             (False, END - RELEASED_AT)):
+        if stopped is not None:
+            loop.request(stopped)
+        for _ in range(round(seconds * 1e9 / suite.tick_ns)):
+            states.append(state)
+            ticks.append(loop.tick(state))
+            state = robot.step(ticks[-1].targets)
     return recording_of(states, ticks)
 
 

@@ -10,17 +10,17 @@ cannot be used.
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from multiprocessing import Pool
 from pathlib import Path
 
 import numpy as np
 
-from dmp_cpg_ros.commands.ros_arguments import parse_arguments
-from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_recording import LoopRun
@@ -68,19 +68,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         help=f'robot files (default: {OWN_ROBOT})')
     parser.add_argument('--seeds', type=int, default=50, metavar='N',
                         help='falls of each robot (default: 50)')
-    options, _ = parse_arguments(parser, arguments)
+    return run_command(parser, arguments, _study)
+
+
+def _study(options: argparse.Namespace, _: RosArguments) -> int:
     rows, outcomes, fine = [], {}, []
-    try:
-        with Pool(options.jobs) as pool:
-            for robot in options.robots:
-                up, down = up_and_down(robot)
-                falls = pool.map(partial(recovery, robot), range(options.seeds), chunksize=1)
-                rows.append(row(robot, up, down, falls))
-                outcomes[robot] = [asdict(fall) for fall in falls]
-                fine.append(up and down and all(fall.stands for fall in falls))
-    except DmpCpgError as error:
-        print(f'study_recovery: {error}', file=sys.stderr)
-        return 2
+    with Pool(options.jobs) as pool:
+        for robot in options.robots:
+            up, down = up_and_down(robot)
+            falls = pool.map(partial(recovery, robot), range(options.seeds), chunksize=1)
+            rows.append(row(robot, up, down, falls))
+            outcomes[robot] = falls
+            fine.append(up and down and all(fall.stands for fall in falls))
     print(markdown_table(COLUMNS, rows))
     write_results(options.json, outcomes)
     return int(not fine[0])
@@ -128,12 +127,10 @@ def row(robot: str, up: bool, down: bool, falls: Sequence[Recovery]) -> tuple[st
     """Cells of one robot's row."""
     stood = [fall for fall in falls if fall.stands]
     rolls = np.bincount([min(fall.tries, 3) for fall in stood], minlength=4)
-    seconds = [fall.seconds for fall in stood]
-    times = f'{np.median(seconds):.1f} / {max(seconds):.1f}' if seconds else '-'
-    yes = ('no', 'yes')
+    seconds, yes = [fall.seconds for fall in stood], ('no', 'yes')
     return (Path(robot).stem, yes[up], yes[down], str(len(falls)),
             f'{len(stood)} ({percent(len(stood), len(falls))})', ' / '.join(map(str, rolls)),
-            times)
+            f'{np.median(seconds):.1f} / {max(seconds):.1f}' if seconds else '-')
 
 
 if __name__ == '__main__':

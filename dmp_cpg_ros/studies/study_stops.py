@@ -24,7 +24,7 @@ import argparse
 import sys
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import groupby, product
 from math import isnan, pi
@@ -37,11 +37,11 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis import stop_outcome
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.stop_outcome import StopOutcome
-from dmp_cpg_ros.commands.ros_arguments import parse_arguments
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
 from dmp_cpg_ros.core.certificates.certify import certify
-from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
 from dmp_cpg_ros.core.primitives.spring_damper import SpringState
@@ -106,22 +106,19 @@ Results = list[tuple[StopCase, StopOutcome]]
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study and print its table; returns the exit status."""
-    options, _ = parse_arguments(_parser(), arguments)
-    try:
-        cases = cases_of(options)
-        suite = suite_of(options.file, cases[0].leg)
-        for gait in options.gaits:
-            load_gait(gait)
-    except DmpCpgError as error:
-        print(f'study_stops: {error}', file=sys.stderr)
-        return 2
+    return run_command(_parser(), arguments, _study)
+
+
+def _study(options: argparse.Namespace, _: RosArguments) -> int:
+    cases = cases_of(options)
+    suite = suite_of(options.file, cases[0].leg)
+    for gait in options.gaits:
+        load_gait(gait)
     results = run_cases(cases, options.file, options.jobs, quiet=options.quiet)
     print(f'{suite.file}: {len(cases)} stops; columns with two numbers are median / worst\n')
     print(table(results))
-    for case, outcome in results:
-        if outcome.fell:
-            print(f'\nfell: {case}', end='')
-    write_results(options.json, [asdict(case) | asdict(outcome) for case, outcome in results])
+    print(*(f'fell: {case}' for case, outcome in results if outcome.fell), sep='\n')
+    write_results(options.json, [vars(case) | vars(outcome) for case, outcome in results])
     return int(any(outcome.fell for case, outcome in results if case.method == METHODS[0]))
 
 
@@ -314,15 +311,13 @@ def _held(run: LoopRun[FreezingLoop]) -> tuple[float, float]:
 
 def table(results: Results) -> str:
     """Markdown table: a row per gait, speed, cadence, leg and method, and one for each method."""
-    rows = []
-    for key, group in groupby(results, lambda result: _key(result[0])):
-        labels = [f'{part:g}' if isinstance(part, float) else part for part in key]
-        rows.append((*labels, *_cells([outcome for _, outcome in group], key[-1])))
-    for method in METHODS:
-        outcomes = [outcome for case, outcome in results if case.method == method]
-        if outcomes:
-            rows.append(('all', '', '', '', method, *_cells(outcomes, method)))
-    return markdown_table(COLUMNS, rows)
+    rows = [([f'{part:g}' if isinstance(part, float) else part for part in key], list(group))
+            for key, group in groupby(results, lambda result: _key(result[0]))]
+    rows += [(['all', '', '', '', method], [result for result in results
+                                            if result[0].method == method]) for method in METHODS]
+    return markdown_table(COLUMNS, [
+        (*labels, *_cells([outcome for _, outcome in group], labels[-1]))
+        for labels, group in rows if group])
 
 
 def _key(case: StopCase) -> tuple[str, float, str, float, str]:

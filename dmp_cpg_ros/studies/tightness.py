@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
+from math import ceil, exp, log, log2
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +32,10 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, GaitSupervisor, predict
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.studies.output import markdown_table
 from dmp_cpg_ros.suite import load_gait
 
 COUPLING = {'all_to_all': 100.0, 'ring': 100.0, 'path': 200.0, 'star': 100.0,
@@ -93,15 +96,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     print(f'rho = {RHO:g} 1/s, r = 1, omega = {OMEGA:g} rad/s, r0 = {REGION:g} where not said '
           'otherwise\n')
-    print('| condition | graph | quantity | certified | works | ratio |')
-    print('|---|---|---|---|---|---|')
-    seen: dict[str, list[float]] = {}
-    for row in rows(options.graphs):
-        print(f'| {row.condition} | {row.graph} | {row.quantity} | {row.certified:.4g} | '
-              f'{row.works:.4g} | {row.ratio:.2f} |', flush=True)
-        seen.setdefault(row.condition, []).append(row.ratio)
-    print()
-    for condition, ratios in seen.items():
+    found = list(rows(options.graphs))
+    print(markdown_table(('condition', 'graph', 'quantity', 'certified', 'works', 'ratio'), [
+        (row.condition, row.graph, row.quantity, f'{row.certified:.4g}', f'{row.works:.4g}',
+         f'{row.ratio:.2f}') for row in found]), end='\n\n')
+    for condition in dict.fromkeys(row.condition for row in found):
+        ratios = [row.ratio for row in found if row.condition == condition]
         print(f'- {condition} ({min(ratios):.2f} to {max(ratios):.2f}): {REASONS[condition]}')
     return 0
 
@@ -149,10 +149,8 @@ def threshold(works: Callable[[float], bool], failing: float, working: float,
         if not works(failing):
             break
         failing /= factor
-    while abs(np.log(working / failing)) > precision:
-        middle = float(np.sqrt(working * failing))
-        failing, working = (failing, middle) if works(middle) else (middle, working)
-    return working
+    rounds = ceil(log2(max(abs(log(working / failing)) / precision, 1.0)))
+    return exp(last_that_holds(lambda u: works(exp(u)), log(working), log(failing), rounds))
 
 
 def _walked(system: CanonicalSystem, x: Array, omega: float | Array, steps: int,

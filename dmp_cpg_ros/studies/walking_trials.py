@@ -8,7 +8,7 @@ equal outcomes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -44,6 +44,9 @@ heading are averaged: over half a metre the sway of single steps would be taken 
 
 RECOVERY = 3.0
 """Time for which the robot must stay on its feet after a push [s]."""
+
+PUSH_RESOLUTION, LARGEST_PUSH = 0.1, 3.2
+"""Of the speed change by a push that is looked for [m/s]."""
 
 FINISH, CROSSING_TIME = 5.0, 30.0
 """Distance to cross on rough ground [m], and the time after which a trial ends [s]."""
@@ -172,11 +175,13 @@ def relative_error(outcome: SteadyOutcome, velocity: Velocity) -> float:
     return abs(along - speed) / speed
 
 
-@dataclass(frozen=True)
-class PushCase:
-    """Pushes of a walking robot at one phase.
+def survived_pushes(gait: str, speed: float, phase: float, directions: Sequence[float],
+                    robot: str | None = None) -> tuple[float, ...]:
+    """Look for the largest speed change Δv = J/m that is survived, per direction, by bisection.
 
-    Attributes
+    Every impulse below it that the bisection tried was survived too.
+
+    Parameters
     ----------
     gait : str
         Name of the gait.
@@ -184,44 +189,21 @@ class PushCase:
         Commanded forward speed [m/s].
     phase : float
         Fraction of a cycle at which the push begins.
-    directions : tuple of float
+    directions : sequence of float
         Directions of the pushes in the base frame [rad].
-    resolution, largest : float
-        Of the speed change that is looked for [m/s].
+    robot : str, optional
+        Robot file; the suite's own without.
+
+    Returns
+    -------
+    tuple of float
+        [m/s]; NaN where the robot fell before any push.
     """
-
-    gait: str
-    speed: float
-    phase: float
-    directions: tuple[float, ...]
-    resolution: float = 0.1
-    largest: float = 3.2
-
-
-@dataclass(frozen=True)
-class PushOutcome:
-    """Largest speed change Δv = J/m that is survived in each of the directions [m/s]."""
-
-    speed_change: tuple[float, ...]
-
-
-def survived_pushes(case: PushCase, robot: str | None = None) -> PushOutcome:
-    """Look for the largest speed change that is survived, per direction, by bisection.
-
-    Every impulse below it that the bisection tried was survived too; NaN where the robot fell
-    before any push.
-    """
-    run = Walk(case.gait, robot)
-    upright = run.settle((case.speed, 0.0, 0.0)) and run.walk(case.phase * run.period())
-    return PushOutcome(tuple(
-        _largest(run, angle, case) if upright else nan for angle in case.directions))
-
-
-def _largest(run: Walk, angle: float, case: PushCase) -> float:
-    if survives(run, angle, case.largest):
-        return case.largest
-    halvings = ceil(log2(case.largest / case.resolution) - 1e-9)
-    return last_that_holds(partial(survives, run, angle), 0.0, case.largest, max(0, halvings))
+    run, halvings = Walk(gait, robot), ceil(log2(LARGEST_PUSH / PUSH_RESOLUTION) - 1e-9)
+    if not (run.settle((speed, 0.0, 0.0)) and run.walk(phase * run.period())):
+        return (nan,) * len(directions)
+    return tuple(LARGEST_PUSH if survives(run, angle, LARGEST_PUSH) else last_that_holds(
+        partial(survives, run, angle), 0.0, LARGEST_PUSH, halvings) for angle in directions)
 
 
 def survives(run: Walk, angle: float, speed_change: float) -> bool:
@@ -233,34 +215,6 @@ def survives(run: Walk, angle: float, speed_change: float) -> bool:
     impulse = after.robot.description.mass * speed_change
     after.push(np.array((impulse * cos(yaw), impulse * sin(yaw), 0.0)))
     return after.walk(RECOVERY)
-
-
-@dataclass(frozen=True)
-class CrossingCase:
-    """One crossing of rough ground.
-
-    Attributes
-    ----------
-    gait : str
-        Name of the gait.
-    kind : str
-        World by name.
-    numbers : tuple of (str, float)
-        The world's parameters.
-    seed : int
-        Seed of the start, the speed and, where it has one, the world.
-    speed : float
-        Mean of the commanded speed [m/s]; each seed draws its own within a tenth of it.
-    values : tuple of (str, value)
-        Parameters that differ from the parameter file.
-    """
-
-    gait: str
-    kind: str
-    numbers: tuple[tuple[str, float], ...]
-    seed: int
-    speed: float = 0.5
-    values: Values = ()
 
 
 @dataclass(frozen=True)
@@ -276,13 +230,28 @@ class CrossingOutcome:
     tilt: float
 
 
-def cross(case: CrossingCase) -> CrossingOutcome:
-    """Walk straight ahead until ``FINISH``, a fall, or ``CROSSING_TIME``."""
-    numbers: dict[str, Any] = dict(case.numbers)
-    if case.kind == 'blocks':
-        numbers['seed'] = case.seed
-    run = Walk(case.gait, None, WORLDS[case.kind](**numbers), case.seed + 1, case.values)
-    run.loop.command(case.speed * float(np.random.default_rng(case.seed).uniform(0.9, 1.1)))
+def cross(gait: str, kind: str, numbers: Mapping[str, float], seed: int, speed: float = 0.5,
+          values: Values = ()) -> CrossingOutcome:
+    """Walk straight ahead until ``FINISH``, a fall, or ``CROSSING_TIME``.
+
+    Parameters
+    ----------
+    gait : str
+        Name of the gait.
+    kind : str
+        World by name.
+    numbers : mapping of str to float
+        The world's parameters.
+    seed : int
+        Seed of the start, the speed and, where it has one, the world.
+    speed : float
+        Mean of the commanded speed [m/s]; each seed draws its own within a tenth of it.
+    values : tuple of (str, value)
+        Parameters that differ from the parameter file.
+    """
+    drawn: dict[str, Any] = {'seed': seed} if kind == 'blocks' else {}
+    run = Walk(gait, None, WORLDS[kind](**numbers, **drawn), seed + 1, values)
+    run.loop.command(speed * float(np.random.default_rng(seed).uniform(0.9, 1.1)))
     begin, tilt, distance, time = run.state.time_ns, [], 0.0, 0.0
     while distance < FINISH and time < CROSSING_TIME:
         run.states.clear()
@@ -299,25 +268,6 @@ def cross(case: CrossingCase) -> CrossingOutcome:
 def _attitude(states: Sequence[RobotState]) -> Array:
     """Roll, pitch and yaw (n, 3) [rad]."""
     return roll_pitch_yaw(np.array([state.base_quaternion for state in states]))
-
-
-@dataclass(frozen=True)
-class ChangeCase:
-    """Changes from one gait to all others at one speed.
-
-    Attributes
-    ----------
-    before : str
-        Name of the gait that is walked.
-    speed : float
-        Commanded forward speed [m/s].
-    phases : int
-        Number of phases, evenly over a cycle, at which the change is asked for.
-    """
-
-    before: str
-    speed: float
-    phases: int
 
 
 @dataclass(frozen=True)
@@ -355,17 +305,17 @@ class ChangeOutcome:
     sway: float = nan
 
 
-def run_changes(case: ChangeCase) -> list[ChangeOutcome]:
-    """Walk once, and change to every other gait at every phase in copies of the walk."""
-    run = Walk(case.before)
-    upright = run.settle((case.speed, 0.0, 0.0))
-    step = run.period() / case.phases
-    outcomes = []
-    for k in range(case.phases):
-        for after in load_gaits():
-            if after != case.before:
-                fell = ChangeOutcome(after, k / case.phases, True)
-                outcomes.append(_changed(deepcopy(run), fell) if upright else fell)
+def run_changes(before: str, speed: float, phases: int) -> list[ChangeOutcome]:
+    """Walk at a speed [m/s] once, and change to every other gait at some phases, evenly over a
+    cycle, in copies of the walk.
+    """
+    run, outcomes = Walk(before), []
+    upright = run.settle((speed, 0.0, 0.0))
+    step = run.period() / phases
+    for k in range(phases):
+        for after in (name for name in load_gaits() if name != before):
+            fell = ChangeOutcome(after, k / phases, True)
+            outcomes.append(_changed(deepcopy(run), fell) if upright else fell)
         upright = run.walk(step)
     return outcomes
 

@@ -20,14 +20,7 @@ from dmp_cpg_ros.studies.output import markdown_table
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.studies.benchmark_walking import main, steady_cells
 from dmp_cpg_ros.studies.loop_recording import recording_of
-from dmp_cpg_ros.studies.walking_trials import (
-    CrossingCase,
-    SteadyOutcome,
-    Walk,
-    cross,
-    relative_error,
-    survives,
-)
+from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, Walk, cross, relative_error, survives
 
 
 def test_the_error_is_along_the_command() -> None:
@@ -87,18 +80,17 @@ def test_a_push_is_felt_and_a_blow_is_fatal() -> None:
 
 
 def test_a_crossing_ends_at_the_finish_or_on_the_ground() -> None:
-    flat = cross(CrossingCase('trot', 'flat', (), 0, speed=0.8))
+    flat = cross('trot', 'flat', {}, 0, speed=0.8)
     assert flat.crossed and not flat.fell
     assert flat.time == pytest.approx(5.0 / 0.8, rel=0.2)
-    wall = cross(CrossingCase('trot', 'steps', (('height', 0.5),), 0, speed=0.8))
+    wall = cross('trot', 'steps', {'height': 0.5}, 0, speed=0.8)
     assert not wall.crossed and wall.distance < 2.0
 
 
 def test_parameters_of_a_case_reach_the_walk() -> None:
-    case = CrossingCase('trot', 'flat', (), 0, values=(('contact_feedback', True),))
-    run = Walk(case.gait, values=case.values)
-    assert run.loop.parameters.canonical.contact_feedback
-    assert not Walk(case.gait).loop.parameters.canonical.contact_feedback
+    felt, usual = Walk('trot', values=(('contact_feedback', True),)), Walk('trot')
+    assert felt.loop.parameters.canonical.contact_feedback
+    assert not usual.loop.parameters.canonical.contact_feedback
 
 
 def test_tables_are_even() -> None:
