@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.learning import learning
-from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, Demonstrations, FitOptions
+from dmp_cpg_ros.core.learning.learning import Demonstrations, FitOptions
 from dmp_cpg_ros.core.learning.regression import Indices, Rows, Task
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.basis import Bases, GaussianBases
@@ -84,23 +84,16 @@ class DiscreteTask(Task):
         return np.mean(starts, axis=0), np.mean(velocities, axis=0)
 
 
-def learn_discrete(
-    demonstrations: Demonstrations, bases: int | None = 25, *,
-    stiffness: ArrayLike | None = None, damping: ArrayLike | None = None,
-    goals: Sequence[ArrayLike] | None = None, form: Form = 'scaled',
-    options: FitOptions | None = None,
-) -> DiscretePrimitive:
-    """Learn a discrete primitive.
-
-    Demonstrations may differ in start, goal and duration: the mean duration is the primitive's at
-    τ = 1, and each demonstration takes part with its own τ and goal.
+def task(
+    demonstrations: Demonstrations, stiffness: ArrayLike | None = None,
+    damping: ArrayLike | None = None, goals: Sequence[ArrayLike] | None = None,
+    form: Form = 'scaled', options: FitOptions | None = None) -> DiscreteTask:
+    """Regression of a discrete primitive.
 
     Parameters
     ----------
     demonstrations : Demonstration or iterable of Demonstration
         Velocities and accelerations are used when present.
-    bases : int, optional
-        Number of bases; None chooses it by the held-out error, see :func:`held_out_errors`.
     stiffness, damping : array_like (n,) or float, optional
         k [1/s²] and b [1/s]; critically damped gains that fit the duration without.
     goals : sequence of array_like (n,), optional
@@ -110,10 +103,6 @@ def learn_discrete(
     options : FitOptions, optional
         Method and regularisation.
 
-    Returns
-    -------
-    DiscretePrimitive
-
     Raises
     ------
     DataError
@@ -121,50 +110,59 @@ def learn_discrete(
     ParameterError
         If an argument is out of range.
     """
-    task = _task(demonstrations, stiffness, damping, goals, form, options)
-    made = task.chosen_bases(bases)
-    gaps = task.has_gaps(made)
-    if gaps and task.options.method != 'response':
-        raise DataError(f"method '{task.options.method}' knows no forces in gaps of the samples "
-                        "that several bases share; use the method 'response', or fewer bases")
-    rows = task.rows(made) if task.options.method == 'response' else []
-    weights = task.fit(made, rows)
-    start, velocity = task.initial(rows, weights)
-    primitive = DiscretePrimitive(
-        weights=weights, bases=made, phase_decay=task.decay, transformation=task.spring,
-        start=start, goal=np.mean(task.goals, axis=0), duration=task.duration,
-        start_velocity=velocity, names=task.demonstrations[0].names)
-    if task.options.method != 'response':
-        errors = reproduction_errors(primitive, task.demonstrations, task.goals)
-        learning.check_reproduction(errors, task.options)
-    if gaps:
-        learning.check_range(task.demonstrations,
-                    primitive.rollout(np.linspace(0.0, task.duration, 101)).positions)
-    return primitive
+    options = options or FitOptions()
+    movements = learning.prepared(demonstrations, options)
+    durations = [movement.duration for movement in movements]
+    spring = learning.chosen_gains(durations, stiffness, damping, movements[0].dofs, form)
+    ends = learning.targets_of(goals, [movement.positions[-1] for movement in movements], 'goal')
+    return DiscreteTask(movements, durations, ends, spring, options)
 
 
-def held_out_errors(demonstrations: Demonstrations,
-                    candidates: Sequence[int] = BASIS_CANDIDATES, **how: Any) -> dict[int, float]:
-    """Error on held-out samples for several numbers of bases.
+def learn_discrete(demonstrations: Demonstrations, bases: int | None = 25, **how: Any
+                   ) -> DiscretePrimitive:
+    """Learn a discrete primitive.
 
-    Whole demonstrations are held out in turn when there are at least two, else every fifth sample.
+    Demonstrations may differ in start, goal and duration: the mean duration is the primitive's at
+    τ = 1, and each demonstration takes part with its own τ and goal.
 
     Parameters
     ----------
-    demonstrations
-        As for :func:`learn_discrete`.
-    candidates : sequence of int
-        Numbers of bases.
+    demonstrations : Demonstration or iterable of Demonstration
+        What is learned from.
+    bases : int, optional
+        Number of bases; None chooses it by the held-out error.
     **how
-        ``stiffness``, ``damping``, ``goals``, ``form``, ``options`` as for :func:`learn_discrete`.
+        Gains, goals, reading of τ and options, as for :func:`task`.
 
     Returns
     -------
-    dict
-        Number of bases → root mean square error of the reproduced position over the held-out
-        samples, as a fraction of each degree of freedom's range.
+    DiscretePrimitive
+
+    Raises
+    ------
+    DataError, ParameterError
+        As :func:`task`.
     """
-    return _task(demonstrations, **how).held_out_errors(candidates)
+    fit = task(demonstrations, **how)
+    made, response = fit.chosen_bases(bases), fit.options.method == 'response'
+    gaps = fit.has_gaps(made)
+    if gaps and not response:
+        raise DataError(f"method '{fit.options.method}' knows no forces in gaps of the samples "
+                        "that several bases share; use the method 'response', or fewer bases")
+    rows = fit.rows(made) if response else []
+    weights = fit.fit(made, rows)
+    start, velocity = fit.initial(rows, weights)
+    primitive = DiscretePrimitive(
+        weights=weights, bases=made, phase_decay=fit.decay, transformation=fit.spring,
+        start=start, goal=np.mean(fit.goals, axis=0), duration=fit.duration,
+        start_velocity=velocity, names=fit.demonstrations[0].names)
+    if not response:
+        errors = reproduction_errors(primitive, fit.demonstrations, fit.goals)
+        learning.check_reproduction(errors, fit.options)
+    if gaps:
+        learning.check_range(fit.demonstrations,
+                             primitive.rollout(np.linspace(0.0, fit.duration, 101)).positions)
+    return primitive
 
 
 def reproduction_errors(primitive: DiscretePrimitive, demonstrations: Demonstrations,
@@ -192,16 +190,3 @@ def reproduction_errors(primitive: DiscretePrimitive, demonstrations: Demonstrat
         state = primitive.initial_state(movement.positions[0], None, goal, tau)
         made.append(primitive.rollout(movement.times, DiscreteInput(goal, tau), state).positions)
     return learning.largest_errors(movements, made)
-
-
-def _task(
-    demonstrations: Demonstrations, stiffness: ArrayLike | None = None,
-    damping: ArrayLike | None = None, goals: Sequence[ArrayLike] | None = None,
-    form: Form = 'scaled', options: FitOptions | None = None,
-) -> DiscreteTask:
-    options = options or FitOptions()
-    movements = learning.prepared(demonstrations, options)
-    durations = [movement.duration for movement in movements]
-    spring = learning.chosen_gains(durations, stiffness, damping, movements[0].dofs, form)
-    ends = learning.targets_of(goals, [movement.positions[-1] for movement in movements], 'goal')
-    return DiscreteTask(movements, durations, ends, spring, options)

@@ -112,34 +112,6 @@ CYCLE_SAMPLES = 200
 """Samples of one cycle where cycles are compared."""
 
 
-def mean_cycle(demonstration: Demonstration, period: float) -> Demonstration:
-    """Mean of a recording's whole cycles: the periodic movement in it.
-
-    What differs from cycle to cycle averages out; a rhythmic primitive can encode no more.
-
-    Parameters
-    ----------
-    demonstration : Demonstration
-        At least two cycles.
-    period : float
-        [s]
-
-    Returns
-    -------
-    Demonstration
-        The mean cycle, twice, and the first sample once more, from the recording's first time on.
-
-    Raises
-    ------
-    DataError
-        If there are fewer than two cycles.
-    """
-    cycle = _cycles(demonstration, period).mean(axis=1)
-    times = demonstration.times[0] + np.arange(2 * CYCLE_SAMPLES + 1) * (period / CYCLE_SAMPLES)
-    positions = np.concatenate([cycle, cycle, cycle[:, :1]], axis=1).T
-    return Demonstration(times, positions, names=demonstration.names)
-
-
 def spread_between_cycles(demonstration: Demonstration, period: float) -> Array:
     """Largest departure of a cycle from the mean cycle; no periodic movement comes much closer.
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.learning import learning
-from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, Demonstrations, FitOptions
+from dmp_cpg_ros.core.learning.learning import Demonstrations, FitOptions
 from dmp_cpg_ros.core.learning.period import find_period, fourier_series, phase_lead
 from dmp_cpg_ros.core.learning.regression import Task
 from dmp_cpg_ros.core.maths import Array
@@ -66,26 +66,17 @@ class RhythmicTask(Task):
         return forced, np.empty((*forced.shape[:2], 0))
 
 
-def learn_rhythmic(
-    demonstrations: Demonstrations, bases: int | None = 25, *,
-    period: float | Sequence[float] | None = None, leads: Sequence[float] | None = None,
-    centres: Sequence[ArrayLike] | None = None, stiffness: ArrayLike | None = None,
-    damping: ArrayLike | None = None, rho: float | None = None, form: Form = 'scaled',
-    options: FitOptions | None = None,
-) -> RhythmicPrimitive:
-    """Learn a rhythmic primitive.
-
-    Demonstrations are taken as steady rhythms; they may differ in centre, period and phase. Phase
-    0 is the first sample of the first one; the others are shifted to agree with it. The mean
-    period is the primitive's at τ = 1.
+def task(
+    demonstrations: Demonstrations, period: float | Sequence[float] | None = None,
+    leads: Sequence[float] | None = None, centres: Sequence[ArrayLike] | None = None,
+    stiffness: ArrayLike | None = None, damping: ArrayLike | None = None, form: Form = 'scaled',
+    options: FitOptions | None = None) -> RhythmicTask:
+    """Regression of a rhythmic primitive.
 
     Parameters
     ----------
     demonstrations : Demonstration or iterable of Demonstration
         Velocities and accelerations are used when present.
-    bases : int, optional
-        Number of bases, with two weights each per degree of freedom; None chooses it by the
-        held-out error.
     period : float or sequence of float, optional
         Period of all or of each demonstration [s]; found from the data without.
     leads : sequence of float, optional
@@ -95,16 +86,10 @@ def learn_rhythmic(
         Centre of each demonstration; the mean of its cycle without.
     stiffness, damping : array_like (n,) or float, optional
         k [1/s²] and b [1/s]; critically damped gains that fit the period without.
-    rho : float, optional
-        Attraction of the oscillator [1/s]; its angular frequency without.
     form : {'scaled', 'printed'}
         Reading of τ; it matters when the periods differ.
     options : FitOptions, optional
         Method and regularisation.
-
-    Returns
-    -------
-    RhythmicPrimitive
 
     Raises
     ------
@@ -113,42 +98,67 @@ def learn_rhythmic(
     ParameterError
         If an argument is out of range.
     """
-    task = _task(demonstrations, period, leads, centres, stiffness, damping, form, options)
-    movements, made = task.demonstrations, task.chosen_bases(bases)
-    weights = task.fit(made, task.rows(made) if task.options.method == 'response' else [])
-    primitive = RhythmicPrimitive(
-        weights=np.ascontiguousarray(weights.reshape(made.count, 2, -1).transpose(0, 2, 1)),
-        bases=made, omega=task.omega, rho=task.omega if rho is None else rho,
-        transformation=task.spring, centre=np.mean(task.goals, axis=0), names=movements[0].names)
-    if task.options.method != 'response':
-        cycles = [primitive.on_cycle(task.phases(i), task.taus[i])[0] + task.goals[i]
-                  for i in range(len(movements))]
-        learning.check_reproduction(learning.largest_errors(movements, cycles), task.options)
-    learning.check_range(movements, primitive.on_cycle(np.linspace(0.0, 2.0 * np.pi, 200))[0])
-    return primitive
+    options = options or FitOptions()
+    movements = learning.prepared(demonstrations, options)
+    if period is None:
+        periods = [find_period(movement) for movement in movements]
+    else:
+        periods = columns(period, len(movements), 'period').tolist()
+        if min(periods) <= 0.0:
+            raise ParameterError(f'period = {period!r} s must be positive')
+    series = [_series(m, p) for m, p in zip(movements, periods, strict=True)]
+    if leads is None:
+        first, *others = (coefficients / learning.ranges(movements) for coefficients in series)
+        leads = [0.0, *(phase_lead(first, other) for other in others)]
+    spring = learning.chosen_gains(periods, stiffness, damping, movements[0].dofs, form)
+    middles = learning.targets_of(centres, [c[0].real for c in series], 'centre')
+    phases = vector(leads, len(movements), 'leads').tolist()
+    return RhythmicTask(movements, periods, middles, spring, options, phases)
 
 
-def held_out_errors(demonstrations: Demonstrations,
-                    candidates: Sequence[int] = BASIS_CANDIDATES, **how: Any) -> dict[int, float]:
-    """Error on held-out samples for several numbers of bases.
+def learn_rhythmic(demonstrations: Demonstrations, bases: int | None = 25, *,
+                   rho: float | None = None, **how: Any) -> RhythmicPrimitive:
+    """Learn a rhythmic primitive.
+
+    Demonstrations are taken as steady rhythms; they may differ in centre, period and phase. Phase
+    0 is the first sample of the first one; the others are shifted to agree with it. The mean
+    period is the primitive's at τ = 1.
 
     Parameters
     ----------
-    demonstrations
-        As for :func:`learn_rhythmic`.
-    candidates : sequence of int
-        Numbers of bases.
+    demonstrations : Demonstration or iterable of Demonstration
+        What is learned from.
+    bases : int, optional
+        Number of bases, with two weights each per degree of freedom; None chooses it by the
+        held-out error.
+    rho : float, optional
+        Attraction of the oscillator [1/s]; its angular frequency without.
     **how
-        ``period``, ``leads``, ``centres``, ``stiffness``, ``damping``, ``form``, ``options`` as
-        for :func:`learn_rhythmic`.
+        Periods, phases, centres, gains, reading of τ and options, as for :func:`task`.
 
     Returns
     -------
-    dict
-        Number of bases → root mean square error of the steady movement over the held-out samples,
-        as a fraction of each degree of freedom's range.
+    RhythmicPrimitive
+
+    Raises
+    ------
+    DataError, ParameterError
+        As :func:`task`.
     """
-    return _task(demonstrations, **how).held_out_errors(candidates)
+    fit = task(demonstrations, **how)
+    movements, made = fit.demonstrations, fit.chosen_bases(bases)
+    response = fit.options.method == 'response'
+    weights = fit.fit(made, fit.rows(made) if response else [])
+    primitive = RhythmicPrimitive(
+        weights=np.ascontiguousarray(weights.reshape(made.count, 2, -1).transpose(0, 2, 1)),
+        bases=made, omega=fit.omega, rho=fit.omega if rho is None else rho,
+        transformation=fit.spring, centre=np.mean(fit.goals, axis=0), names=movements[0].names)
+    if not response:
+        cycles = [primitive.on_cycle(fit.phases(i), fit.taus[i])[0] + fit.goals[i]
+                  for i in range(len(movements))]
+        learning.check_reproduction(learning.largest_errors(movements, cycles), fit.options)
+    learning.check_range(movements, primitive.on_cycle(np.linspace(0.0, 2.0 * np.pi, 200))[0])
+    return primitive
 
 
 def place(primitive: RhythmicPrimitive, demonstration: Demonstration, period: float | None = None
@@ -206,27 +216,3 @@ def _series(demonstration: Demonstration, period: float) -> Array:
     """Fourier series over the time since the first sample."""
     times = demonstration.times - demonstration.times[0]
     return fourier_series(times, demonstration.positions, 2.0 * np.pi / period, _SERIES)
-
-
-def _task(
-    demonstrations: Demonstrations, period: float | Sequence[float] | None = None,
-    leads: Sequence[float] | None = None, centres: Sequence[ArrayLike] | None = None,
-    stiffness: ArrayLike | None = None, damping: ArrayLike | None = None, form: Form = 'scaled',
-    options: FitOptions | None = None,
-) -> RhythmicTask:
-    options = options or FitOptions()
-    movements = learning.prepared(demonstrations, options)
-    if period is None:
-        periods = [find_period(movement) for movement in movements]
-    else:
-        periods = columns(period, len(movements), 'period').tolist()
-        if min(periods) <= 0.0:
-            raise ParameterError(f'period = {period!r} s must be positive')
-    series = [_series(m, p) for m, p in zip(movements, periods, strict=True)]
-    if leads is None:
-        first, *others = (coefficients / learning.ranges(movements) for coefficients in series)
-        leads = [0.0, *(phase_lead(first, other) for other in others)]
-    spring = learning.chosen_gains(periods, stiffness, damping, movements[0].dofs, form)
-    middles = learning.targets_of(centres, [c[0].real for c in series], 'centre')
-    phases = vector(leads, len(movements), 'leads').tolist()
-    return RhythmicTask(movements, periods, middles, spring, options, phases)

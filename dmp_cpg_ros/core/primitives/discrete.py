@@ -149,7 +149,7 @@ class DiscretePrimitive(Primitive):
         ParameterError
             If τ or dt is not positive or the goal does not fit.
         """
-        grid = self._scaling.grid(state.tau, command.tau, dt, 3, self.form)
+        grid = self._grid(state, command, dt, 3)
         x = state.x * np.exp(-self.phase_decay * grid.scaled)  # (3,)
         position, velocity, goal = self._transformed(state, command, x, grid)
         return DiscreteState(position, velocity, float(x[-1]), goal, float(grid.tau[-1]))

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
 from math import ceil
 from typing import Any, ClassVar
 
@@ -93,13 +92,8 @@ class Primitive(ABC):
         """Reading of τ."""
         return self.transformation.form
 
-    @cached_property
-    def _scaling(self) -> TimeScaling:
-        return TimeScaling(self.tau_rate)
-
-    @cached_property
-    def _target_filter(self) -> FirstOrderFilter:
-        return FirstOrderFilter(getattr(self, f'{self.TARGET}_rate'))
+    def _grid(self, state: Any, command: Any, dt: float, nodes: int) -> StepGrid:
+        return TimeScaling(self.tau_rate).grid(state.tau, command.tau, dt, nodes, self.form)
 
     @abstractmethod
     def forcing(self, x: ArrayLike) -> Array:
@@ -121,7 +115,8 @@ class Primitive(ABC):
                      ) -> tuple[Array, Array, Array]:
         """Position, velocity and filtered target at the end of a step with three nodes."""
         wanted = vector(getattr(command, self.TARGET), self.dofs, self.TARGET)
-        targets = self._target_filter.at(getattr(state, self.TARGET), wanted, grid.elapsed)
+        targets = FirstOrderFilter(getattr(self, f'{self.TARGET}_rate')).at(
+            getattr(state, self.TARGET), wanted, grid.elapsed)
         position, velocity = self.transformation.step(
             state.position, state.velocity, targets, self.forcing(x), grid)
         return position, velocity, targets[-1]

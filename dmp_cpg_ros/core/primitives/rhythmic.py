@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -109,10 +108,6 @@ class RhythmicPrimitive(Primitive):
             centre=np.concatenate([part.centre for part in parts]), names=names,
             transformation=SpringDamper(k, b, parts[0].form))
 
-    @cached_property
-    def _amplitude_filter(self) -> FirstOrderFilter:
-        return FirstOrderFilter(self.amplitude_rate)
-
     @property
     def period(self) -> float:
         """Period at τ = 1 [s]."""
@@ -209,8 +204,9 @@ class RhythmicPrimitive(Primitive):
             If amplitude, τ or dt is not positive or the centre does not fit.
         """
         check_positive(amplitude=command.amplitude, tau=command.tau)
-        grid = self._scaling.grid(state.tau, command.tau, dt, 5, self.form)
-        radii = self._amplitude_filter.at(state.amplitude, command.amplitude, grid.elapsed)
+        grid = self._grid(state, command, dt, 5)
+        radii = FirstOrderFilter(self.amplitude_rate).at(
+            state.amplitude, command.amplitude, grid.elapsed)
         x = hopf_flow(state.x, self.omega, self.rho, radii, grid)
         return self._moved(state, command, x, float(radii[-1]), grid)
 
@@ -233,7 +229,7 @@ class RhythmicPrimitive(Primitive):
         -------
         RhythmicState
         """
-        grid = self._scaling.grid(state.tau, command.tau, dt, 5, self.form)
+        grid = self._grid(state, command, dt, 5)
         return self._moved(state, command, x, float(np.hypot(*x[-1])), grid)
 
     def _moved(self, state: RhythmicState, command: RhythmicInput, x: Array, amplitude: float,

@@ -8,7 +8,6 @@ a closed form, so a change of speed costs no accuracy and makes no velocity jump
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,8 +19,6 @@ from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 
 Form = Literal['scaled', 'printed']
-
-_GAUSS_NODES, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,51 +123,13 @@ class TimeScaling(FirstOrderFilter):
         if tau == command:
             elapsed, taus = fraction * dt, np.full(count, tau)
             scaled = elapsed / tau
-        else:
-            if form == 'scaled':
-                scaled = fraction * float(self.scaled_time(tau, command, dt))
-                elapsed = self.real_time(tau, command, scaled)
-            else:
-                elapsed = fraction * dt
-                scaled = self.scaled_time(tau, command, elapsed)
+        elif form == 'scaled':
+            scaled = fraction * float(self.scaled_time(tau, command, dt))
+            elapsed = self.real_time(tau, command, scaled)
             taus = self.at(tau, command, elapsed)
+        else:
+            elapsed = fraction * dt
+            scaled, taus = (of(tau, command, elapsed) for of in (self.scaled_time, self.at))
         if form == 'scaled':
             return StepGrid(elapsed, scaled, taus, float(scaled[-1]), np.ones(count))
         return StepGrid(elapsed, scaled, taus, dt, 1.0 / taus)
-
-
-def scaled_times(times: ArrayLike, tau: Callable[[float], float]) -> Array:
-    """Scaled time along a given profile τ(t), by 5-point Gauss quadrature between the samples.
-
-    A primitive in scaled form follows the same path for every τ(t): its position at time t is the
-    position of the unscaled one at ``scaled_times(...)``, its velocity is divided by τ(t).
-
-    Parameters
-    ----------
-    times : array_like (m,)
-        Increasing sample times [s].
-    tau : callable
-        τ(t) > 0 for a time [s].
-
-    Returns
-    -------
-    ndarray (m,)
-        s at the sample times, 0 at the first [s]; the error falls with the 10th power of the
-        spacing.
-
-    Raises
-    ------
-    ParameterError
-        If times do not increase or τ is not positive somewhere.
-    """
-    times = np.asarray(times, dtype=float)
-    steps = np.diff(times)
-    if times.ndim != 1 or not np.all(steps > 0.0):
-        raise ParameterError('times must be one increasing sequence')
-    middles = 0.5 * (times[1:] + times[:-1])
-    nodes = middles[:, None] + 0.5 * steps[:, None] * _GAUSS_NODES  # (m - 1, 5)
-    values = np.array([tau(float(t)) for t in nodes.ravel()], dtype=float).reshape(nodes.shape)
-    if not np.all(np.isfinite(values)) or not np.all(values > 0.0):
-        raise ParameterError('tau(t) must be positive and finite at all times')
-    pieces = 0.5 * steps * ((1.0 / values) @ _GAUSS_WEIGHTS)
-    return np.concatenate([[0.0], np.cumsum(pieces)])

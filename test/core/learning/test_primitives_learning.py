@@ -250,14 +250,14 @@ def test_held_out_error_sees_what_the_fit_does_not():
         Demonstration(clean.times, clean.positions + rng.normal(0.0, 0.05, clean.positions.shape))
         for _ in range(2)
     ]
-    errors = learning_discrete.held_out_errors(noisy, (5, 10, 40), goals=[[1.0], [1.0]])
+    errors = learning_discrete.task(noisy, goals=[[1.0], [1.0]]).held_out_errors((5, 10, 40))
     assert errors[40] > errors[5]
     chosen = learn_discrete(noisy, None, goals=[[1.0], [1.0]])
     assert chosen.bases.count < 14
 
 
 def test_rhythmic_bases_are_chosen_too():
-    errors = learning_rhythmic.held_out_errors(walking_joints(noise=0.01), (5, 43))
+    errors = learning_rhythmic.task(walking_joints(noise=0.01)).held_out_errors((5, 43))
     assert errors[43] > errors[5]
     assert learn_rhythmic(walking_joints(noise=0.01), None).bases.count < 14
 

@@ -14,7 +14,6 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.learning.period import (
     find_period,
     fourier_series,
-    mean_cycle,
     phase_lead,
     spread_between_cycles,
 )
@@ -139,15 +138,3 @@ def test_spread_is_that_of_the_cycles_and_nothing_of_their_shape():
     np.testing.assert_allclose(spread, [0.0, 0.2], atol=1e-3)
     with pytest.raises(DataError, match='fewer than two'):
         spread_between_cycles(Demonstration(times, both), 3.0)
-
-
-def test_the_mean_cycle_is_what_the_cycles_have_in_common():
-    times = np.linspace(1.0, 5.0, 4001)
-    sizes = np.array([0.0, 1.0, 1.2, 0.8, 1.0, 1.0])[(times // 1.0).astype(int)]
-    wave = sizes * np.sin(2.0 * np.pi * times)
-    mean = mean_cycle(Demonstration(times, wave, names=['a']), 1.0)
-    assert tuple(mean.names) == ('a',)
-    np.testing.assert_allclose(mean.times[[0, -1]], [1.0, 3.0], atol=1e-9)
-    np.testing.assert_allclose(mean.positions[:, 0], np.sin(2.0 * np.pi * mean.times), atol=1e-3)
-    with pytest.raises(DataError, match='fewer than two'):
-        mean_cycle(Demonstration(times, wave), 3.0)
