@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.primitives.basis import GaussianBases, VonMisesBases
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
-from dmp_cpg_ros.core.transformation.foot_motion import Motion
+from dmp_cpg_ros.core.transformation.foot_path import Motion
 from dmp_cpg_ros.core.transformation.learned_motion import LearnedMotion
 
 Primitive = DiscretePrimitive | RhythmicPrimitive

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from dmp_cpg_ros.analysis.metrics.stops import STILL_SPEED
+from dmp_cpg_ros.analysis.metrics.summary import STILL_SPEED
 
 SPEED_TOLERANCE = 0.10
 """Relative error of steady speed that is accepted."""

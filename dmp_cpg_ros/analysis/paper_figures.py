@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures 1 to 4 and 6 of the paper, with what they show simulated.
 
-Figures 5 and 7 are those of the report, in :mod:`~dmp_cpg_ros.analysis.figures.over_time`.
+Figures 5 and 7 are those of the report, in :mod:`~dmp_cpg_ros.analysis.figures.drawings`.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
 
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Array
-from dmp_cpg_ros.core.canonical.graph import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.system import graph_from_edges, topology
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.paper.network import EdgeCoupling, OscillatorNetwork
 from dmp_cpg_ros.paper.oscillators import HopfOscillators, VanDerPolOscillators

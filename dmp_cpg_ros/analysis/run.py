@@ -1,21 +1,143 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""From a bag to a run's folder: metrics, manifest, figures, pictures and report."""
+"""From a bag to a run's folder: metrics, manifest, figures, pictures and report.
+
+Pictures show the robot at telling moments. Who draws is handed in: this layer knows poses, the
+robot's layer knows how the robot looks.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib import image
+from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.episodes import MOVING, requested_stops, steady_segments
 from dmp_cpg_ros.analysis.figures.catalogue import write_figures
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
-from dmp_cpg_ros.analysis.pictures import Draw, write_pictures
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
+from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.analysis.report import render
 from dmp_cpg_ros.analysis.strict_json import plain, write_json
+from dmp_cpg_ros.core.robot_model.state import LEGS
+
+Draw = Callable[[Array, Array, Array], Sequence[NDArray[np.uint8]]]
+"""From base positions (n, 3), quaternions (n, 4), joint positions (n, 12) to pictures, or none."""
+
+NEAR_FOOT = LEGS.index('fr')
+"""Front foot on the side from which pictures are taken."""
+
+FEWEST_SAMPLES = 3
+"""Shorter losses of contact are no swings."""
+
+
+class Moment(NamedTuple):
+    """A time that is worth a picture.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, without ending.
+    caption : str
+        What it shows.
+    time : float
+        [s]
+    """
+
+    name: str
+    caption: str
+    time: float
+
+
+def moments(recording: Recording, context: RunContext) -> list[Moment]:
+    """Walking straight on with a foot in the air, at rest, turning; those that happened."""
+    reference, found = recording.reference, []
+    steady = [(*held(reference.time, reference.value, start)[[0, 2]], start, end)
+              for start, end in steady_segments(recording)]
+    straight = next((of for of in steady if abs(of[1]) < MOVING), None)
+    if straight:
+        time = _foot_in_the_air(recording, context, *straight[2:])
+        caption = f'Walking at {straight[0]:.2f} m/s (t = {time:.2f} s)'
+        found.append(Moment('walking', caption, time))
+    stop = next((stop for stop in requested_stops(recording)
+                 if stop.events[-1].message == 'at_rest'), None)
+    if stop:
+        time = 0.5 * (stop.events[-1].time + stop.end)
+        found.append(Moment('at_rest', f'At rest under inhibition (t = {time:.2f} s)', time))
+    fastest = max(steady, key=lambda of: abs(of[1]), default=None)
+    if fastest and abs(fastest[1]) >= MOVING:
+        time = _foot_in_the_air(recording, context, *fastest[2:])
+        caption = f'Turning at {fastest[1]:.2f} rad/s (t = {time:.2f} s)'
+        found.append(Moment('turning', caption, time))
+    return found
+
+
+def write_pictures(recording: Recording, context: RunContext, folder: Path, draw: Draw,
+                   ) -> dict[str, tuple[Path, str]]:
+    """Draw the moments of a run and write ``NAME.png``.
+
+    Parameters
+    ----------
+    recording : Recording
+        Needs joints and odometry.
+    context : RunContext
+        What is known besides.
+    folder : Path
+        Made when missing.
+    draw : callable
+        Draws poses; an empty answer means that nothing can be drawn here.
+
+    Returns
+    -------
+    dict of str to (Path, str)
+        File and caption by name; empty without pictures.
+    """
+    chosen = moments(recording, context)
+    if not (recording.joints.time.size and recording.odometry.time.size and chosen):
+        return {}
+    poses = [_pose(recording, moment.time, context.world.is_flat) for moment in chosen]
+    pictures = draw(*(np.array(part) for part in zip(*poses, strict=True)))
+    folder.mkdir(parents=True, exist_ok=True)
+    written = {}
+    for moment, picture in zip(chosen, pictures, strict=False):
+        path = folder / f'{moment.name}.png'
+        image.imsave(path, picture)
+        written[moment.name] = (path, moment.caption)
+    return written
+
+
+def _pose(recording: Recording, time: float, turn: bool) -> tuple[Array, Array, Array]:
+    """Pose at a time; on a flat floor turned to face along x, so that every picture is taken from
+    the same side.
+    """
+    odometry, joints = recording.odometry, recording.joints
+    row = min(int(np.searchsorted(odometry.time, time)), len(odometry.time) - 1)
+    position = odometry.position_in_world[row]
+    angles = held(joints.time, joints.position, time)
+    if not turn:
+        return position, odometry.quaternion[row], angles
+    quaternion = odometry.quaternion[row : row + 1]
+    yaw = float(roll_pitch_yaw(quaternion)[0, 2])
+    x, y, z, w = quaternion[0]
+    s, c = np.sin(-0.5 * yaw), np.cos(-0.5 * yaw)
+    turned = np.array([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
+    return position * np.array([0.0, 0.0, 1.0]), turned, angles
+
+
+def _foot_in_the_air(recording: Recording, context: RunContext, start: float, end: float) -> float:
+    """Middle of a swing of the near front foot, about the middle of an interval [s]."""
+    middle, feet = 0.5 * (start + end), recording.feet
+    inside = (feet.time >= start) & (feet.time <= end)
+    swings = stretches(inside & (feet.force[:, NEAR_FOOT] <= context.contact_force))
+    middles = [float(feet.time[(first + past) // 2]) for first, past in swings
+               if past - first > FEWEST_SAMPLES]
+    return min(middles, key=lambda time: abs(time - middle), default=middle)
 
 
 @dataclass(frozen=True)
@@ -61,7 +183,7 @@ def write_results(
     certificate : sequence, optional
         The inequalities, passed through.
     draw : callable, optional
-        Draws the robot (see :mod:`dmp_cpg_ros.analysis.pictures`); no pictures without.
+        Draws the robot (see :mod:`dmp_cpg_ros.analysis.run`); no pictures without.
     report : bool
         Whether to draw figures and write the report; the two JSON files are written in any case,
         and first.

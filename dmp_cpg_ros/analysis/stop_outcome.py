@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dmp_cpg_ros.analysis import motion
-from dmp_cpg_ros.analysis.metrics.stops import STILL_SPEED
+from dmp_cpg_ros.analysis.metrics.summary import STILL_SPEED
 from dmp_cpg_ros.analysis.recording import Recording, taken
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 

@@ -18,7 +18,7 @@ from typing import Any
 import yaml
 
 from dmp_cpg_ros.analysis.context import RunContext, find_parameter
-from dmp_cpg_ros.analysis.pictures import Draw
+from dmp_cpg_ros.analysis.run import Draw
 from dmp_cpg_ros.configuration import find_config, first_free
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError

@@ -19,15 +19,13 @@ from dmp_cpg_ros.core.certificates.changes import refused_change
 from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
 from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.estimation.estimate import estimated_state
-from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState, estimated_state
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE
-from dmp_cpg_ros.core.gait.choice import highest_speed
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits, quarter_weight
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.gait.running import RunningGait
+from dmp_cpg_ros.core.gait.running import RunningGait, highest_speed
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState, predict
 from dmp_cpg_ros.core.inhibition.voters import vote_sensors

@@ -14,10 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.graph import CouplingGraph, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem, CouplingGraph, topology
 from dmp_cpg_ros.core.certificates.step import cycle_radius_error, longest_step
 from dmp_cpg_ros.core.contraction.capture import capture_set, radius_tolerance
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
@@ -29,8 +28,15 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
 )
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.studies.adversary_runs import EVENTS, TICKS, Case, Certified, Network, Runs
-from dmp_cpg_ros.studies.network_batches import Setting
+from dmp_cpg_ros.studies.adversary_runs import (
+    EVENTS,
+    TICKS,
+    Case,
+    Certified,
+    Network,
+    Runs,
+    Setting,
+)
 
 WEAKENED = ('synchronisation', 'contraction', 'capture', 'time_step', 'cycle_radius',
             'region_per_tick', 'places', 'holding')

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from dmp_cpg_ros.analysis import paper_figures
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.figures import over_time, style
+from dmp_cpg_ros.analysis.figures import drawings, style
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.loop import WalkingLoop
@@ -62,7 +62,7 @@ def figures(suite: Suite) -> Iterator[tuple[str, Figure]]:
     context = RunContext(robot.description, suite.gait, suite.parameters.inhibition,
                          suite.parameters.canonical.radius)
     recording = experiment(suite, robot)
-    for draw in (over_time.target_kinematics, over_time.canonical_states):
+    for draw in (drawings.target_kinematics, drawings.canonical_states):
         figure = draw(recording, context)
         if figure is not None:
             yield draw.__name__, figure

@@ -20,7 +20,7 @@ from math import ceil, exp, log, log2
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical import graph as graphs
+from dmp_cpg_ros.core.canonical import system as graphs
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at

@@ -20,7 +20,6 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from synthetic_bag import STORE, WALL_PER_ROBOT, make, write_bag
 from synthetic_walk import SyntheticWalk
 
-from dmp_cpg_ros.analysis import rescue
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
@@ -224,7 +223,7 @@ def test_a_copy_that_cannot_lie_beside_its_bag_is_temporary(
             raise OSError(errno.EROFS, 'Read-only file system')
         return TemporaryDirectory(prefix=prefix)
 
-    monkeypatch.setattr(rescue, 'TemporaryDirectory', read_only)
+    monkeypatch.setattr('dmp_cpg_ros.analysis.bag.TemporaryDirectory', read_only)
     file = cut(written_file(walked, tmp_path / 'monday.mcap'))
     assert_same(load_recording(file), walked)
     assert list(tmp_path.iterdir()) == [file]

@@ -17,7 +17,7 @@ from dmp_cpg_ros.analysis.episodes import (
     planned_stance,
     steady_segments,
 )
-from dmp_cpg_ros.analysis.metrics.gait import gait_metrics, phase_errors
+from dmp_cpg_ros.analysis.metrics.summary import gait_metrics, phase_errors
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase

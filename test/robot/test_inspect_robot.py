@@ -15,8 +15,7 @@ from matplotlib import image
 from dmp_cpg_ros.commands.inspect_robot import main
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.robot.camera import Camera
-from dmp_cpg_ros.robot.inspector import inspect_model
-from dmp_cpg_ros.robot.model_reader import load_description
+from dmp_cpg_ros.robot.model_reader import inspect_model, load_description
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
 
 ROBOTS = ROOT / 'config' / 'robots'

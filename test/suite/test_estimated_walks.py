@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from core_examples import GAITS, TICK, suite_parameters
 
-from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimate
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.maths.rotations import roll_pitch_yaw
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters

@@ -14,7 +14,7 @@ from walked_feet import Walk
 
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
-from dmp_cpg_ros.core.transformation.foot_motion import HermiteMotion
+from dmp_cpg_ros.core.transformation.foot_path import HermiteMotion
 from dmp_cpg_ros.primitive_files import (
     load_motion,
     load_primitive,

@@ -6,11 +6,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.graph import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.studies.network_batches import Batch, Setting
+from dmp_cpg_ros.core.canonical.system import (
+    CanonicalSystem,
+    CouplingGraph,
+    graph_from_edges,
+    topology,
+)
+from dmp_cpg_ros.studies.adversary_runs import Batch, Setting
 
 __all__ = ['Batch', 'Setting', 'locked', 'random_graph', 'random_setting']
 

@@ -1,16 +1,195 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""All of ``metrics.json``."""
+"""All of ``metrics.json``, and its groups on gait, stops and starts, and timing.
+
+Whether the legs kept their places, and how long each foot stood; of every stop and start what was
+predicted, bounded and measured, and what the body did.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from dmp_cpg_ros.analysis import episodes
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.metrics import gait, robot, stops
-from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.episodes import Episode
+from dmp_cpg_ros.analysis.metrics import robot
+from dmp_cpg_ros.analysis.motion import held, mean_between
+from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent
+from dmp_cpg_ros.core.canonical.phase import phase, wrapped
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.suite_table import ROBOT
+
+STILL_SPEED = 0.01
+"""Speed below which the body stands still [m/s]."""
+
+REST_SETTLING = 0.5
+"""Time after the oscillators' rest from which on the body is expected to be still [s]."""
+
+
+def stop_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
+    """Group ``stop`` of ``metrics.json``: the slowest completed stop, and ``all``."""
+    return _summary([_stop(recording, context, stop)
+                     for stop in episodes.requested_stops(recording)])
+
+
+def start_metrics(recording: Recording) -> dict[str, Any]:
+    """Group ``start`` of ``metrics.json``: the slowest completed start, and ``all``."""
+    return _summary([_start(recording, start)
+                     for start in episodes.episodes(recording, episodes.STARTING)])
+
+
+def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
+    completed = [entry for entry in entries if entry['measured_s'] is not None]
+    slowest = max(completed, key=lambda entry: float(entry['measured_s']), default={})
+    return {
+        **{key: slowest.get(key) for key in ('predicted_s', 'bound_s', 'measured_s')},
+        'count': len(entries), 'completed': len(completed), 'all': entries}
+
+
+def _stop(recording: Recording, context: RunContext, episode: Episode) -> dict[str, Any]:
+    at_rest = next((event for event in episode.events if event.message == 'at_rest'), None)
+    entry = {**_times(episode, at_rest), 'distance_bound_m': _first(episode, 'bound_m')}
+    if at_rest is None:
+        return entry
+    end = episodes.stands_until(recording, at_rest.time, episode.end)
+    window = (min(at_rest.time + REST_SETTLING, end), end)
+    return {**entry, 'rest_s': at_rest.time, 'rest_until_s': end,
+            **_body_at_rest(recording, entry['request_s'], window),
+            **_feet_at_rest(recording, context, window)}
+
+
+def _start(recording: Recording, start: Episode) -> dict[str, Any]:
+    """Times of a start; one that another state than walking follows was interrupted."""
+    return _times(start, next((event for event in recording.inhibition if event.time == start.end
+                               and event.message in episodes.RUNNING), None))
+
+
+def _times(episode: Episode, done: StatusEvent | None) -> dict[str, Any]:
+    """Request, prediction, bound and measurement; the node's own numbers where it states them."""
+    first = episode.events[0]
+    stated = first.number('request_stamp')
+    # a stamp far from the event that bears it belongs to another request
+    request = stated if stated is not None and abs(stated - first.time) < 1.0 else first.time
+    measured = None if done is None else done.number('measured_s')
+    if done is not None and measured is None:
+        measured = done.time - request
+    return {'request_s': request, 'predicted_s': _first(episode, 'predicted_s'),
+            'bound_s': _first(episode, 'bound_s'), 'measured_s': measured}
+
+
+def _first(episode: Episode, key: str) -> float | None:
+    numbers = (event.number(key) for event in episode.events)
+    return next((number for number in numbers if number is not None), None)
+
+
+def _body_at_rest(
+        recording: Recording, request: float, window: tuple[float, float]) -> dict[str, Any]:
+    odometry = recording.odometry
+    since, rows = (episodes.within(odometry.time, [(start, window[1])])
+                   for start in (request, window[0]))
+    if not rows.any():
+        return {'body_speed_at_rest_m_s': None, 'body_still_after_s': None, 'displacement_m': None}
+    speed = np.linalg.norm(odometry.velocity_in_base, axis=1)
+    moving = odometry.time[since & (speed >= STILL_SPEED)]
+    still_after = float(moving[-1]) - request if moving.size else 0.0
+    start, end = (odometry.position_in_world[rows_of][0, :2] for rows_of in (since, rows))
+    return {
+        'body_speed_at_rest_m_s': float(speed[rows].max()),
+        'body_still_after_s': still_after if speed[rows][-1] < STILL_SPEED else None,
+        'displacement_m': float(np.hypot(*(end - start)))}
+
+
+def _feet_at_rest(
+        recording: Recording, context: RunContext, window: tuple[float, float]) -> dict[str, Any]:
+    force = recording.feet.force[episodes.within(recording.feet.time, [window])]
+    least = float(force.min()) if force.size else None
+    return {'feet_down_at_rest': None if least is None else bool(least > context.contact_force),
+            'least_foot_force_n': least}
+
+
+def gait_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
+    """Group ``gait`` of ``metrics.json``.
+
+    Returns
+    -------
+    dict
+        ``name`` of the gait at the start, ``names`` of all in order and their ``changes``;
+        ``phase_error_rad_max``, the largest deviation of a leg from its place in the gait while
+        walking freely and settled; ``duty_factor``, the measured share of the cycle on the ground,
+        mean of the legs, with ``duty_factor_of_leg`` and the planned ``duty_factor_planned``;
+        ``period_s``, the median gait cycle.
+    """
+    time, errors = phase_errors(recording, context)
+    settled = np.abs(errors[settled_rows(recording, time)])
+    duty = duty_factors(recording, context)
+    changes = [{'start_s': start, 'end_s': end}
+               for start, end in episodes.changing_intervals(recording)]
+    return {
+        'name': None if context.gait is None else context.gait.name,
+        'names': episodes.gaits_walked(recording) or None, 'changes': changes or None,
+        'phase_error_rad_max': float(settled.max()) if settled.size else None,
+        'duty_factor': None if duty is None else float(duty.mean()),
+        'duty_factor_of_leg':
+            None if duty is None else dict(zip(LEGS, duty.tolist(), strict=True)),
+        'duty_factor_planned': planned_duty_factor(recording, context),
+        'period_s': episodes.gait_period(recording)}
+
+
+def phase_errors(recording: Recording, context: RunContext) -> tuple[Array, Array]:
+    """Deviation of each leg's phase from its place, relative to the circular mean of the four.
+
+    Returns
+    -------
+    time : ndarray (n,)
+        [s]
+    error : ndarray (n, 4)
+        [rad]; from the places in the gait in force, which move while gaits change. Where the gait
+        is not known its offsets are the circular means of the settled walk.
+    """
+    time, phi = recording.canonical.time, phase(recording.canonical.x)
+    offsets = episodes.phase_offsets(recording, context)
+    if offsets is None:
+        relative = (phi - phi[:, :1])[settled_rows(recording, time)]
+        offsets = np.arctan2(np.sin(relative).sum(axis=0), np.cos(relative).sum(axis=0))
+    places = phi - offsets
+    common = np.arctan2(np.sin(places).sum(axis=1), np.cos(places).sum(axis=1))
+    return time, wrapped(places - common[:, None])
+
+
+def settled_rows(recording: Recording, time: Array) -> NDArray[np.bool_]:
+    """Which times lie in settled, moving walking, boolean ndarray (n,)."""
+    inside = episodes.within(time, [(start + episodes.SETTLING, end) for start, end
+                                    in episodes.running_intervals(recording)])
+    if recording.reference.time.size and time.size:
+        value = held(recording.reference.time, recording.reference.value, time)
+        inside &= (np.abs(value) > episodes.MOVING).any(axis=1)
+    return inside
+
+
+def duty_factors(recording: Recording, context: RunContext) -> Array | None:
+    """Measured share of time on the ground over whole cycles of steady walking, ndarray (4,)."""
+    segments, feet = episodes.steady_segments(recording), recording.feet
+    if not segments or not feet.time.size:
+        return None
+    contact = (feet.force > context.contact_force).astype(float)
+    shares = [mean_between(feet.time, contact, start, end) for start, end in segments]
+    return np.average(shares, axis=0, weights=np.diff(segments)[:, 0])
+
+
+def planned_duty_factor(recording: Recording, context: RunContext) -> float | None:
+    """Duty factor that the gait plans, averaged over the same stretches."""
+    segments, time = episodes.steady_segments(recording), recording.canonical.time
+    _, duty = episodes.planned_stance(recording, context)
+    if not duty.size or not segments:
+        return None
+    planned = [duty[(time >= start) & (time <= end)].mean() for start, end in segments]
+    return float(np.average(planned, weights=np.diff(segments)[:, 0]))
+
 
 TIMING = ('rate_hz', 'real_time_factor', 'latency_ms_p50', 'latency_ms_p99', 'deadline_misses')
 
@@ -39,8 +218,8 @@ def compute_metrics(
         'robot': robot.robot_metrics(recording, context),
         'tracking': robot.tracking_metrics(recording),
         'estimation': robot.estimation_metrics(recording, context),
-        'gait': gait.gait_metrics(recording, context),
-        'stop': stops.stop_metrics(recording, context), 'start': stops.start_metrics(recording),
+        'gait': gait_metrics(recording, context),
+        'stop': stop_metrics(recording, context), 'start': start_metrics(recording),
         'timing': timing_metrics(recording),
         'recording': {'undecodable_messages': sum(recording.undecodable.values())},
         'certificate': None if certificate is None else list(certificate)}

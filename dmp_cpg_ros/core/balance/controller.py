@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dmp_cpg_ros.core.balance import com_plan
+from dmp_cpg_ros.core.balance import virtual_model
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
@@ -225,7 +225,7 @@ class PostureController:
         activity = activities_step(memory.activity, rates, own_omegas, p.activity_rate, dt)
         swings = activity.tolist()
         positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
-        load = com_plan.contact_weights(positions, duty, swings, p.load_transfer)
+        load = virtual_model.contact_weights(positions, duty, swings, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
         velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))
         rate = vec3.times(R_ground_base, vec3.triple(state.base_rate_in_base.tolist()))
@@ -269,13 +269,14 @@ class PostureController:
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
 
     def _sway(self, positions: list[float], duty: float, omega: float, reference: Triple,
-              moving: float) -> com_plan.LateralPlan:
+              moving: float) -> virtual_model.LateralPlan:
         """Planned sway of the body; it fades with the legs' activity and with speed sideways."""
-        sway = com_plan.lateral_plan(positions, duty, omega, self._across, self.model.height)
-        if sway is com_plan.STRAIGHT:
-            return com_plan.STRAIGHT
-        share = moving * max(0.0, 1.0 - abs(reference[1]) / self.scale.speed(com_plan.SIDEWAYS))
-        return com_plan.LateralPlan(*(share * value for value in sway))
+        sway = virtual_model.lateral_plan(positions, duty, omega, self._across, self.model.height)
+        if sway is virtual_model.STRAIGHT:
+            return virtual_model.STRAIGHT
+        sideways = abs(reference[1]) / self.scale.speed(virtual_model.SIDEWAYS)
+        share = moving * max(0.0, 1.0 - sideways)
+        return virtual_model.LateralPlan(*(share * value for value in sway))
 
     def _torque(self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
                 load: list[float], r: Triple, bounce: Bounce, sway_acceleration: float) -> Array:

@@ -29,7 +29,7 @@ from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitiv
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, JointTargets
-from dmp_cpg_ros.core.transformation.foot_motion import Motion
+from dmp_cpg_ros.core.transformation.foot_path import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
 
 

@@ -57,7 +57,7 @@ class CommandGate:
         The robot's lengths, for the limits of the gait and of curves.
     highest_speed : float
         Dimensionless foot speed of the gait that is wanted, see
-        :func:`~dmp_cpg_ros.core.gait.choice.highest_speed`.
+        :func:`~dmp_cpg_ros.core.gait.running.highest_speed`.
     """
 
     def __init__(self, parameters: ReferenceParameters, scale: BodyScale | None = None,

@@ -12,18 +12,25 @@ When inhibition stops a phase inside the swing, the foot must come down; when th
 it must lift. The swing's height is therefore scaled by an amplitude (*activity*) that follows the
 phase speed (notes on the paper: for duty factors below 3/4 no phase has all four feet down),
 through a first-order filter as the paper uses for amplitudes (:func:`activity_step`).
+
+A :class:`Motion` says where the paths of the feet come from; this is the one place at which
+another source plugs in. A leg asks a :class:`FootMotion` for its foot at every tick and adds the
+feedback of the body (shifts, stumbling reflex) before inverse kinematics makes joint goals of it.
+The default is :class:`~dmp_cpg_ros.core.transformation.foot_path.FootPath`; learned primitives are
+in :mod:`~dmp_cpg_ros.core.transformation.learned_motion`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, exp, sin
-from typing import NamedTuple
+from math import cos, exp, pi, sin
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.vec3 import Triple
+from dmp_cpg_ros.core.maths.vec3 import Triple, moved
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 LIFTING, LOWERING = 0.35, 0.5
@@ -211,3 +218,53 @@ def _hermite(s: float, p0: float, p1: float, m0: float, m1: float) -> tuple[floa
     slope = (
         6.0 * (s2 - s) * (p0 - p1) + (3.0 * s2 - 4.0 * s + 1.0) * m0 + (3.0 * s2 - 2.0 * s) * m1)
     return value, slope
+
+
+class FootMotion(Protocol):
+    """Motion of one foot in the base."""
+
+    def step(self, state: Any, path: FootPath, cycle_position: float, rate: float,
+             dt: float) -> tuple[Any, Triple, Triple]:
+        """Advance to the time at which the inputs hold.
+
+        Parameters
+        ----------
+        state : object
+            What the source returned one tick before; None at the first.
+        path : FootPath
+            What the gait and the reference ask: velocity, frequency, duty factor, foothold, and
+            the height of the swing that acts now, which is 0 for a leg at rest.
+        cycle_position : float
+            0 at mid-swing, ±1/2 at mid-stance, in [−1/2, 1/2].
+        rate : float
+            Rate of the phase [rad/s].
+        dt : float
+            Time since the last tick [s]; 0 at the first.
+
+        Returns
+        -------
+        state : object
+        position_in_base, velocity_in_base : tuple of float
+            [m], [m/s]
+        """
+
+
+class Motion(Protocol):
+    """Motions of all feet of any robot."""
+
+    @property
+    def clearance(self) -> float:
+        """Height of the swing as a fraction of the standing height."""
+
+    def of_leg(self, leg: str, description: RobotDescription) -> FootMotion:
+        """Motion of one foot, scaled to a robot."""
+
+
+class HermiteMotion:
+    """The foot path itself."""
+
+    def step(self, state: None, path: FootPath, cycle_position: float, rate: float,
+             dt: float) -> tuple[None, Triple, Triple]:
+        """Foot on its path, as :meth:`FootMotion.step`."""
+        foot, slope = path.at(cycle_position)
+        return None, foot, moved((0.0, 0.0, 0.0), slope, rate / (2.0 * pi))

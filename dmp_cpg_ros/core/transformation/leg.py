@@ -25,14 +25,16 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.transformation import stumble as reflex
-from dmp_cpg_ros.core.transformation.foot_motion import FootMotion, HermiteMotion, Motion
 from dmp_cpg_ros.core.transformation.foot_path import (
+    FootMotion,
     FootPath,
+    HermiteMotion,
+    Motion,
     activity_step,
     rolling_share,
     swing_height,
 )
-from dmp_cpg_ros.core.transformation.foothold_offset import OffsetRates
+from dmp_cpg_ros.core.transformation.stumble import OffsetRates
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The stumbling reflex: a swinging foot that is held up by an obstacle is lifted over it.
+"""What moves the path of a foot: the stumbling reflex, and the foothold offset.
+
+A swinging foot that is held up by an obstacle is lifted over it.
 
 Cats lift a paw higher when its back touches something while it swings (Forssberg 1979); with
 oscillators as here it took robots over steps blind (Focchi et al. 2013; Ajallooeian et al. 2013).
@@ -18,15 +20,92 @@ by the next ones: for ``POST_STUMBLE_SWINGS`` swings the foot steps as high from
 A foot that comes down on something high stands still as well, above its target. It yields, too,
 and its path comes back to the height of the others over the stance, so that it does not throw the
 body up.
+
+The foothold offset is the shift s of a foot's path. In swing ṡ = h λ_p (s_wanted − s), with h the
+relative height of the foot: a foot that has not left the ground is not dragged along it.
+
+In stance ṡ = drift + λ_y (p_measured − p) horizontally, a spring that yields: the target p of a
+standing foot stays where the foot is. Vertically ṡ = −λ_l s, back to level.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import exp, hypot, pi
 from typing import NamedTuple
 
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.transformation.foot_path import LOWERING, FootPath
+
+
+@dataclass(frozen=True)
+class OffsetRates:
+    """Rates of the offset.
+
+    Attributes
+    ----------
+    placement : float
+        λ_p [1/s].
+    yielding : float
+        λ_y [1/s].
+    levelling : float
+        λ_l [1/s].
+    """
+
+    placement: float
+    yielding: float
+    levelling: float
+
+    def in_swing(self, shift: Triple, wanted: Triple, height: float, activity: float,
+                 dt: float) -> Triple:
+        """Rate of the shift of a swinging foot.
+
+        Parameters
+        ----------
+        shift, wanted : tuple of float
+            Present and wanted shift [m].
+        height : float
+            Height of the foot as a share of its largest, in [0, 1].
+        activity : float
+            Swing activity of the leg; a foot that comes down as the phase stops is left alone.
+        dt : float
+            Time step [s], positive.
+
+        Returns
+        -------
+        tuple of float
+            Mean over the step [m/s].
+        """
+        share = (1.0 - exp(-self.placement * activity * height * dt)) / dt
+        (x, y, z), (wanted_x, wanted_y, wanted_z) = shift, wanted
+        return (wanted_x - x) * share, (wanted_y - y) * share, (wanted_z - z) * share
+
+    def in_stance(self, shift: Triple, drift: tuple[float, float], away: tuple[float, float],
+                  activity: float, dt: float) -> Triple:
+        """Rate of the shift of a standing foot.
+
+        Parameters
+        ----------
+        shift : tuple of float
+            Present shift [m].
+        drift : tuple of float
+            Horizontal velocity by which the ground moves otherwise than planned [m/s].
+        away : tuple of float
+            Where the foot is horizontally relative to its target [m].
+        activity : float
+            Swing activity of the leg; at rest the foot holds.
+        dt : float
+            Time step [s], positive.
+
+        Returns
+        -------
+        tuple of float
+            Mean over the step [m/s].
+        """
+        share = activity * (1.0 - exp(-self.yielding * dt)) / dt
+        back = (1.0 - exp(-self.levelling * dt)) / dt
+        return drift[0] + share * away[0], drift[1] + share * away[1], -back * shift[2]
+
 
 FEELING = (0.3, 0.85)
 """Shares of the swing between which the foot feels what holds it up."""

@@ -27,10 +27,9 @@ from dmp_cpg_ros.core.certificates import gate
 from dmp_cpg_ros.core.certificates.certify import Certificate
 from dmp_cpg_ros.core.certificates.changes import refused_change
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait.running import RunningGait
+from dmp_cpg_ros.core.gait.running import GaitChoiceParameters, RunningGait, highest_speed
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale

@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.estimation.estimate import BodyEstimate
+from dmp_cpg_ros.core.estimation.estimator import BodyEstimate
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
 from dmp_cpg_ros.nodes.messages import cdr
 from dmp_cpg_ros.nodes.messages.joint_states import JointStateReader, JointStateWriter

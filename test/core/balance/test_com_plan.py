@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.balance.com_plan import STRAIGHT, lateral_plan
+from dmp_cpg_ros.core.balance.virtual_model import STRAIGHT, lateral_plan
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.studies.walking_trials import relative_error, steady
 from dmp_cpg_ros.suite import load_gaits

@@ -13,10 +13,9 @@ from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_sta
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
-from dmp_cpg_ros.core.gait.running import CADENCE_RATE, RunningGait
+from dmp_cpg_ros.core.gait.running import CADENCE_RATE, GaitChoiceParameters, RunningGait
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER, SuiteParameters

@@ -14,9 +14,9 @@ from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, chosen_gait
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, shares_of
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.running import GaitChoiceParameters, chosen_gait
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitTransition
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.maths.constants import GRAVITY

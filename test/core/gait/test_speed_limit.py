@@ -17,9 +17,8 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.choice import GaitChoiceParameters, highest_speed
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait, limited
-from dmp_cpg_ros.core.gait.running import HASTE
+from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, highest_speed
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
 from dmp_cpg_ros.core.gait.transition import GaitTransition
 from dmp_cpg_ros.core.maths.constants import GRAVITY
