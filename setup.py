@@ -78,11 +78,12 @@ def shared_files() -> list[tuple[str, list[str]]]:
 
 
 def package_data() -> list[str]:
-    """The type marker and every file below models/, relative to the package."""
+    """The type marker, the report's style and all below models/, relative to the package."""
     package = Path(NAME)
     models = sorted((package / 'models').rglob('*'))
-    return ['py.typed', *(str(path.relative_to(package)) for path in models
-                          if path.is_file() and path.suffix not in ('.py', '.pyc'))]
+    return ['py.typed', 'analysis/report.css', *(
+        str(path.relative_to(package)) for path in models
+        if path.is_file() and path.suffix not in ('.py', '.pyc'))]
 
 
 setup(

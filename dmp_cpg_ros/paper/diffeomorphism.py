@@ -15,7 +15,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +25,7 @@ from dmp_cpg_ros.core.canonical.phase import phase, state_at
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning.period import fourier_series
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
-from dmp_cpg_ros.paper.jacobians import Array, complex_step_jacobian, difference_jacobian
+from dmp_cpg_ros.paper.jacobians import Array, difference_jacobian, numerical_jacobian
 
 _SMALLEST_PIECE = 2.0**-20
 _GRID = 2.0 * np.pi * np.arange(513) / 512
@@ -65,31 +64,21 @@ class FunctionDiffeomorphism(Diffeomorphism):
         J: ndarray (n,) → ndarray (n, n). Without, T is differentiated numerically.
     inverse_function : callable, optional
         T⁻¹: ndarray (n,) → ndarray (n,). Without, it is found by Newton's method.
-    derivative : {'difference', 'complex'}
-        Numerical differentiation: five-point differences (relative error about 1e-11), or the
-        complex step (exact to rounding) for functions that are analytic and take complex numbers.
     """
 
     function: Callable[[Array], Array]
     jacobian_function: Callable[[Array], Array] | None = None
     inverse_function: Callable[[Array], Array] | None = None
-    derivative: Literal['difference', 'complex'] = 'difference'
-
-    def __post_init__(self) -> None:
-        if self.derivative not in ('difference', 'complex'):
-            raise ParameterError(
-                f"derivative must be 'difference' or 'complex', not {self.derivative!r}")
 
     def forward(self, y: Array) -> Array:
         """T(y)."""
         return np.asarray(self.function(np.asarray(y, dtype=float)), dtype=float)
 
     def jacobian(self, y: Array) -> Array:
-        """J(y), given or numerical."""
-        if self.jacobian_function is not None:
-            return np.asarray(self.jacobian_function(np.asarray(y, dtype=float)), dtype=float)
-        numerical = complex_step_jacobian if self.derivative == 'complex' else difference_jacobian
-        return numerical(self.function, y)
+        """J(y), given or by :func:`~dmp_cpg_ros.paper.jacobians.numerical_jacobian`."""
+        if self.jacobian_function is None:
+            return numerical_jacobian(self.function, y)
+        return np.asarray(self.jacobian_function(np.asarray(y, dtype=float)), dtype=float)
 
     def inverse(self, y_prime: Array, guess: Array | None = None) -> Array:
         """T⁻¹(y'), given or by Newton's method (:func:`newton_inverse`)."""

@@ -37,7 +37,7 @@ def complex_step_jacobian(field: Field, x: ArrayLike) -> Array:
     x = np.asarray(x, dtype=float)
     columns = [field(x + 1j * _COMPLEX_STEP * direction) for direction in np.eye(x.size)]
     if not all(map(np.iscomplexobj, columns)):
-        raise ParameterError("the function drops imaginary parts; use derivative = 'difference'")
+        raise ParameterError('the function drops imaginary parts; take differences')
     return np.stack(columns, axis=-1).imag / _COMPLEX_STEP
 
 

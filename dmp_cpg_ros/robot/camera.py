@@ -87,15 +87,6 @@ class Camera:
         self._data = mujoco.MjData(self.model)
         self._renderer, self.reason = _renderer(self.model, width, height)
 
-    def picture(self, base_position_in_world: ArrayLike, base_quaternion: ArrayLike,
-                joint_position: ArrayLike, **view: Any) -> Picture | None:
-        """Draw one pose as :meth:`drawn` does; None where pictures cannot be drawn (see
-        ``reason``).
-        """
-        if self._renderer is None:
-            return None
-        return self.drawn(base_position_in_world, base_quaternion, joint_position, **view)
-
     def drawn(self, base_position_in_world: ArrayLike, base_quaternion: ArrayLike,
               joint_position: ArrayLike, azimuth: float = AZIMUTH, elevation: float = ELEVATION,
               distance: float | None = None, mark: Mark | None = None,

@@ -16,6 +16,7 @@ from dmp_cpg_ros.robot.camera import Camera, open_viewer, pose_pictures
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco, usable_backend
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.robot.port import RobotError
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 HOME = home_joint_position(load_description())
@@ -35,7 +36,6 @@ from dmp_cpg_ros.robot.camera import Camera, pose_pictures
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 state = MujocoRobot().reset()
 with Camera() as camera:
-    assert camera.picture((0, 0, 0.28), (0, 0, 0, 1), state.joint_position) is None
     assert 'no pictures' in camera.reason
 assert pose_pictures(None, [(0, 0, 0.28)], [(0, 0, 0, 1)], [state.joint_position]) == []
 """
@@ -50,7 +50,7 @@ def camera():
 
 
 def test_a_picture_has_its_size_and_shows_the_robot_in_the_middle(camera):
-    picture = camera.picture((0, 0, 0.28), UPRIGHT, HOME)
+    picture = camera.drawn((0, 0, 0.28), UPRIGHT, HOME)
     assert picture.shape == (240, 320, 3) and picture.dtype == np.uint8
     orange = (picture[..., 0] > 150) & (picture[..., 2] < 80)
     rows, columns = np.nonzero(orange)
@@ -59,7 +59,7 @@ def test_a_picture_has_its_size_and_shows_the_robot_in_the_middle(camera):
 
 
 def test_the_camera_follows_the_robot(camera):
-    here, there = (camera.picture((x, 0, 0.28), UPRIGHT, HOME) for x in (0.0, 4.0))
+    here, there = (camera.drawn((x, 0, 0.28), UPRIGHT, HOME) for x in (0.0, 4.0))
     difference = np.abs(here.astype(int) - there.astype(int)).mean(axis=2) > 60
     assert difference.mean() < 0.1  # the floor is periodic, so both show almost the same
 
@@ -74,8 +74,8 @@ def test_recorded_poses_are_drawn_without_simulating(camera):
 def test_a_closed_camera_draws_nothing():
     camera = Camera(width=64, height=48)
     camera.close()
-    assert camera.picture((0, 0, 0.28), UPRIGHT, HOME) is None
-    assert camera.reason
+    with pytest.raises(RobotError, match='closed'):
+        camera.drawn((0, 0, 0.28), UPRIGHT, HOME)
 
 
 @pytest.mark.parametrize('backend', ['egl', 'osmesa', ''])

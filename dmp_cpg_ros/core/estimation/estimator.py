@@ -15,7 +15,7 @@ judged by its joint torques, and without IMU the standing feet tell how the body
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, isfinite
 
 import numpy as np
@@ -24,7 +24,7 @@ from dmp_cpg_ros.core.estimation import leg_odometry, terrain_plane, velocity_fi
 from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.terrain_plane import TerrainState, normal_in_world
-from dmp_cpg_ros.core.estimation.velocity_filter import FilterNoise, FilterState
+from dmp_cpg_ros.core.estimation.velocity_filter import FilterState
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.rotations import levelled
@@ -86,7 +86,7 @@ BLIND = 0.02
 turning. Also the gap between ticks beyond which readings do not stand for their mean.
 """
 
-BLIND_NOISE = (0.3, 3.0)
+BLIND_NOISE = {'gyro_noise': 0.3, 'accelerometer_noise': 3.0}
 """Noise densities of such guesses instead of the IMU's [rad/s/√Hz], [m/s²/√Hz]."""
 
 INITIAL_DEVIATION = (0.05, 0.1, 0.005, 0.1)
@@ -152,22 +152,9 @@ class BodyEstimator:
     def __init__(self, description: RobotDescription, parameters: EstimationParameters,
                  legs: RobotLegs | None = None) -> None:
         """Scale the thresholds by the robot's weight."""
-        self.parameters = parameters
+        self.parameters = parameters  # may be set while the estimator runs
         self.odometry = leg_odometry.LegOdometry(description, legs)
         self._weight = description.mass * GRAVITY
-
-    @property
-    def parameters(self) -> EstimationParameters:
-        """Noise and thresholds; may be set while the estimator runs."""
-        return self._parameters
-
-    @parameters.setter
-    def parameters(self, parameters: EstimationParameters) -> None:
-        self._parameters = p = parameters
-        self._seeing_noise, self._blind_noise = (
-            FilterNoise(gyro, accelerometer, p.gyro_bias_walk, p.accelerometer_bias_walk,
-                        p.foot_noise, p.foot_freedom)
-            for gyro, accelerometer in ((p.gyro_noise, p.accelerometer_noise), BLIND_NOISE))
 
     def step(self, memory: EstimatorState | None, readings: SensorReadings
              ) -> tuple[EstimatorState, BodyEstimate]:
@@ -190,7 +177,7 @@ class BodyEstimator:
         dt = (readings.time_ns - memory.estimate.time_ns) * 1e-9
         seeing = readings.imu_is_usable
         blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
-        noise = self._blind_noise if blind else self._seeing_noise
+        noise = replace(self.parameters, **BLIND_NOISE) if blind else self.parameters
         rate, force = (
             (readings.rate_in_base, readings.specific_force_in_base) if seeing
             else self._guessed(memory, readings, blind))

@@ -5,7 +5,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
+import numpy as np
+
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 
 ESTIMATE, GROUND_TRUTH = 'estimate', 'ground_truth'
@@ -52,3 +56,9 @@ class EstimationParameters(Parameters):
         0.3, "time constant of the filter on the ground's plane", 0.01, 10.0, unit='s')
     estimate_rate: float = parameter(
         50.0, 'rate at which estimated_odom is published; 0: never', 0.0, 2000.0, unit='Hz')
+
+    @cached_property
+    def spread(self) -> Array:
+        """Diagonal of the process noise per second (12,)."""
+        return np.repeat(np.square((self.gyro_noise, self.accelerometer_noise,
+                                    self.gyro_bias_walk, self.accelerometer_bias_walk)), 3)

@@ -27,10 +27,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -54,36 +54,6 @@ _TRANSITION = (
     *_places(VELOCITY, TILT, False), *_places(VELOCITY, GYRO_BIAS, False),
     *_places(TILT, GYRO_BIAS, True), *_places(VELOCITY, ACCELEROMETER_BIAS, True))
 """Places in the transition's matrix of what is neither 0 nor 1, block by block."""
-
-
-@dataclass(frozen=True)
-class FilterNoise:
-    """What the filter believes of its sensors.
-
-    Attributes
-    ----------
-    gyro, accelerometer : float
-        Noise densities [rad/s/√Hz], [m/s²/√Hz].
-    gyro_walk, accelerometer_walk : float
-        Random walks of the biases [rad/s²/√Hz], [m/s³/√Hz].
-    foot : float
-        Deviation of a standing foot's velocity [m/s].
-    freedom : float
-        Degrees of freedom ν of a foot's velocity.
-    """
-
-    gyro: float
-    accelerometer: float
-    gyro_walk: float
-    accelerometer_walk: float
-    foot: float
-    freedom: float
-
-    @cached_property
-    def spread(self) -> Array:
-        """Diagonal of the process noise per second (12,)."""
-        densities = (self.gyro, self.accelerometer, self.gyro_walk, self.accelerometer_walk)
-        return np.repeat(np.square(densities), 3)
 
 
 @dataclass(frozen=True)
@@ -140,8 +110,8 @@ def _skew(v: Triple, scale: float) -> tuple[float, ...]:
     return -z, y, z, -x, -y, x
 
 
-def predict(state: FilterState, rate: Array, specific_force: Array, dt: float, noise: FilterNoise
-            ) -> FilterState:
+def predict(state: FilterState, rate: Array, specific_force: Array, dt: float,
+            noise: EstimationParameters) -> FilterState:
     """Predict by the IMU's readings.
 
     Parameters
@@ -152,8 +122,8 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float, n
         ω̃ [rad/s] and f̃ [m/s²], means over the interval.
     dt : float
         Length of the interval [s].
-    noise : FilterNoise
-        Noise.
+    noise : EstimationParameters
+        What the filter believes of its sensors.
 
     Returns
     -------
@@ -180,7 +150,7 @@ def predict(state: FilterState, rate: Array, specific_force: Array, dt: float, n
 
 
 def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
-           velocity_in_base: Sequence[Triple], trust: Sequence[float], noise: FilterNoise
+           velocity_in_base: Sequence[Triple], trust: Sequence[float], noise: EstimationParameters
            ) -> tuple[FilterState, tuple[float, ...]]:
     """Correct by the velocities that standing feet measure.
 
@@ -198,10 +168,10 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
     contact_in_base, velocity_in_base : sequence of n tuples of float
         Contact points r [m] and measured v + ω × r [m/s] of the feet.
     trust : sequence of n floats
-        In [0, 1]: the deviation of a foot is ``noise.foot / trust``; one of no trust measures
+        In [0, 1]: the deviation of a foot is ``foot_noise / trust``; one of no trust measures
         nothing.
-    noise : FilterNoise
-        Noise.
+    noise : EstimationParameters
+        What the filter believes of its sensors.
 
     Returns
     -------
@@ -213,14 +183,14 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
     predicted = P[VELOCITY, VELOCITY].tolist()
     spread_x, spread_y, spread_z = predicted[0][0], predicted[1][1], predicted[2][2]
     turning = triple((rate - state.gyro_bias).tolist())
-    v, nu = triple(state.velocity_in_base.tolist()), noise.freedom
+    v, nu = triple(state.velocity_in_base.tolist()), noise.foot_freedom
     total, pull, distances = 0.0, (0.0, 0.0, 0.0), []
     for contact, measured, share in zip(contact_in_base, velocity_in_base, trust, strict=True):
         if share <= 0.0:
             distances.append(0.0)
             continue
         off = minus(minus(measured, v), cross(turning, contact))
-        variance = (noise.foot / share) ** 2
+        variance = (noise.foot_noise / share) ** 2
         x, y, z = off
         distance = (x * x / (spread_x + variance) + y * y / (spread_y + variance)
                     + z * z / (spread_z + variance))

@@ -15,9 +15,9 @@ from dmp_cpg_ros.core.estimation.leg_odometry import (
     force_from_torque,
     turn_rate_of_feet,
 )
+from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.terrain_plane import STEEPEST, fitted_slope, normal_in_world
 from dmp_cpg_ros.core.estimation.velocity_filter import (
-    FilterNoise,
     FilterState,
     predict,
     settle,
@@ -28,7 +28,7 @@ from dmp_cpg_ros.core.maths.rotations import levelled, roll_pitch_yaw, turned
 from dmp_cpg_ros.core.maths.vec3 import rotation, triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
-NOISE = FilterNoise(2e-3, 0.05, 1e-5, 1e-4, 0.1, 4.0)
+NOISE = EstimationParameters()
 RANDOM = np.random.default_rng(7)
 
 
@@ -88,10 +88,11 @@ def textbook_update(state: FilterState, rate: np.ndarray, contact: np.ndarray,
     n, P = len(trust), state.covariance
     H = np.tile(np.eye(12)[3:6], (n, 1))
     y = measured - state.velocity_in_base - np.cross(rate - state.gyro_bias, contact)
-    variance = (NOISE.foot / trust) ** 2
+    variance = (NOISE.foot_noise / trust) ** 2
     spread = np.diag(H @ P @ H.T).reshape(n, 3) + variance[:, None]
     distance = (y * y / spread).sum(axis=1)
-    variance = variance * np.maximum((NOISE.freedom + distance) / (NOISE.freedom + 3.0), 1.0)
+    nu = NOISE.foot_freedom
+    variance = variance * np.maximum((nu + distance) / (nu + 3.0), 1.0)
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.diag(np.repeat(variance, 3)))
     return K @ y.ravel(), P - K @ H @ P
 

@@ -143,7 +143,7 @@ def test_the_camera_shows_the_terrain():
         with Camera(width=160, height=120, world=world) as camera:
             if camera.reason:
                 pytest.skip(camera.reason)
-            pictures.append(camera.picture((2.0, 0.0, 0.4), (0, 0, 0, 1), MujocoRobot().reset()
+            pictures.append(camera.drawn((2.0, 0.0, 0.4), (0, 0, 0, 1), MujocoRobot().reset()
                                            .joint_position).astype(int))
     assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 20).mean() > 0.2
 
