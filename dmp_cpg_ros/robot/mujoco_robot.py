@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot in MuJoCo: joint drive at the physics rate, sensors, clock, pushes."""
+"""The robot in MuJoCo: joint drive at the physics rate, noisy sensors, clock, pushes."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
@@ -25,8 +26,53 @@ from dmp_cpg_ros.robot.model_reader import read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.port import RobotError, steps_per_tick
 from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file
-from dmp_cpg_ros.robot.sensor_noise import SensorNoise
 from dmp_cpg_ros.robot.start_pose import UPRIGHT, StartPose, home_joint_position, start_pose_of
+
+STREAM = 1
+"""Tells the sensors' random numbers from others of the same seed."""
+
+
+class SensorNoise:
+    """Noise of one robot's sensors; the same seed gives the same noise.
+
+    Parameters
+    ----------
+    parameters : SensorParameters
+        How good the sensors are.
+    seed : int
+        Seed of noise and biases.
+    tick_ns : int
+        Time between two readings [ns]: a density n gives deviations n / √tick.
+    """
+
+    def __init__(self, parameters: SensorParameters, seed: int, tick_ns: int) -> None:
+        """Scale the deviations: gyroscope, accelerometer, joint angles, joint velocities."""
+        p, root = parameters, (tick_ns * 1e-9) ** -0.5
+        self._seed = seed
+        self._deviation = p.sensor_noise * np.repeat(
+            (p.gyro_noise_density * root, p.accelerometer_noise_density * root, p.encoder_noise,
+             p.joint_velocity_noise), (3, 3, 12, 12))
+        self._bias_deviation = p.sensor_noise * np.repeat((p.gyro_bias, p.accelerometer_bias), 3)
+        self.reset()
+
+    def reset(self) -> None:
+        """Draw the biases, and begin the noise anew."""
+        self._random = np.random.default_rng((self._seed, STREAM))
+        self._bias = self._bias_deviation * self._random.standard_normal(6)
+
+    def measured(self, state: RobotState) -> RobotState:
+        """State as the sensors tell it; what is no sensor's stays the truth.
+
+        Without any noise the numbers are the truth's, bit for bit.
+        """
+        noise = self._deviation * self._random.standard_normal(30)
+        noise[:6] += self._bias
+        return replace_unchecked(
+            state, joint_position=state.joint_position + noise[6:18],
+            joint_velocity=state.joint_velocity + noise[18:],
+            acceleration_in_base=state.acceleration_in_base + noise[3:6],
+            gyro_in_base=state.measured_rate_in_base + noise[:3])
+
 
 Vector = NDArray[np.float64]
 

@@ -20,8 +20,7 @@ from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world import Slope
 
 pytest.importorskip('mujoco')
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.robot.sensor_noise import SensorNoise
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot, SensorNoise
 
 STAND = 1.0  # [s]
 

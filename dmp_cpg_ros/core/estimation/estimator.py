@@ -4,9 +4,9 @@
 
 A Kalman filter (:mod:`~dmp_cpg_ros.core.estimation.velocity_filter`) fuses the IMU with the
 velocities that the standing legs measure (:mod:`~dmp_cpg_ros.core.estimation.leg_odometry`);
-position is integrated, the ground is a plane through the newest footholds
-(:mod:`~dmp_cpg_ros.core.estimation.terrain_plane`). An attitude that the IMU's driver may give is
-not used: here yaw is the gyroscope's, whose bias the standing legs correct.
+position is integrated, the ground is a plane through the newest footholds. An attitude that the
+IMU's driver may give is not used: here yaw is the gyroscope's, whose bias the standing legs
+correct.
 
 What cannot be used (not finite, impossible, absent) never reaches the filter and is named in
 ``BodyEstimate.problems``: a leg without joints measures nothing, a foot without contact sensor is
@@ -20,10 +20,9 @@ from math import exp, isfinite
 
 import numpy as np
 
-from dmp_cpg_ros.core.estimation import leg_odometry, terrain_plane, velocity_filter
-from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion
+from dmp_cpg_ros.core.estimation import leg_odometry, velocity_filter
+from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion, TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
-from dmp_cpg_ros.core.estimation.terrain_plane import TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.velocity_filter import FilterState
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -221,7 +220,7 @@ class BodyEstimator:
             readings.time_ns, np.array((0.0, 0.0, height)), state.quaternion, zero, rate, height,
             np.array(normal_in_world(flat.slope)), np.array(trust), covariance.diagonal()[3:6],
             _problems(readings))
-        terrain = terrain_plane.initial_terrain(
+        terrain = leg_odometry.initial_terrain(
             [(x, y, z + height) for x, y, z in contact]) if all(legs) else flat
         return EstimatorState(state, terrain, estimate, rate, 0.0, 0.0), estimate
 
@@ -278,7 +277,7 @@ class BodyEstimator:
         velocity = 0.5 * (v[0] + u[0]), 0.5 * (v[1] + u[1]), 0.5 * (v[2] + u[2])
         position = vec3.moved(vec3.triple(last.position_in_world.tolist()), velocity, dt)
         contact = [vec3.times(R, place) for place in motion.contact_in_base]
-        terrain = terrain_plane.terrain_step(
+        terrain = leg_odometry.terrain_step(
             memory.terrain, [vec3.plus(position, place) for place in contact], trust, dt,
             self.parameters.terrain_time)
         normal = normal_in_world(terrain.slope)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.balance.virtual_model import REGULARISATION, distribute
-from dmp_cpg_ros.core.estimation.terrain_plane import normal_in_world
+from dmp_cpg_ros.core.estimation.leg_odometry import normal_in_world
 from dmp_cpg_ros.core.maths.rotations import turned
 from dmp_cpg_ros.core.maths.vec3 import Triple, heading_frame, rotation, triple, upward
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics

@@ -9,7 +9,7 @@ import pytest
 from core_examples import quadruped, standing_state
 
 from dmp_cpg_ros.core.balance.footholds import SLIGHT, ground_from_base, lean
-from dmp_cpg_ros.core.estimation.terrain_plane import normal_in_world
+from dmp_cpg_ros.core.estimation.leg_odometry import normal_in_world
 from dmp_cpg_ros.core.maths.rotations import turned
 from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.state import RobotState

@@ -11,12 +11,14 @@ import pytest
 from core_examples import GRAVITY, differences, quadruped
 
 from dmp_cpg_ros.core.estimation.leg_odometry import (
+    STEEPEST,
     LegOdometry,
+    fitted_slope,
     force_from_torque,
+    normal_in_world,
     turn_rate_of_feet,
 )
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
-from dmp_cpg_ros.core.estimation.terrain_plane import STEEPEST, fitted_slope, normal_in_world
 from dmp_cpg_ros.core.estimation.velocity_filter import (
     FilterState,
     predict,
