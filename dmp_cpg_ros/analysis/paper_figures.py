@@ -18,9 +18,9 @@ from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
 
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.recording import Array
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import graph_from_edges, topology
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.paper.network import EdgeCoupling, OscillatorNetwork
 from dmp_cpg_ros.paper.oscillators import HopfOscillators, VanDerPolOscillators

@@ -34,8 +34,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph
 from dmp_cpg_ros.core.canonical.phase import phase_rotation
-from dmp_cpg_ros.core.canonical.system import CouplingGraph
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.paper.jacobians import Array, Field
 from dmp_cpg_ros.paper.oscillators import OscillatorFamily

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem, CouplingGraph, topology
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.step import cycle_radius_error, longest_step
 from dmp_cpg_ros.core.contraction.capture import capture_set, radius_tolerance
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth

@@ -25,8 +25,9 @@ from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
+from dmp_cpg_ros.core.canonical.coupling import Edges, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem, Edges, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
 from dmp_cpg_ros.core.inhibition.supervisor import predict
 from dmp_cpg_ros.core.loop import Array, WalkingLoop

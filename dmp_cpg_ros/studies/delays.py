@@ -21,14 +21,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import (
-    CanonicalSystem,
-    CouplingGraph,
-    graph_from_edges,
-    topology,
-)
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction import delays
 from dmp_cpg_ros.core.contraction.capture import capture_set, place_tolerance, radius_tolerance
 from dmp_cpg_ros.core.contraction.delays import Capture

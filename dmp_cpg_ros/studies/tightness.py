@@ -20,11 +20,11 @@ from math import ceil, exp, log, log2
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical import system as graphs
+from dmp_cpg_ros.core.canonical import coupling as graphs
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import Array, CanonicalSystem
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates import certify, step
 from dmp_cpg_ros.core.contraction import capture, heterogeneity, inhibited, synchronisation, voting
 from dmp_cpg_ros.core.gait.gait import BodyScale
@@ -32,6 +32,7 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import RunningGait
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, GaitSupervisor, predict
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters

@@ -14,7 +14,7 @@ MOST_FILES, MOST_LINES = 12, 350
 
 HOMES = {
     'AndronovHopf': 'core.canonical.hopf',
-    'CouplingGraph': 'core.canonical.system',
+    'CouplingGraph': 'core.canonical.coupling',
     'CanonicalSystem': 'core.canonical.system',
     'GaitNetwork': 'core.gait.network',
     'SpringDamper': 'core.primitives.spring_damper',

@@ -6,14 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import (
-    CanonicalSystem,
-    CouplingGraph,
-    graph_from_edges,
-    topology,
-)
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.studies.adversary_runs import Batch, Setting
 
 __all__ = ['Batch', 'Setting', 'locked', 'random_graph', 'random_setting']

@@ -6,161 +6,19 @@ Sections 4.2 and 5).
     ẋ_i = f_x(x_i; ω_i) + Σ_j K_ij (R(φ_ij) x_j − x_i) + α_i (x_{i,d} − x_i)
 
 with α_i = 0 except where inhibition is switched on.
-
-An edge (i, j) of the graph means that oscillator i feels K_ij (R(φ_ij) x_j − x_i), with φ_ij the
-phase by which i leads j (paper, Section 5; Wang & Slotine 2005 for the block Laplacian).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
-from dmp_cpg_ros.core.canonical.phase import phase_rotation
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
-
-Edges = tuple[tuple[int, int], ...]
-
-
-@dataclass(frozen=True)
-class CouplingGraph:
-    """Directed edges with 2×2 gains and the phases at which the nodes lock.
-
-    Attributes
-    ----------
-    size : int
-        Number N of oscillators.
-    edges : tuple of (int, int)
-        Pairs (i, j): j acts on i. A bidirectional coupling is two edges.
-    gains : ndarray (E, 2, 2)
-        K_ij of each edge [1/s]; its symmetric part is positive definite.
-    phases : ndarray (N,)
-        Phase of each oscillator relative to oscillator 0 when locked [rad]; φ_ij = phases[i] −
-        phases[j].
-
-    Raises
-    ------
-    ParameterError
-        If an edge names a node that is not there, or a gain's symmetric part is not positive
-        definite.
-    """
-
-    size: int
-    edges: Edges
-    gains: Array
-    phases: Array
-
-    def __post_init__(self) -> None:
-        """Validate."""
-        if self.gains.shape != (len(self.edges), 2, 2) or self.phases.shape != (self.size,):
-            raise ParameterError(
-                f'{len(self.edges)} edges and {self.size} nodes need gains '
-                f'({len(self.edges)}, 2, 2) and phases ({self.size},), '
-                f'not {self.gains.shape} and {self.phases.shape}')
-        if not (np.all(np.isfinite(self.gains)) and np.all(np.isfinite(self.phases))):
-            raise ParameterError('coupling gains and phase offsets must be finite')
-        for i, j in self.edges:
-            if not (0 <= i < self.size and 0 <= j < self.size and i != j):
-                raise ParameterError(
-                    f'edge ({i}, {j}) is not between two of the nodes 0 to {self.size - 1}')
-        symmetric = 0.5 * (self.gains + np.swapaxes(self.gains, 1, 2))
-        for edge, smallest in zip(self.edges, np.linalg.eigvalsh(symmetric)[:, 0], strict=True):
-            if smallest <= 0.0:
-                raise ParameterError(
-                    f'gain of edge {edge} must have a positive definite symmetric part; '
-                    f'its smallest eigenvalue is {smallest:.4g}')
-
-    def coupling_matrix(self) -> Array:
-        """Matrix −L with ẋ = … − L x in the original coordinates (offsets included).
-
-        Returns
-        -------
-        ndarray (2N, 2N)
-        """
-        return self._block_matrix(
-            self.gains, lambda i, j: phase_rotation(float(self.phases[i] - self.phases[j])))
-
-    def block_laplacian(self) -> Array:
-        """Block Laplacian L in the co-rotated coordinates, where locked states are equal.
-
-        Returns
-        -------
-        ndarray (2N, 2N)
-            Σ over edges of K̃_ij at (i, i) and −K̃_ij at (i, j), with K̃_ij = R(φ_i)ᵀ K_ij R(φ_i)
-            the gain as the locked coordinates x̃_i = R(φ_i)ᵀ x_i see it; K̃ = K for every K = a I
-            + b S, such as k I.
-        """
-        turns = [phase_rotation(float(phi)) for phi in self.phases]
-        turned = [turns[i].T @ gain @ turns[i]
-                  for (i, _), gain in zip(self.edges, self.gains, strict=True)]
-        return -self._block_matrix(turned, lambda i, j: np.eye(2))
-
-    def _block_matrix(self, gains: Iterable[Array], seen_from: Callable[[int, int], Array]
-                      ) -> Array:
-        matrix = np.zeros((2 * self.size, 2 * self.size))
-        for (i, j), gain in zip(self.edges, gains, strict=True):
-            matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] -= gain
-            matrix[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] += gain @ seen_from(i, j)
-        return matrix
-
-
-def graph_from_edges(size: int, edges: Edges, gain: float | Array,
-                     phases: Array | None = None) -> CouplingGraph:
-    """Graph in which every edge has the same gain.
-
-    Parameters
-    ----------
-    size : int
-        Number of oscillators.
-    edges : tuple of (int, int)
-        Directed edges (i, j): j acts on i.
-    gain : float or ndarray (2, 2)
-        k for K = k I, or K [1/s].
-    phases : ndarray (N,), optional
-        Locked phases [rad]; zeros without.
-
-    Returns
-    -------
-    CouplingGraph
-    """
-    K = gain * np.eye(2) if np.ndim(gain) == 0 else np.asarray(gain, dtype=float)
-    gains = np.broadcast_to(K, (len(edges), 2, 2)).copy()
-    return CouplingGraph(
-        size, edges, gains, np.zeros(size) if phases is None else np.asarray(phases, float))
-
-
-def topology(name: str, size: int) -> Edges:
-    """Edges of a named graph: ``all_to_all``, ``ring``, ``path``, ``star`` or ``directed_ring``.
-
-    The star's centre is node 0; the directed ring passes the state on from i to i + 1.
-
-    Raises
-    ------
-    ParameterError
-        If the name is not known.
-    """
-    following = [(i, i + 1) for i in range(size - 1)]
-    closing = [(size - 1, 0)] if size > 2 else []
-    undirected: dict[str, Iterable[tuple[int, int]]] = {
-        # lazy, for it is long where the others are short
-        'all_to_all': ((i, j) for i in range(size) for j in range(i + 1, size)),
-        'ring': following + closing,
-        'path': following,
-        'star': [(0, i) for i in range(1, size)],
-    }
-    if name == 'directed_ring':
-        return tuple((j, i) for i, j in following + [(size - 1, 0)])
-    if name not in undirected:
-        raise ParameterError(
-            f"topology '{name}' is not known; valid are {', '.join(undirected)}, directed_ring")
-    return tuple(edge for i, j in undirected[name] for edge in ((i, j), (j, i)))
-
 
 MOST_KEPT = 64
 """Sets of gains for which matrices are kept."""

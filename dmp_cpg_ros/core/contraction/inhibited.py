@@ -16,7 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem, CouplingGraph
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.synchronisation import (

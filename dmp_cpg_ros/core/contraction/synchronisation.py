@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.system import CouplingGraph
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph
 from dmp_cpg_ros.core.maths import Array
 
 

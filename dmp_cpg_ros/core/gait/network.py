@@ -19,15 +19,11 @@ from math import atan2, ceil, cos, pi, sin
 
 import numpy as np
 
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned
-from dmp_cpg_ros.core.canonical.system import (
-    MOST_KEPT,
-    CanonicalSystem,
-    graph_from_edges,
-    topology,
-)
+from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.maths import Array

@@ -9,12 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import (
-    CouplingGraph,
-    graph_from_edges,
-    topology,
-)
 from dmp_cpg_ros.core.errors import ParameterError
 
 NAMES = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')

@@ -21,8 +21,9 @@ from contraction_batches import Batch, Setting, locked, random_graph
 from core_examples import GAITS, TICK, quadruped
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem, graph_from_edges
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound

@@ -13,9 +13,10 @@ from contraction_batches import Batch, Setting, locked, random_setting
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.step import longest_step
 from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set, outward_growth
 from dmp_cpg_ros.core.contraction.capture_anywhere import needed_gain_anywhere

@@ -8,14 +8,10 @@ import numpy as np
 import pytest
 from contraction_batches import Batch, Setting
 
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.system import (
-    CanonicalSystem,
-    CouplingGraph,
-    graph_from_edges,
-    topology,
-)
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import (
     capture_set,
     outward_growth,

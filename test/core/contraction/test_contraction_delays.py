@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.canonical.system import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.contraction.delays import Capture, longest_carried
 from dmp_cpg_ros.studies.delays import (
     MARGINS,

@@ -10,8 +10,9 @@ from contraction_batches import Batch, Setting, locked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.heterogeneity import (
     disagreement_bound,
     mismatch_bound,

@@ -10,13 +10,9 @@ from contraction_batches import Batch, Setting, locked, random_setting
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
-from dmp_cpg_ros.core.canonical.system import (
-    CanonicalSystem,
-    CouplingGraph,
-    graph_from_edges,
-    topology,
-)
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.synchronisation import (
     components,
     connectivity,

@@ -13,9 +13,9 @@ from core_examples import GAITS, TICK, quadruped
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate, turned, wrapped
-from dmp_cpg_ros.core.canonical.system import graph_from_edges, topology
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
 from dmp_cpg_ros.core.errors import DataError, ParameterError
