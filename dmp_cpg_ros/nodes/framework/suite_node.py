@@ -9,8 +9,10 @@ node overrides the hooks that it needs: ``configure``, ``activate``, ``deactivat
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
+from math import inf
 from typing import Any, ClassVar, TypeVar, cast
 
 from rcl_interfaces.msg import SetParametersResult
@@ -23,6 +25,7 @@ from dmp_cpg_ros.core.certificates.gate import shown
 from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.parameters import Parameters
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.framework import parameters
 from dmp_cpg_ros.nodes.framework.certified import Certified, Sets
@@ -30,10 +33,19 @@ from dmp_cpg_ros.nodes.framework.health import missing_connections
 from dmp_cpg_ros.nodes.framework.lifecycle import GuardedLifecycleNode
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePublisher
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
-from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
-from dmp_cpg_ros.nodes.messages.interfaces import Interface, interface, partners
+from dmp_cpg_ros.nodes.framework.writers import WriterWatch
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader, serialized_stamp
+from dmp_cpg_ros.nodes.messages.interfaces import (
+    Interface,
+    expected_count,
+    interface,
+    partners,
+)
 from dmp_cpg_ros.nodes.messages.values import counts_message, header_ns
 from dmp_cpg_ros.suite_table import KINDS
+
+LOOK_EVERY_S = 0.2
+"""How often the graph is asked for the publishers of a topic at most [s]."""
 
 P = TypeVar('P', bound=Parameters)
 Readers = Mapping[str, Callable[[Any], Any]]
@@ -93,6 +105,8 @@ class SuiteNode(GuardedLifecycleNode):
         self._commands: list[Subscription] = []
         self._commands_taken: dict[str, int] = {}
         self._inputs: list[tuple[Interface, Subscription]] = []
+        self._writers: dict[str, list[WriterWatch]] = {}
+        self._looked: dict[str, tuple[float, bool]] = {}
         topic, ready = interface('/diagnostics'), interface('~/ready')
         self._diagnostics = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._outputs: list[tuple[Interface, Publisher]] = [(topic, self._diagnostics)]
@@ -263,25 +277,106 @@ class SuiteNode(GuardedLifecycleNode):
         topic = topic if isinstance(topic, Interface) else interface(topic)
         inside = self.local is not None and self.local.kinds.issuperset(topic.publishers)
         latched, read = topic.latched, serialized_reader(topic.type, as_message=command)
-        as_it_is = raw or inside
 
-        def receive(message: Any) -> None:
+        def take(message: Any) -> None:
             if self.active or latched:
-                callback(message if as_it_is else read(message))
+                callback(message if raw or inside else read(message))
 
+        receive: Callable[..., None] = take
+        watched = not (command or raw) and expected_count(topic.publishers) > 0
         if self.local is not None and inside:
-            receive = self.guarded(topic.name, receive)
+            receive = self.guarded(topic.name, take)
             self.local.attach(topic.name, receive)
             self._undo.append(partial(self.local.detach, receive))
             return None
+        if command:
+            receive = self._counted(topic.name, take)
+        elif watched:
+            receive = self._from_writers(topic, callback, read)
         subscription = self.create_subscription(
-            topic.type, topic.name, self._counted(topic.name, receive) if command else receive,
-            qos or topic.reader_qos, raw=True)
+            topic.type, topic.name, receive, qos or topic.reader_qos, raw=True)
+        if watched:
+            subscription._callback_type = type(subscription).CallbackType.WithMessageInfo
         self._undo.append(partial(self.destroy_subscription, subscription))
         self._inputs.append((topic, subscription))
         if command:
             self._commands.append(subscription)
         return subscription
+
+    def _from_writers(self, topic: Interface, callback: Callable[[Any], None],
+                      read: Callable[[bytes], Any]) -> Callable[..., None]:
+        """Return a callback that takes the messages of a topic's own writers only.
+
+        Where each leg has a writer, its messages name the leg.
+        """
+        several = expected_count(topic.publishers) > 1
+        ticked, latched = hasattr(topic.type(), 'header') and not topic.latched, topic.latched
+        watches = {leg: WriterWatch(partial(self._none_but_writers, topic), ticked=ticked)
+                   for leg in (LEGS if several else ('',))}
+        self._writers[topic.name] = list(watches.values())
+        only = None if several else watches['']
+
+        def receive(data: Any, information: Any = None) -> None:
+            if not (self.active or latched):
+                return
+            if information is None:  # the events executor hands both over as one
+                data, information = data
+            stamp_ns = serialized_stamp(data) if ticked else 0
+            watch, message = only, cast(Any, None)
+            if watch is None or not watch.known:
+                message = read(data)
+            if watch is None:
+                watch = watches.get((message.name or ('',))[0].partition('_')[0])
+            if watch is None or watch.admits(information['publication_sequence_number'], stamp_ns,
+                                             information['received_timestamp']):
+                callback(read(data) if message is None else message)
+            else:
+                self._refuse_writer(topic)
+
+        return receive
+
+    def _strangers(self, topic: Interface) -> list[str]:
+        """Names of nodes that publish a topic and should not, where there are too many."""
+        ends = self.get_publishers_info_by_topic(self.resolve_topic_name(topic.name))
+        if len(ends) <= expected_count(topic.publishers):
+            return []
+        own = {(name, self.get_namespace().rstrip('/')) for kind in topic.publishers
+               if kind in KINDS for name in KINDS[kind].instances}
+        return sorted({f'{end.node_namespace.rstrip("/")}/{end.node_name}' for end in ends
+                       if (end.node_name, end.node_namespace.rstrip('/')) not in own})
+
+    def _none_but_writers(self, topic: Interface) -> bool:
+        """Whether the graph knows no strangers; it is not asked at every message."""
+        now_s, (then_s, known) = time.monotonic(), self._looked.get(topic.name, (-inf, False))
+        if now_s > then_s + LOOK_EVERY_S:
+            then_s, known = self._looked[topic.name] = now_s, not self._strangers(topic)
+        return known
+
+    def _refuse_writer(self, topic: Interface) -> None:
+        """Count a message of a stranger, and say who it is."""
+        rejected, key = self.health.rejected, f'writer of {topic.name}'
+        rejected[topic.name] = rejected.get(topic.name, 0) + 1
+        if not self.health.has_problem(key):
+            self._name_writers(topic)
+
+    def _name_writers(self, topic: Interface) -> None:
+        who = ', '.join(self._strangers(topic)) or 'another node of the same name'
+        self.warn(f'writer of {topic.name}', f'{topic.name} is published by {who} too; only the '
+                  f'messages of {" and ".join(topic.publishers)} are taken')
+
+    def _watch_writers(self) -> None:
+        """Name strangers among the publishers of topics that have their own writers."""
+        now_ns = time.time_ns()
+        for topic, subscription in self._inputs:
+            watches = self._writers.get(topic.name)
+            if watches is None:
+                continue
+            too_many = subscription.get_publisher_count() > expected_count(topic.publishers)
+            if (too_many and self._strangers(topic)) or any(
+                    watch.has_strangers(now_ns) for watch in watches):
+                self._name_writers(topic)
+            else:
+                self.clear(f'writer of {topic.name}')
 
     def serve(self, name: str, take: Callable[[Any], tuple[bool, str]]) -> None:
         """Create a service of the table; while the node is active, what takes its requests tells
@@ -303,7 +398,7 @@ class SuiteNode(GuardedLifecycleNode):
             self.certified = None
         for undo in reversed(self._undo):
             undo()
-        self._undo, self._commands, self._inputs = [], [], []
+        self._undo, self._commands, self._inputs, self._writers = [], [], [], {}
         self._outputs = self._outputs[:1]
 
     def missing(self) -> list[str]:
@@ -349,7 +444,14 @@ class SuiteNode(GuardedLifecycleNode):
                            optional=tuple(optional), lock_step=self.lock_step)
 
         def feeding(name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
-            return lambda message: ticks.add(name, header_ns(message), read(message))
+            def feed(message: Any) -> None:
+                stamp_ns = header_ns(message)
+                if not ticks.add(name, stamp_ns, read(message)):
+                    raise DataError(
+                        f'stamp {stamp_ns * 1e-9:.3f} s is not of this run of the robot, whose '
+                        f'last tick was at {self.health.stamp_ns * 1e-9:.3f} s')
+
+            return feed
 
         for name, read in {**readers, **delayed}.items():
             self.listen(name, feeding(name, read))
@@ -370,6 +472,7 @@ class SuiteNode(GuardedLifecycleNode):
         """
         if self.health.due():
             self._watch_command_types()
+            self._watch_writers()
             self.report(periodic=True)
 
     def let_ticks_pass(self) -> None:

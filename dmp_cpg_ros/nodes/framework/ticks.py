@@ -14,7 +14,13 @@ from typing import Any
 TickCallback = Callable[[int, dict[str, Any]], None]
 
 RESET_NS = 100_000_000
-"""A stamp that lies this far behind the last tick means that the robot was reset [ns]."""
+"""A stamp that lies this far behind the last tick is of a robot that was reset, or false [ns]."""
+
+AHEAD_NS = 1_000_000_000
+"""A stamp that lies further ahead of the last tick is of a clock that was set, or false [ns]."""
+
+CONFIRMED = 3
+"""In real time: messages in a row that must agree on another time before it is believed."""
 
 PENDING_TICKS = 16
 """Ticks that may be incomplete at one time; older ones are forgotten."""
@@ -63,6 +69,7 @@ class TickInputs:
         self._delayed, self._optional, self._lock_step = tuple(delayed), optional, lock_step
         self._others = tuple(name for name in inputs if name != trigger)
         self._held: dict[str, Any] = dict.fromkeys(delayed)
+        self._astray: list[tuple[str, int, Any]] = []
         self.ignored = 0
         self.reset()
 
@@ -78,7 +85,7 @@ class TickInputs:
         self._missed = dict.fromkeys(self._inputs, 0)
         self.last_ns: int | None = None
 
-    def add(self, name: str, stamp_ns: int, value: Any) -> None:
+    def add(self, name: str, stamp_ns: int, value: Any) -> bool:
         """Take a message; ticks that it completes are fired before this returns.
 
         Parameters
@@ -89,14 +96,21 @@ class TickInputs:
             Stamp of the message [ns].
         value : object
             Its content.
+
+        Returns
+        -------
+        bool
+            Whether the stamp can be of this robot's run. When ``CONFIRMED`` messages in a row
+            agree on another time, the robot has started again, and ticks begin anew with them.
         """
         if name in self._held:
             self._add_delayed(name, stamp_ns, value)
-            return
+            return True
         last = self.last_ns
-        if last is not None and stamp_ns <= last - RESET_NS:
-            self.reset()
-            last = None
+        if last is not None and not -RESET_NS < stamp_ns - last <= AHEAD_NS:
+            return self._follow_clock(name, stamp_ns, value)
+        if self._astray:
+            self._astray = []
         newest = self._newest.get(name)
         if newest is None or stamp_ns > newest[0]:
             self._newest[name] = (stamp_ns, value)
@@ -104,11 +118,11 @@ class TickInputs:
                 self._missed[name] = 0
         if last is not None and stamp_ns <= last:
             self.ignored += 1
-            return
+            return True
         tick = self._pending.setdefault(stamp_ns, {})
         if name in tick:
             self.ignored += 1
-            return
+            return True
         tick[name] = value
         if self._lock_step:
             self._fire_exact()
@@ -116,6 +130,21 @@ class TickInputs:
             self._fire_newest()
         if len(self._pending) > PENDING_TICKS:
             del self._pending[min(self._pending)]
+        return True
+
+    def _follow_clock(self, name: str, stamp_ns: int, value: Any) -> bool:
+        """Keep a message of another time, or begin anew with all of them."""
+        self._astray = [
+            (other, at, known) for other, at, known in self._astray
+            if abs(at - stamp_ns) < RESET_NS and (other != name or at < stamp_ns)]
+        self._astray.append((name, stamp_ns, value))
+        if len(self._astray) < (1 if self._lock_step else CONFIRMED):
+            return False
+        astray, self._astray = self._astray, []
+        self.reset()
+        for message in astray:
+            self.add(*message)
+        return True
 
     def _add_delayed(self, name: str, stamp_ns: int, value: Any) -> None:
         if not self._lock_step:
@@ -205,10 +234,12 @@ def drain(subscription: Any) -> int:
         Number of messages taken.
     """
     count, handle, msg_type, raw = 0, subscription.handle, subscription.msg_type, subscription.raw
+    kinds = type(subscription).CallbackType
+    with_information = subscription._callback_type is kinds.WithMessageInfo
     while True:
         with handle:
             taken = handle.take_message(msg_type, raw)
         if taken is None:
             return count
         count += 1
-        subscription.callback(taken[0])
+        subscription.callback(*taken[:1 + with_information])

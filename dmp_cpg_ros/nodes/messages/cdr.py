@@ -39,7 +39,7 @@ FIELDS = ('position', 'velocity', 'effort')
 """The arrays of a ``JointState``, in the order of its definition."""
 
 _STAMP, _HEADER, _COUNT = struct.Struct('<iI'), struct.Struct('<iII'), struct.Struct('<I')
-_TWIST, _IMU = struct.Struct('<6d'), struct.Struct('<104x3d72x3d')
+_TWIST, _IMU = struct.Struct('<6d'), struct.Struct('<104x3d72x3d72x')
 
 
 class Serialized:
@@ -186,6 +186,16 @@ def serialized_reader(kind: type, *, as_message: bool = False) -> Callable[[byte
     return reader
 
 
+def serialized_stamp(data: bytes) -> int:
+    """Stamp [ns] with which little-endian bytes of a message with a header begin, whatever
+    follows; raises DataError where there is no room for one.
+    """
+    if len(data) < BODY + _STAMP.size:
+        raise DataError(f'{len(data)} bytes are no message with a stamp')
+    seconds, rest = _STAMP.unpack_from(data, BODY)
+    return int(seconds * NS + rest)
+
+
 def aligned(at: int, size: int) -> int:
     """Place of the next primitive of a size of 4 or 8 bytes, at or behind a place."""
     return at + (BODY - at) % size
@@ -218,9 +228,10 @@ def _names(data: bytes, at: int) -> tuple[list[str], int]:
     for _ in range(count):
         begin = aligned(end, 4) + 4
         end = begin + _COUNT.unpack_from(data, begin - 4)[0]
-        if not begin < end <= len(data):
+        if end > len(data):
             raise ValueError('a name is cut short')
-        names.append(data[begin:end - 1].decode())
+        # As rclpy reads them: up to a zero, and with a mark in place of what is no UTF-8.
+        names.append(data[begin:end].partition(b'\0')[0].decode(errors='replace'))
     if end - at <= _LONGEST_NAMES:
         if len(_known_names) >= _MOST_NAMES:
             _known_names.clear()

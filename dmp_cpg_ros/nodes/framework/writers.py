@@ -1,0 +1,104 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""One writer per topic: its messages are told from those of others by their numbers and stamps.
+
+The middleware numbers the messages of every publisher from 1 on. rclpy of Jazzy hands that number
+to callbacks and keeps the publisher's identity to itself, so a reader knows the writer of a topic
+by a run of numbers that goes on, by no more than one for each tick of the robot's time. Somebody
+else's message is behind it, or ahead of it, or has the stamp of a tick that has been written
+already. Who the others are, the graph tells. Another publisher becomes the writer when the former
+one is silent and nobody else is in the graph.
+
+Who has sent exactly as many messages as the writer and is quicker at every tick passes: numbers
+protect from mistakes and from what does not know them, DDS Security from the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+SILENT_NS = 500_000_000
+"""Time without a message of the writer after which another one may take over [ns]."""
+
+REMEMBERED_NS = 2_000_000_000
+"""Time for which a stranger is remembered after its last message [ns]."""
+
+LEARNING = 50
+"""Messages of a writer from which the length of a tick is learned."""
+
+SHORTEST_TICK_NS = 500_000
+"""Stamps of two ticks differ by so much at least [ns]."""
+
+LOST = 20
+"""Messages in a row that may be lost of a writer that sends on change, or is not known yet."""
+
+
+class WriterWatch:
+    """Which messages of a topic are its writer's.
+
+    Parameters
+    ----------
+    may_take_over : callable () → bool
+        Whether the graph knows nobody who should not write this topic.
+    ticked : bool
+        Whether the topic has one stamped message for every tick; else one for every change.
+    """
+
+    __slots__ = ('_heard_ns', '_last', '_learned', '_may_take_over', '_stamp_ns', '_stranger',
+                 '_stranger_ns', '_tick_ns', '_ticked')
+
+    def __init__(self, may_take_over: Callable[[], bool], *, ticked: bool = True) -> None:
+        """Know no writer yet."""
+        self._may_take_over, self._ticked = may_take_over, ticked
+        self._stranger, self._stranger_ns = -1, -REMEMBERED_NS
+        self._begin(0, 0, -SILENT_NS)
+
+    def _begin(self, number: int, stamp_ns: int, now_ns: int) -> None:
+        self._last, self._stamp_ns, self._heard_ns = number, stamp_ns, now_ns
+        self._tick_ns, self._learned = 0, 0
+
+    def admits(self, number: int | None, stamp_ns: int, now_ns: int) -> bool:
+        """Whether a message is the writer's; True where the middleware does not number.
+
+        Parameters
+        ----------
+        number : int or None
+            Number that the message has among those of its publisher.
+        stamp_ns : int
+            Its stamp [ns]; of no meaning unless ticked.
+        now_ns : int
+            Time of its reception [ns].
+        """
+        if number is None or self._continues(number - self._last, stamp_ns - self._stamp_ns):
+            self._last, self._stamp_ns, self._heard_ns = number or 0, stamp_ns, now_ns
+            return True
+        silent = now_ns - self._heard_ns > SILENT_NS
+        if silent and self._may_take_over():
+            self._begin(number, stamp_ns, now_ns)
+            return True
+        self._stranger, self._stranger_ns = number, now_ns
+        return False
+
+    @property
+    def known(self) -> bool:
+        """Whether the topic has had a writer."""
+        return self._last > 0
+
+    def has_strangers(self, now_ns: int) -> bool:
+        """Whether strangers have been heard lately."""
+        return now_ns - self._stranger_ns < REMEMBERED_NS
+
+    def _continues(self, ahead: int, passed_ns: int) -> bool:
+        """Whether a message can be the writer's next one, with losses before it perhaps."""
+        if ahead < 1 or not self._last:
+            return False
+        if not self._ticked:
+            return self._last + ahead != self._stranger + 1 and (
+                ahead == 1 or (ahead <= LOST and self._may_take_over()))
+        if self._learned < LEARNING:
+            if ahead > LOST or passed_ns < ahead * SHORTEST_TICK_NS:
+                return False
+            self._learned += 1
+            self._tick_ns = min(self._tick_ns or passed_ns, passed_ns // ahead)
+            return True
+        return ahead * self._tick_ns <= passed_ns

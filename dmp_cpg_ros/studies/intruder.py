@@ -1,0 +1,494 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""An intruder in the robot's ROS domain: whether it can topple, stop, start or steer the robot.
+
+``python -m dmp_cpg_ros.studies.intruder --duration S --seed N`` walks the robot at 0.5 m/s in real
+time and publishes forged messages, replays, garbage and floods on every topic of the suite,
+parameter events and requests, and transitions that are not possible. After each attack it looks
+whether the robot is on its feet and at its speed, and how soon the intruder was named on
+``/diagnostics``. Exit status 1 when an attack succeeded.
+
+The documented services and ``cmd_vel`` are open to everybody and are not attacked; neither are
+requests that are valid, such as deactivating a node, which only DDS Security can refuse.
+"""
+
+from __future__ import annotations
+
+import argparse
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from math import nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterEvent, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_parameter_events
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.layouts import GAIN_ROWS
+from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.messages.interfaces import TOPICS, Interface, interface
+from dmp_cpg_ros.nodes.messages.values import set_stamp
+from dmp_cpg_ros.studies.output import markdown_table
+from dmp_cpg_ros.suite_table import ROBOT, WALKING_NODES
+
+NAME = 'intruder'
+"""Its node; what ``/diagnostics`` must name."""
+
+SPEED = 0.5
+"""Commanded speed of the walk [m/s]."""
+
+RECOVERY_S = 3.0
+"""Time of the robot after an attack after which it must walk as before [s]."""
+
+ATTACK_S = 2.0
+"""Length of an attack [s]."""
+
+SLOWEST, FASTEST, LOWEST = 0.35, 0.65, 0.15
+"""Speeds [m/s] and the height of the base [m] of a robot that walks on."""
+
+OWN = tuple(topic for topic in TOPICS if topic.publishers != ('user',) and topic.recorded
+            and topic.name not in ('/clock', '/diagnostics', 'joint_work', 'estimated_odom'))
+"""Topics that only nodes of the suite may write."""
+
+TICKED = ('joint_states', 'imu', 'foot_contacts', 'reference', 'canonical_state',
+          'posture_feedback', 'joint_targets')
+"""Topics with a message at every tick."""
+
+
+class Intruder(Node):  # type: ignore[misc]
+    """A node that listens to the suite and publishes what it should not.
+
+    Attributes
+    ----------
+    named : float
+        When a report of the suite first named it during the attack [s]; NaN before.
+    """
+
+    def __init__(self, seed: int) -> None:
+        """Listen to everything."""
+        super().__init__(NAME)
+        self.executor_ = SingleThreadedExecutor()
+        self.executor_.add_node(self)
+        self.draw = random.Random(seed)
+        self.last: dict[str, bytes] = {}
+        self.poses: list[tuple[float, float, float]] = []
+        self.named, self.fell = nan, False
+        self._writers: dict[str, Any] = {}
+        for topic in OWN:
+            self.create_subscription(
+                topic.type, topic.name, lambda data, topic=topic: self._hear(topic, data),
+                topic.reader_qos, raw=True)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._on_report, 100)
+
+    def _hear(self, topic: Interface, data: bytes) -> None:
+        self.last[topic.name] = data
+        if topic.name == 'odom':
+            odom = deserialize_message(data, Odometry)
+            place, stamp = odom.pose.pose.position, odom.header.stamp
+            self.poses.append((stamp.sec + 1e-9 * stamp.nanosec, place.x, place.z))
+            if len(self.poses) > 1000:
+                del self.poses[:500]
+
+    def _on_report(self, report: DiagnosticArray) -> None:
+        for status in report.status:
+            if NAME in status.message and self.named != self.named:
+                self.named = time.monotonic()
+            self.fell |= any(entry.key == 'fell' and entry.value == 'true'
+                             for entry in status.values)
+
+    def spin(self, seconds: float) -> None:
+        """Listen for some time."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.executor_.spin_once(timeout_sec=max(0.0, end - time.monotonic()))
+
+    def speed(self, seconds: float = 1.5) -> float:
+        """Mean speed along x over the last seconds of the robot's clock [m/s]."""
+        if not self.poses:
+            return nan
+        end, x, _ = self.poses[-1]
+        then, before = next((t, p) for t, p, _ in self.poses if t >= end - seconds)
+        return (x - before) / (end - then) if end > then else nan
+
+    def publish(self, name: str, message: Any) -> None:
+        """Publish a message, or its bytes, with the suite's own quality of service."""
+        if name not in self._writers:
+            topic = interface(name)
+            self._writers[name] = self.create_publisher(
+                topic.type, topic.name, topic.publisher_qos)
+            self.spin(0.3)
+        with suppress(rclpy_implementation.RCLError):  # bytes that this middleware does not send
+            self._writers[name].publish(message)
+
+    def leave(self) -> None:
+        """Destroy all publishers."""
+        for publisher in self._writers.values():
+            self.destroy_publisher(publisher)
+        self._writers = {}
+
+    def repeat(self, seconds: float, rate: float, act: Callable[[], object]) -> None:
+        """Do something at a rate [Hz], and listen in between."""
+        begin, count = time.monotonic(), 0
+        while time.monotonic() < begin + seconds:
+            act()
+            count += 1
+            ahead = begin + count / rate - time.monotonic()
+            if ahead > 0.0:
+                self.spin(ahead)
+            elif count % 20 == 0:
+                self.executor_.spin_once(timeout_sec=0.0)
+
+    def message(self, name: str) -> Any:
+        """The last message of a topic."""
+        return deserialize_message(self.last[name], interface(name).type)
+
+    def changed(self, name: str, change: Callable[[Any], None]) -> None:
+        """Publish the last message of a topic, changed."""
+        if name in self.last:
+            message = self.message(name)
+            change(message)
+            self.publish(name, message)
+
+    def stamp_ns(self) -> int:
+        """Stamp of the last canonical state [ns]."""
+        stamp = self.message('canonical_state').header.stamp
+        return int(stamp.sec * 10**9 + stamp.nanosec)
+
+    def stamped(self, name: str, stamp_ns: int) -> None:
+        """Publish the last message of a topic with another stamp."""
+        self.changed(name, lambda message: set_stamp(message.header.stamp, stamp_ns))
+
+    def call(self, kind: Any, name: str, requests: Sequence[Any], rate: float) -> None:
+        """Send requests to a service at a rate and do not wait for the answers."""
+        client = self.create_client(kind, name)
+        client.wait_for_service(timeout_sec=2.0)
+        left = list(requests)
+        self.repeat(len(left) / rate, rate, lambda: left and client.call_async(left.pop()))
+        self.spin(0.2)
+        self.destroy_client(client)
+
+
+def _filled(field: str, value: float) -> Callable[[Any], None]:
+    return lambda message: setattr(message, field, [value] * len(getattr(message, field)))
+
+
+def _scaled(field: str, factor: float) -> Callable[[Any], None]:
+    return lambda message: setattr(
+        message, field, (factor * np.array(getattr(message, field))).tolist())
+
+
+def _upside_down(message: Any) -> None:
+    message.linear_acceleration.z = -9.81
+
+
+def _too_fast(message: Any) -> None:
+    message.twist.linear.x = 9e5
+
+
+def _forger(name: str, change: Callable[[Any], None]) -> Callable[[Intruder], None]:
+    return lambda node: node.repeat(ATTACK_S, 250.0, lambda: node.changed(name, change))
+
+
+def _old(name: str) -> Callable[[Intruder], None]:
+    def attack(node: Intruder) -> None:
+        data = node.last[name]
+        node.repeat(ATTACK_S, 250.0, lambda: node.publish(name, data))
+
+    return attack
+
+
+def _flood(name: str, make: Callable[[Intruder], bytes]) -> Callable[[Intruder], None]:
+    def attack(node: Intruder) -> None:
+        data = make(node)
+        node.repeat(2.0 * ATTACK_S, 1e9, lambda: node.publish(name, data))
+
+    return attack
+
+
+def _newest(name: str, node: Intruder) -> bytes:
+    return node.last[name]
+
+
+def _garbage(node: Intruder) -> bytes:
+    return b'\x00\x01\x00\x00' + node.draw.randbytes(300)
+
+
+def _stamps(name: str) -> Callable[[Intruder], None]:
+    def attack(node: Intruder) -> None:
+        for stamp_ns in (10**12, 0, 2_147_483_000 * 10**9, 10**10):
+            node.stamped(name, stamp_ns)
+            node.spin(0.3)
+
+    return attack
+
+
+def _bytes_on_all(node: Intruder) -> None:
+    for topic in OWN:
+        for data in (b'\x00\x00\x00\x00\x01\x02\x03', b'\x00\x01\x00\x00\x01\x02\x03',
+                     _garbage(node), b'\xff\x42' + node.draw.randbytes(200)):
+            node.publish(topic.name, data)
+    node.spin(ATTACK_S)
+
+
+def _mutants(node: Intruder) -> None:
+    def mutant() -> None:
+        name = node.draw.choice(sorted(set(TICKED) & set(node.last)))
+        data = bytearray(node.last[name])
+        for _ in range(node.draw.randrange(1, 6)):
+            data[node.draw.randrange(len(data))] = node.draw.randrange(256)
+        node.publish(name, bytes(data[:node.draw.randrange(4, len(data) + 1)]
+                                 if node.draw.random() < 0.3 else data))
+
+    node.repeat(2.0 * ATTACK_S, 500.0, mutant)
+
+
+def _huge(node: Intruder) -> None:
+    long = JointState(name=[f'{k:09}' for k in range(600_000)])
+    data = serialize_message(long)
+    for _ in range(4):
+        node.publish('canonical_state', data)
+        node.spin(0.3)
+
+
+def _gains(node: Intruder) -> None:
+    for values in ([-1e6] * 4 + [0.3, 1.0, 0.0], [1e300] * 4 + [0.3, 1.0, 0.0],
+                   [400.0] * 4 + [0.3, 1.0, 1.0], [0.0] * 4 + [0.3, 0.0, 0.0]):
+        for stamp_ns in (0, node.stamp_ns()):
+            message = JointState(name=list(GAIN_ROWS), position=values)
+            set_stamp(message.header.stamp, stamp_ns)
+            node.publish('inhibition_gains', message)
+            node.spin(0.2)
+
+
+def _modes(node: Intruder) -> None:
+    for mode in ('damped', 'lying', 'nonsense', ''):
+        node.publish('body_mode', String(data=mode))
+        node.spin(0.3)
+
+    def forge(message: Any) -> None:
+        message.position[-1] = message.velocity[-1] = 3.0
+
+    node.repeat(0.5, 250.0, lambda: node.changed('posture_feedback', forge))
+
+
+def _events(node: Intruder) -> None:
+    publisher = node.create_publisher(
+        ParameterEvent, '/parameter_events', qos_profile_parameter_events)
+    node.spin(0.3)
+    lies = [('gait', ParameterValue(type=4, string_value='nope')),
+            ('gait', ParameterValue(type=4, string_value='trot')),
+            ('gait', ParameterValue(type=77)),
+            ('alpha_r', ParameterValue(type=3, double_value=9.0)),
+            ('rho', ParameterValue(type=3, double_value=1e300)),
+            ('region_radius', ParameterValue(type=3, double_value=1.9))]
+    for owner in ('canonical_oscillators', 'reference_filter', 'inhibition'):
+        for name, value in lies:
+            publisher.publish(ParameterEvent(node=f'/{owner}', changed_parameters=[
+                ParameterMessage(name=name, value=value)]))
+            node.spin(0.02)
+    node.spin(1.0)
+    node.destroy_publisher(publisher)
+
+
+def _transitions(node: Intruder) -> None:
+    valid = (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVE_SHUTDOWN)
+    for name in WALKING_NODES:
+        requests = [ChangeState.Request(transition=Transition(id=number))
+                    for number in (99, 1, 2, 3, 0, 255) if number not in valid]
+        node.call(ChangeState, f'{name}/change_state', requests, 50.0)
+
+
+def _parameters(owner: str, name: str) -> Callable[[Intruder], None]:
+    def attack(node: Intruder) -> None:
+        node.call(SetParameters, f'{owner}/set_parameters', [
+            SetParameters.Request(parameters=[
+                Parameter(name, value=node.draw.uniform(0.5, 0.9)).to_parameter_msg()])
+            for _ in range(2000)], 1000.0)
+
+    return attack
+
+
+def _second_robot(node: Intruder) -> None:
+    robot = subprocess.Popen([sys.executable, '-m', 'dmp_cpg_ros', ROBOT, '--ros-args', '-r',
+                              f'__node:={NAME}'], stderr=subprocess.DEVNULL)
+    node.spin(5.0)
+    robot.send_signal(signal.SIGINT)
+    robot.wait(10.0)
+
+
+ATTACKS: dict[str, Callable[[Intruder], None]] = {
+    'nothing': lambda node: node.spin(ATTACK_S),
+    'bytes that are no message, on all topics': _bytes_on_all,
+    'mutated messages': _mutants,
+    **{f'stamps of {name}': _stamps(name) for name in TICKED},
+    **{f'{name} of long ago': _old(name) for name in TICKED},
+    'joint_targets times 3': _forger('joint_targets', _scaled('position', 3.0)),
+    'canonical_state 1e6': _forger('canonical_state', _filled('position', 9e5)),
+    'canonical_state zero': _forger('canonical_state', _filled('position', 0.0)),
+    'canonical_state backwards': _forger('canonical_state', _scaled('position', -1.0)),
+    'posture_feedback 1e6': _forger('posture_feedback', _filled('effort', 9e5)),
+    'imu upside down': _forger('imu', _upside_down),
+    'reference 9e5 m/s': _forger('reference', _too_fast),
+    'foot_contacts zero': _forger('foot_contacts', _filled('effort', 0.0)),
+    'joint_states zero': _forger('joint_states', _filled('position', 0.0)),
+    'inhibition_gains': _gains,
+    'body_mode': _modes,
+    '10 MB': _huge,
+    **{f'flood of old {name}': _flood(name, partial(_newest, name))
+       for name in ('canonical_state', 'joint_targets', 'joint_states')},
+    **{f'flood of garbage on {name}': _flood(name, _garbage)
+       for name in ('canonical_state', 'joint_targets', 'joint_states')},
+    'parameter events': _events,
+    'transitions': _transitions,
+    '1,000 rho a second': _parameters('canonical_oscillators', 'rho'),
+    '1,000 friction a second': _parameters('posture_control', 'friction'),
+    'second robot': _second_robot,
+}
+"""What the intruder does, by name."""
+
+
+@dataclass
+class Outcome:
+    """What came of an attack; it failed when the robot walked on."""
+
+    attack: str
+    fell: bool
+    speed: float
+    named_s: float
+
+    @property
+    def walked_on(self) -> bool:
+        """Whether the robot walked on as commanded."""
+        return not self.fell and SLOWEST <= self.speed <= FASTEST
+
+
+class Suite:
+    """A walk in real time at ``SPEED``, as processes; started again after a fall."""
+
+    def __init__(self, folder: Path, composed: bool) -> None:
+        """Write the scenario."""
+        self._folder, self._composed, self._runs = folder, composed, 0
+        self._process: subprocess.Popen[bytes] | None = None
+        (folder / 'walk.yaml').write_text(yaml.safe_dump({
+            'name': 'intruder', 'duration': 36000.0,
+            'events': [{'at': 0.5, 'inhibit': False}, {'at': 1.0, 'command': {'v_x': SPEED}}]}),
+            encoding='utf-8')
+
+    def start(self, node: Intruder) -> None:
+        """Walk until the speed is steady; raises DmpCpgError when it does not come up."""
+        self.end()
+        node.poses.clear()
+        node.fell, self._runs = False, self._runs + 1
+        out = self._folder / f'run{self._runs}'
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', 'dmp_cpg_ros.commands.walk', str(self._folder / 'walk.yaml'),
+             '--no-report', '--out', str(out), *(['--composed'] if self._composed else [])],
+            stdout=(self._folder / f'walk{self._runs}.log').open('wb'), stderr=subprocess.STDOUT)
+        end = time.monotonic() + 120.0
+        while not (node.poses and node.poses[-1][0] > 6.0):
+            node.spin(0.2)
+            if time.monotonic() > end or self._process.poll() is not None:
+                said = (self._folder / f'walk{self._runs}.log').read_text(encoding='utf-8')
+                raise DmpCpgError(f'the suite does not walk: {said}')
+
+    def running(self) -> bool:
+        """Whether no node has died."""
+        return self._process is not None and self._process.poll() is None
+
+    def end(self) -> None:
+        """End it."""
+        if self._process is not None:
+            self._process.send_signal(signal.SIGINT)
+            try:
+                self._process.wait(90.0)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+
+
+def attacked(node: Intruder, suite: Suite, name: str) -> Outcome:
+    """Attack and look what comes of it."""
+    node.named, begin = nan, time.monotonic()
+    ATTACKS[name](node)
+    named = node.named
+    node.leave()
+    end_s, deadline = node.poses[-1][0] + RECOVERY_S, time.monotonic() + 10.0 * RECOVERY_S
+    while suite.running() and node.poses[-1][0] < end_s and time.monotonic() < deadline:
+        node.spin(0.1)
+    fell = node.fell or not suite.running() or node.poses[-1][2] < LOWEST
+    return Outcome(name, fell, node.speed(), named - begin)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the study; returns the exit status."""
+    parser = argparse.ArgumentParser(prog='intruder', description=(__doc__ or '').split('\n')[0])
+    parser.add_argument('--duration', type=float, default=60.0, metavar='S',
+                        help='time of attacks [s]; each is tried once before any is tried again')
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--composed', action='store_true', help='all nodes in one process')
+    parser.add_argument('--attacks', nargs='+', metavar='NAME', default=list(ATTACKS),
+                        help=f'those whose names hold these words, of {"; ".join(ATTACKS)}')
+    options = parser.parse_args(arguments)
+    names = [name for name in ATTACKS if any(word in name for word in options.attacks)]
+    if not names:
+        parser.error(f'no attack is named so; valid are {"; ".join(ATTACKS)}')
+    prepare_middleware()
+    rclpy.init()
+    node, outcomes = Intruder(options.seed), list[Outcome]()
+    with tempfile.TemporaryDirectory(prefix='intruder') as folder:
+        suite = Suite(Path(folder), options.composed)
+        try:
+            suite.start(node)
+            end, left = time.monotonic() + options.duration, list[str]()
+            while time.monotonic() < end:
+                left = left or node.draw.sample(names, len(names))
+                outcomes.append(attacked(node, suite, left.pop()))
+                print(outcomes[-1], flush=True)
+                if not outcomes[-1].walked_on:
+                    suite.start(node)
+        finally:
+            suite.end()
+            rclpy.try_shutdown()
+    print(table(outcomes))
+    return int(not all(outcome.walked_on for outcome in outcomes))
+
+
+def table(outcomes: Sequence[Outcome]) -> str:
+    """Markdown table by attack."""
+    rows = []
+    for name in ATTACKS:
+        of = [outcome for outcome in outcomes if outcome.attack == name]
+        if of:
+            late = max(outcome.named_s for outcome in of)
+            rows.append((name, str(len(of)), str(sum(outcome.fell for outcome in of)),
+                         str(sum(not outcome.walked_on for outcome in of)),
+                         '-' if late != late else f'{late:.1f} s'))
+    return markdown_table(('attack', 'times', 'falls', 'did not walk on', 'named within'), rows)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,102 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A topic's writer is known by the numbers of its messages; nobody else is taken for it."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from dmp_cpg_ros.nodes.framework.writers import LOST, REMEMBERED_NS, SILENT_NS, WriterWatch
+
+TICK_NS = 4_000_000
+KNOWN = 600
+"""Messages after which the writer is known well."""
+
+
+def watched(*, alone: bool = True, ticked: bool = True, known: int = KNOWN) -> WriterWatch:
+    """A watch that has heard so many messages of its writer, the last at that tick."""
+    watch = WriterWatch(lambda: alone or not watch.known, ticked=ticked)
+    assert all(watch.admits(k, k * TICK_NS, k * TICK_NS) for k in range(1, known + 1))
+    return watch
+
+
+@given(st.lists(st.tuples(st.integers(1, 60), st.integers(0, 60), st.sampled_from((0.1, 1, 9))),
+                max_size=50))
+def test_a_lone_writer_may_lose_messages_and_ticks_and_stall(
+        steps: list[tuple[int, int, float]]) -> None:
+    watch, number, stamp, now = watched(), KNOWN, KNOWN * TICK_NS, KNOWN * TICK_NS
+    for messages, ticks, pace in steps:
+        number += messages
+        stamp += (messages + ticks) * TICK_NS
+        now += round(pace * (messages + ticks) * TICK_NS)
+        assert watch.admits(number, stamp, now)
+
+
+@pytest.mark.parametrize('stall', [1, 5, LOST])
+def test_messages_may_be_lost_while_the_tick_is_learned(stall: int) -> None:
+    watch = WriterWatch(lambda: not watch.known)
+    for number in (1, 2, 2 + stall, *range(3 + stall, 200)):
+        assert watch.admits(number, number * TICK_NS, number * TICK_NS)
+
+
+@settings(deadline=None)
+@given(st.integers(1, 2000), st.sampled_from((0.004, 0.1, 0.9, 1.0, 1.1, 2.0, 10.0, 80.0)),
+       st.integers(-500, 3), st.integers(0, 2**32), st.sampled_from((0.0, 0.05, 0.5)))
+def test_a_stranger_is_not_taken_for_the_writer(
+        first: int, rate: float, late: int, seed: int, lost: float) -> None:
+    """Some messages at each tick, with stamps of long ago to a little ahead of now."""
+    watch, draw = watched(alone=False), random.Random(seed)
+    assume(rate != 1.0 or abs(first - KNOWN) > 3)  # as many messages as the writer's, always
+    heard: Counter[str] = Counter()
+    events = [(float(k), 'writer', k, k) for k in range(KNOWN + 1, KNOWN + 500)]
+    events += [(KNOWN + 0.5 + k / rate, 'stranger', first + k, late)
+               for k in range(round(rate * 498.0)) if draw.random() >= lost]
+    for time, who, number, tick in sorted(events):
+        stamp = (int(time) + tick if who == 'stranger' else tick) * TICK_NS
+        heard[who] += watch.admits(number, stamp, round(time * TICK_NS))
+    assert heard['stranger'] <= 12
+    assert heard['writer'] >= 499 - 30
+    if heard['stranger'] < round(rate * 498.0 * (1.0 - lost)):
+        assert watch.has_strangers(watch._heard_ns)
+
+
+def test_nobody_takes_over_from_a_writer_that_sends() -> None:
+    watch = watched()
+    for k in range(1, 250):
+        now = (KNOWN + k) * TICK_NS
+        assert watch.admits(KNOWN + k, now, now)
+        assert not watch.admits(k, now, now + 1000)
+        assert watch.has_strangers(now + 1000)
+    assert not watch.has_strangers(now + REMEMBERED_NS + 1000)
+
+
+@pytest.mark.parametrize('first', [1, 300, 5000])
+@pytest.mark.parametrize('stamp', [0, TICK_NS * KNOWN, 10**15])
+def test_a_writer_that_was_started_again_takes_over(first: int, stamp: int) -> None:
+    watch, again = watched(), KNOWN * TICK_NS + SILENT_NS + TICK_NS
+    for k in range(10):
+        assert watch.admits(first + k, stamp + k * TICK_NS, again + k * TICK_NS)
+
+
+def test_a_stranger_does_not_take_over_while_it_is_in_the_graph() -> None:
+    watch = watched(alone=False)
+    for k in range(1, KNOWN):
+        assert not watch.admits(k, (KNOWN + k) * TICK_NS, (KNOWN + k) * TICK_NS)
+
+
+@pytest.mark.parametrize('first', [1, 2, 3])
+def test_a_stranger_on_a_topic_of_changes_is_told_from_its_writer(first: int) -> None:
+    """The writer has sent four messages, and sends the fifth after many of the stranger."""
+    watch = watched(alone=False, ticked=False, known=4)
+    for k in range(first, 50):
+        assert not watch.admits(k, 0, 10 * SILENT_NS + k)
+    assert watch.admits(5, 0, 20 * SILENT_NS)
+
+
+def test_without_numbers_everybody_is_heard() -> None:
+    assert WriterWatch(lambda: False).admits(None, 0, 0)
