@@ -118,7 +118,7 @@ class Intruder(Node):  # type: ignore[misc]
         for status in report.status:
             if NAME in status.message and self.named != self.named:
                 self.named = time.monotonic()
-            self.fell |= any(entry.key == 'fell' and entry.value == 'true'
+            self.fell |= status.name == ROBOT and any(entry.key == 'fell' and entry.value == 'true'
                              for entry in status.values)
 
     def spin(self, seconds: float) -> None:
@@ -402,6 +402,7 @@ class Suite:
     def start(self, node: Intruder) -> None:
         """Walk until the speed is steady; raises DmpCpgError when it does not come up."""
         self.end()
+        node.spin(0.5)
         node.poses.clear()
         node.fell, self._runs = False, self._runs + 1
         out = self._folder / f'run{self._runs}'

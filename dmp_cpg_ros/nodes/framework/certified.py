@@ -61,8 +61,9 @@ had to be started again, is known after this time.
 class ParameterFollower:
     """Lets a node follow what the owners of parameters have accepted.
 
-    Owners announce changes on ``/parameter_events``; they are also asked now and then. What the
-    node refuses is counted as dropped.
+    What ``/parameter_events`` tells anybody can have said, so news make the node ask the owner,
+    and so does time that has passed. False news, and answers that the node refuses, are counted
+    as dropped.
     """
 
     def __init__(self, node: SuiteNode) -> None:
@@ -78,6 +79,7 @@ class ParameterFollower:
         self._askers = {owner: node.create_client(GetParameters, f'{owner}/get_parameters')
                         for owner in self._names}
         self._pending: dict[str, Future] = {}
+        self._claimed: dict[str, dict[str, Any]] = {}
         self._timer = node.create_steady_timer(ASK_EVERY_S, self._ask)
 
     def end(self) -> None:
@@ -90,18 +92,26 @@ class ParameterFollower:
     def _on_event(self, data: bytes) -> None:
         event: ParameterEvent = self._read(data)
         owner = self._owners.get(event.node)
-        if owner is not None:
-            self._tell(owner, {entry.name: entry.value for entry in (
-                *event.new_parameters, *event.changed_parameters)})
+        if owner is None:
+            return
+        told = self._plain(owner, {entry.name: entry.value for entry in (
+            *event.new_parameters, *event.changed_parameters)})
+        if not told:
+            return
+        if not self._askers[owner].service_is_ready():
+            raise DataError(f'{told} is said to be changed by {owner}, which does not answer')
+        asked = self._pending.get(owner)
+        self._claimed[owner] = told
+        if asked is None or asked.done():  # else it asks again when the answer is there
+            self._ask_owner(owner)
 
-    def _tell(self, owner: str, values: Mapping[str, ParameterValue]) -> None:
+    def _plain(self, owner: str, values: Mapping[str, ParameterValue]) -> dict[str, Any]:
+        """Values of the owner's parameters that are followed; raises DataError."""
         try:
-            told = {name: plain(parameter_value_to_python(value))
+            return {name: plain(parameter_value_to_python(value))
                     for name, value in values.items() if name in self._names[owner]}
         except RuntimeError as error:
             raise DataError(f'a value of {owner} cannot be read: {error}') from None
-        if told:
-            self._node.follow(told)
 
     def _ask(self) -> None:
         for owner, client in self._askers.items():
@@ -109,15 +119,27 @@ class ParameterFollower:
             if former is not None and not former.done():
                 client.remove_pending_request(former)
             if client.service_is_ready():
-                future = client.call_async(GetParameters.Request(names=self._names[owner]))
-                self._pending[owner] = future
-                future.add_done_callback(self._node.guarded(
-                    f'{owner}/get_parameters', partial(self._answered, owner)))
+                self._ask_owner(owner)
 
-    def _answered(self, owner: str, future: Future) -> None:
+    def _ask_owner(self, owner: str) -> None:
+        claimed = self._claimed.pop(owner, {})
+        future = self._askers[owner].call_async(
+            GetParameters.Request(names=self._names[owner]))
+        self._pending[owner] = future
+        future.add_done_callback(self._node.guarded(
+            f'{owner}/get_parameters', partial(self._answered, owner, claimed)))
+
+    def _answered(self, owner: str, claimed: Mapping[str, Any], future: Future) -> None:
         answer, names = future.result(), self._names[owner]
-        if answer is not None and len(answer.values) == len(names):
-            self._tell(owner, dict(zip(names, answer.values, strict=True)))
+        if answer is None or len(answer.values) != len(names):
+            return
+        told = self._plain(owner, dict(zip(names, answer.values, strict=True)))
+        if owner in self._claimed:
+            self._ask_owner(owner)
+        if not self._node.follow(told) and any(
+                told[name] != value for name, value in claimed.items()):
+            self._node.drop('/parameter_events', DataError(
+                f'{dict(claimed)} is said to be changed by {owner}, which has not'))
 
 
 class Acting(NamedTuple):

@@ -10,10 +10,13 @@ rclpy's own ones included, therefore calls through :meth:`GuardedLifecycleNode.g
 from __future__ import annotations
 
 import contextlib
+import time
 import traceback
 from collections.abc import Callable
 from typing import Any, ClassVar
 
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.clock import Clock, ClockType
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
@@ -23,6 +26,11 @@ from rclpy.timer import Timer
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.nodes.framework.health import NodeHealth
+
+MOST_CHANGES, CHANGES_PER_S = 100, 10
+"""Changes of parameters that are looked at at a time, and that are allowed again each second: to
+judge one can take longer than a tick.
+"""
 
 
 class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
@@ -57,6 +65,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
     def __init__(self, name: str, **options: Any) -> None:
         """Create the node, unconfigured."""
         self._traced: set[tuple[str, type[Exception]]] = set()
+        self._changes = float(MOST_CHANGES), time.monotonic()
         self.active = self.configured = False
         self.state_label = 'unconfigured'
         self.failure: Exception | None = None
@@ -185,7 +194,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
             except self.ENDS_WITH:
                 raise
             except Exception as error:  # noqa: BLE001 - whatever it is, the node goes on
-                text = self._drop(name, error)
+                text = self.drop(name, error)
                 answer: Any = arguments[-1] if arguments else None
                 if hasattr(answer, 'success'):
                     answer.success = False
@@ -203,9 +212,32 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable[..., Any],
                        *arguments: Any, **options: Any) -> Service:
-        """Create a service with a guarded callback."""
+        """Create a service with a guarded callback; one of parameters is not asked too often."""
+        if srv_type in (SetParameters, SetParametersAtomically):
+            callback = self._limited(callback)
         return super().create_service(
             srv_type, srv_name, self.guarded(srv_name, callback), *arguments, **options)
+
+    def _limited(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+        """Refuse changes of parameters that come so fast that ticks would starve."""
+        def answer(request: Any, response: Any) -> Any:
+            count, now = len(request.parameters), time.monotonic()
+            allowance, then = self._changes
+            allowance = min(MOST_CHANGES, allowance + CHANGES_PER_S * (now - then))
+            self._changes = max(0.0, allowance - count), now
+            if count <= allowance:
+                return callback(request, response)
+            refusal = SetParametersResult(successful=False, reason=(
+                f'too many changes of parameters: {MOST_CHANGES} at a time and '
+                f'{CHANGES_PER_S} a second are looked at'))
+            self.health.reject('set_parameters', refusal.reason)
+            if hasattr(response, 'results'):
+                response.results = [refusal] * min(count, MOST_CHANGES)
+            else:
+                response.result = refusal
+            return response
+
+        return answer
 
     def create_timer(self, timer_period_sec: float, callback: Callable[..., Any],
                      *arguments: Any, **options: Any) -> Timer:
@@ -235,7 +267,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
 
         service.callback = self.guarded('change_state', answer)
 
-    def _drop(self, name: str, error: Exception) -> str:
+    def drop(self, name: str, error: Exception) -> str:
         """Count, log now and then, and report; returns the reason."""
         expected, kind = isinstance(error, DmpCpgError), (name, type(error))
         reason = str(error) if expected else f'{type(error).__name__}: {error}'

@@ -47,6 +47,9 @@ from dmp_cpg_ros.suite_table import KINDS
 LOOK_EVERY_S = 0.2
 """How often the graph is asked for the publishers of a topic at most [s]."""
 
+STALE_NS = 250_000_000
+"""In real time: age from which messages of ticks are not worth being worked through [ns]."""
+
 P = TypeVar('P', bound=Parameters)
 Readers = Mapping[str, Callable[[Any], Any]]
 
@@ -165,8 +168,8 @@ class SuiteNode(GuardedLifecycleNode):
         if self.parameters_of(parameters.NodeParameters).autostart:
             super().start()
 
-    def follow(self, values: Mapping[str, Any]) -> None:
-        """Take over what the owner of some parameters has accepted, where it is new.
+    def follow(self, values: Mapping[str, Any]) -> bool:
+        """Take over what the owner of some parameters has accepted; returns whether it is new.
 
         Raises
         ------
@@ -177,7 +180,7 @@ class SuiteNode(GuardedLifecycleNode):
         news = {name: value for name, value in values.items()
                 if name in known and value != parameters.plain(known[name])}
         if not news:
-            return
+            return False
         self.following = True
         try:
             result = self.set_parameters_atomically(
@@ -186,6 +189,7 @@ class SuiteNode(GuardedLifecycleNode):
             self.following = False
         if not result.successful:
             raise DataError(f'cannot follow {news}: {result.reason}')
+        return True
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters; read-only ones may be set to the value that they have.
@@ -311,25 +315,28 @@ class SuiteNode(GuardedLifecycleNode):
         """
         several = expected_count(topic.publishers) > 1
         ticked, latched = hasattr(topic.type(), 'header') and not topic.latched, topic.latched
-        watches = {leg: WriterWatch(partial(self._none_but_writers, topic), ticked=ticked)
-                   for leg in (LEGS if several else ('',))}
-        self._writers[topic.name] = list(watches.values())
-        only = None if several else watches['']
+        by_leg = {leg: WriterWatch(partial(self._none_but_writers, topic), ticked=ticked)
+                  for leg in (LEGS if several else ('',))}
+        only, watches, lock_step = by_leg.get(''), list(by_leg.values()), self.lock_step
+        self._writers[topic.name] = watches
 
         def receive(data: Any, information: Any = None) -> None:
             if not (self.active or latched):
                 return
             if information is None:  # the events executor hands both over as one
                 data, information = data
+            number, now_ns = (information['publication_sequence_number'],
+                              information['received_timestamp'])
             stamp_ns = serialized_stamp(data) if ticked else 0
-            watch, message = only, cast(Any, None)
-            if watch is None or not watch.known:
-                message = read(data)
-            if watch is None:
-                watch = watches.get((message.name or ('',))[0].partition('_')[0])
-            if watch is None or watch.admits(information['publication_sequence_number'], stamp_ns,
-                                             information['received_timestamp']):
-                callback(read(data) if message is None else message)
+            if not any(watch.may_admit(number, stamp_ns, now_ns) for watch in watches):
+                self._refuse_writer(topic)
+                return
+            if ticked and not lock_step and time.time_ns() > now_ns + STALE_NS:
+                return
+            message = read(data)  # only what can be read makes its sender the writer
+            watch = only or by_leg.get((message.name or ('',))[0].partition('_')[0])
+            if watch is None or watch.admits(number, stamp_ns, now_ns):  # no leg: it is refused
+                callback(message)
             else:
                 self._refuse_writer(topic)
 

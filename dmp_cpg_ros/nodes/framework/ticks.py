@@ -16,7 +16,7 @@ TickCallback = Callable[[int, dict[str, Any]], None]
 RESET_NS = 100_000_000
 """A stamp that lies this far behind the last tick is of a robot that was reset, or false [ns]."""
 
-AHEAD_NS = 1_000_000_000
+AHEAD_NS = 2_000_000_000
 """A stamp that lies further ahead of the last tick is of a clock that was set, or false [ns]."""
 
 CONFIRMED = 3

@@ -69,7 +69,11 @@ class WriterWatch:
         now_ns : int
             Time of its reception [ns].
         """
-        if number is None or self._continues(number - self._last, stamp_ns - self._stamp_ns):
+        ahead, passed_ns = (number or 0) - self._last, stamp_ns - self._stamp_ns
+        if number is None or self._continues(ahead, passed_ns):
+            if self._learned < LEARNING and ahead > 0:
+                self._learned += 1
+                self._tick_ns = min(self._tick_ns or passed_ns, passed_ns // ahead)
             self._last, self._stamp_ns, self._heard_ns = number or 0, stamp_ns, now_ns
             return True
         silent = now_ns - self._heard_ns > SILENT_NS
@@ -84,6 +88,11 @@ class WriterWatch:
         """Whether the topic has had a writer."""
         return self._last > 0
 
+    def may_admit(self, number: int | None, stamp_ns: int, now_ns: int) -> bool:
+        """Whether :meth:`admits` can be true: False for most of what is not the writer's."""
+        return (number is None or now_ns - self._heard_ns > SILENT_NS
+                or self._continues(number - self._last, stamp_ns - self._stamp_ns))
+
     def has_strangers(self, now_ns: int) -> bool:
         """Whether strangers have been heard lately."""
         return now_ns - self._stranger_ns < REMEMBERED_NS
@@ -96,9 +105,5 @@ class WriterWatch:
             return self._last + ahead != self._stranger + 1 and (
                 ahead == 1 or (ahead <= LOST and self._may_take_over()))
         if self._learned < LEARNING:
-            if ahead > LOST or passed_ns < ahead * SHORTEST_TICK_NS:
-                return False
-            self._learned += 1
-            self._tick_ns = min(self._tick_ns or passed_ns, passed_ns // ahead)
-            return True
+            return ahead <= LOST and passed_ns >= ahead * SHORTEST_TICK_NS
         return ahead * self._tick_ns <= passed_ns

@@ -10,8 +10,10 @@ their oldest message when a reader hangs.
 
 Depths. A publisher keeps ``PUBLISHER_DEPTH`` messages, because that is what can still be sent
 again to a reader that was not scheduled for a while (the recorder is on no tick's path and may
-lag). The suite's nodes are never more than two ticks apart in lock-step; their depth bounds how
-far a late node works through old ticks in real time.
+lag). The suite's nodes are never more than two ticks apart in lock-step. A reader's queue is one
+for all publishers, so it is deep enough that a stranger who floods a topic does not push out the
+messages of its writer between two looks; how far a late node works through old ticks in real time,
+their age bounds.
 """
 
 from __future__ import annotations
@@ -38,8 +40,8 @@ PUBLISHER_DEPTH = 2000
 """Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the
 period of 3 s at which Fast DDS tells readers what they have missed."""
 
-READER_DEPTH = 10
-"""Messages of one publisher that a node of the suite queues."""
+READER_DEPTH = 250
+"""Messages that a node of the suite queues for each of a topic's writers."""
 
 RECORDER_DEPTH = 8000
 """Messages per topic that the recorder queues."""
