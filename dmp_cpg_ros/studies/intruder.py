@@ -102,7 +102,7 @@ class Intruder(Node):  # type: ignore[misc]
         for topic in OWN:
             self.create_subscription(
                 topic.type, topic.name, lambda data, topic=topic: self._hear(topic, data),
-                topic.reader_qos, raw=True)
+                10, raw=True)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_report, 100)
 
     def _hear(self, topic: Interface, data: bytes) -> None:
@@ -402,17 +402,17 @@ class Suite:
     def start(self, node: Intruder) -> None:
         """Walk until the speed is steady; raises DmpCpgError when it does not come up."""
         self.end()
-        node.spin(0.5)
-        node.poses.clear()
-        node.fell, self._runs = False, self._runs + 1
+        self._runs, begun = self._runs + 1, False
         out = self._folder / f'run{self._runs}'
         self._process = subprocess.Popen(
             [sys.executable, '-m', 'dmp_cpg_ros.commands.walk', str(self._folder / 'walk.yaml'),
              '--no-report', '--out', str(out), *(['--composed'] if self._composed else [])],
             stdout=(self._folder / f'walk{self._runs}.log').open('wb'), stderr=subprocess.STDOUT)
         end = time.monotonic() + 120.0
-        while not (node.poses and node.poses[-1][0] > 6.0):
+        while not (begun and node.poses[-1][0] > 6.0):
             node.spin(0.2)
+            if not begun and node.poses and node.poses[-1][0] < 5.0:  # nothing of the last run
+                begun, node.fell, node.poses = True, False, node.poses[-1:]
             if time.monotonic() > end or self._process.poll() is not None:
                 said = (self._folder / f'walk{self._runs}.log').read_text(encoding='utf-8')
                 raise DmpCpgError(f'the suite does not walk: {said}')
@@ -451,6 +451,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         help='time of attacks [s]; each is tried once before any is tried again')
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--composed', action='store_true', help='all nodes in one process')
+    parser.add_argument('--out', type=Path, metavar='DIR', help='keep the runs in an old folder')
     parser.add_argument('--attacks', nargs='+', metavar='NAME', default=list(ATTACKS),
                         help=f'those whose names hold these words, of {"; ".join(ATTACKS)}')
     options = parser.parse_args(arguments)
@@ -461,7 +462,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rclpy.init()
     node, outcomes = Intruder(options.seed), list[Outcome]()
     with tempfile.TemporaryDirectory(prefix='intruder') as folder:
-        suite = Suite(Path(folder), options.composed)
+        suite = Suite(options.out or Path(folder), options.composed)
         try:
             suite.start(node)
             end, left = time.monotonic() + options.duration, list[str]()

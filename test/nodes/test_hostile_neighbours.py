@@ -8,6 +8,7 @@ import contextlib
 import math
 import random
 import signal
+import time
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.serialization import serialize_message
@@ -45,6 +47,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import LARGEST_FORCE
 from dmp_cpg_ros.nodes.framework import certified
 from dmp_cpg_ros.nodes.framework.gaits import follow_gait, known_gaits
+from dmp_cpg_ros.nodes.framework.writers import SILENT_NS
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.conversions import read_push_force
@@ -210,6 +213,127 @@ def test_every_false_news_of_parameters_is_counted(ros: Ros) -> None:
     node.close()
     ros.executor.remove_node(node)
     node.destroy_node()
+
+
+@pytest.fixture
+def follower(ros: Ros) -> Any:
+    """A reference filter in this process."""
+    node = ReferenceFilter('follower', context=ros.context)
+    node.start()
+    ros.executor.add_node(node)
+    yield node
+    node.close()
+    ros.executor.remove_node(node)
+    node.destroy_node()
+
+
+def test_news_that_the_owner_has_not_told_change_nothing(ros: Ros, follower: Any) -> None:
+    """The follower asks the owner, which has another gait than the news say."""
+    gait = 'amble'
+
+    def answer(request: Any, response: Any) -> Any:
+        response.values = [
+            ParameterValue(type=4, string_value=gait) if name == 'gait'
+            else follower.get_parameter(name).get_parameter_value() for name in request.names]
+        return response
+
+    ros.node.create_service(GetParameters, 'canonical_oscillators/get_parameters', answer)
+    publisher = ros.node.create_publisher(
+        ParameterEvent, '/parameter_events', qos_profile_parameter_events)
+    ros.spin_until(lambda: publisher.get_subscription_count() > 0)
+    news = ParameterEvent(node='/canonical_oscillators', changed_parameters=[
+        ParameterMessage(name='gait', value=ParameterValue(type=4, string_value='trot'))])
+
+    def told() -> bool:
+        publisher.publish(news)
+        return bool(follower.health.rejected.get('/parameter_events', 0) > 1)
+
+    ros.spin_until(told)
+    assert follower.get_parameter('gait').value == 'amble'
+    gait = 'trot'  # now they are true
+
+    def followed() -> bool:
+        publisher.publish(news)
+        return bool(follower.get_parameter('gait').value == 'trot')
+
+    ros.spin_until(followed)
+
+
+def test_parameter_requests_without_end_are_not_all_looked_at(ros: Ros, follower: Any) -> None:
+    looked_at = []
+    follower.check_parameters = looked_at.append
+    client = ros.node.create_client(SetParameters, 'follower/set_parameters')
+    ros.spin_until(client.service_is_ready)
+    answers = [client.call_async(SetParameters.Request(parameters=[
+        Parameter('rho', value=0.5 + 0.001 * k).to_parameter_msg()])) for k in range(5)]
+    ros.spin_until(lambda: all(answer.done() for answer in answers))
+    many = SetParameters.Request(parameters=[
+        Parameter('max_speed', value=1.0).to_parameter_msg()] * 1000)
+    answer = ros.call(SetParameters, 'follower/set_parameters', many)
+    assert not answer.results[0].successful and 'too many' in answer.results[0].reason
+    assert len(answer.results) < 1000
+    assert len(looked_at) <= 5
+    assert follower.health.rejected['set_parameters'] >= 1
+
+
+def test_a_topic_has_one_writer(ros: Ros, follower: Any) -> None:
+    """The robot is heard, a second writer is refused and named, and a new robot takes over."""
+    topic = interface('joint_states')
+    ticks: list[int] = []
+    follower.on_tick = lambda stamp_ns, values: ticks.append(stamp_ns // 4_000_000)
+    nodes = {name: Node(name, context=ros.context) for name in ('mujoco_robot', 'intruder')}
+    writers = {name: node.create_publisher(topic.type, topic.name, topic.publisher_qos)
+               for name, node in nodes.items() if name == 'mujoco_robot'}
+    sent = dict.fromkeys(nodes, 0)
+
+    def send(name: str, tick: int) -> None:
+        writers[name].publish(still(topic, 4_000_000 * tick))
+        sent[name] += 1
+
+    def heard(count: int) -> None:
+        ros.spin_until(lambda: len(ticks) + follower.health.rejected.get('joint_states', 0)
+                       >= count, what=lambda: f'{ticks} {follower.health.rejected}')
+
+    ros.spin_until(lambda: writers['mujoco_robot'].get_subscription_count() > 0)
+    for tick in range(100, 200):
+        send('mujoco_robot', tick)
+        heard(sent['mujoco_robot'])
+    writers['intruder'] = nodes['intruder'].create_publisher(
+        topic.type, topic.name, topic.publisher_qos)
+    ros.spin_until(lambda: writers['intruder'].get_subscription_count() > 0)
+    for tick in range(200, 220):
+        send('intruder', tick)
+        heard(sum(sent.values()))
+        send('mujoco_robot', tick)
+        heard(sum(sent.values()))
+    assert ticks == list(range(100, 220))
+    assert follower.health.rejected['joint_states'] == 20
+    problem = follower.health.status('', {}, periodic=False).status[0].message
+    assert 'joint_states is published by /intruder too' in problem
+    # The robot is gone: the intruder does not take over, and when it is gone a new robot does.
+    nodes['mujoco_robot'].destroy_node()
+    silent_ns = time.time_ns() + 2 * SILENT_NS
+    ros.spin_until(lambda: time.time_ns() > silent_ns)
+    for tick in range(220, 230):
+        send('intruder', tick)
+        heard(sum(sent.values()))
+    assert ticks[-1] == 219
+    nodes['intruder'].destroy_node()
+    nodes['mujoco_robot'] = robot = Node('mujoco_robot', context=ros.context)
+    writers['mujoco_robot'] = robot.create_publisher(topic.type, topic.name, topic.publisher_qos)
+    ros.spin_until(lambda: writers['mujoco_robot'].get_subscription_count() > 0)
+    tick = 0
+
+    def taken_over() -> bool:
+        nonlocal tick
+        tick += 1
+        send('mujoco_robot', tick)
+        heard(sum(sent.values()))
+        return 219 not in ticks[-1:]
+
+    ros.spin_until(taken_over)
+    assert ticks[-1] == tick
+    robot.destroy_node()
 
 
 def test_a_false_answer_about_parameters_is_refused(

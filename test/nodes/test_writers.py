@@ -33,7 +33,7 @@ def test_a_lone_writer_may_lose_messages_and_ticks_and_stall(
     for messages, ticks, pace in steps:
         number += messages
         stamp += (messages + ticks) * TICK_NS
-        now += round(pace * (messages + ticks) * TICK_NS)
+        now += round(max(pace * (messages + ticks), 0.25 * (messages + ticks - 50)) * TICK_NS)
         assert watch.admits(number, stamp, now)
 
 
@@ -96,6 +96,16 @@ def test_a_stranger_on_a_topic_of_changes_is_told_from_its_writer(first: int) ->
     for k in range(first, 50):
         assert not watch.admits(k, 0, 10 * SILENT_NS + k)
     assert watch.admits(5, 0, 20 * SILENT_NS)
+
+
+def test_in_lock_step_the_writer_does_not_keep_to_the_clock() -> None:
+    draw = random.Random(3)
+    watch, now = WriterWatch(lambda: not watch.known, lock_step=True), 0
+    for number in range(1, 1000):
+        now += draw.choice((1, 10**6, 10**10))
+        assert watch.admits(number, number * TICK_NS, now)
+        if number > 500:
+            assert not watch.admits(number - 500, number * TICK_NS, now)
 
 
 def test_without_numbers_everybody_is_heard() -> None:

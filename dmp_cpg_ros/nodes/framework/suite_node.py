@@ -110,6 +110,7 @@ class SuiteNode(GuardedLifecycleNode):
         self._inputs: list[tuple[Interface, Subscription]] = []
         self._writers: dict[str, list[WriterWatch]] = {}
         self._looked: dict[str, tuple[float, bool]] = {}
+        self._own_writers: set[str] = set()
         topic, ready = interface('/diagnostics'), interface('~/ready')
         self._diagnostics = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._outputs: list[tuple[Interface, Publisher]] = [(topic, self._diagnostics)]
@@ -315,9 +316,10 @@ class SuiteNode(GuardedLifecycleNode):
         """
         several = expected_count(topic.publishers) > 1
         ticked, latched = hasattr(topic.type(), 'header') and not topic.latched, topic.latched
-        by_leg = {leg: WriterWatch(partial(self._none_but_writers, topic), ticked=ticked)
+        lock_step, may_take_over = self.lock_step, partial(self._none_but_writers, topic)
+        by_leg = {leg: WriterWatch(may_take_over, ticked=ticked, lock_step=lock_step)
                   for leg in (LEGS if several else ('',))}
-        only, watches, lock_step = by_leg.get(''), list(by_leg.values()), self.lock_step
+        only, watches = by_leg.get(''), list(by_leg.values())
         self._writers[topic.name] = watches
 
         def receive(data: Any, information: Any = None) -> None:
@@ -343,14 +345,19 @@ class SuiteNode(GuardedLifecycleNode):
         return receive
 
     def _strangers(self, topic: Interface) -> list[str]:
-        """Names of nodes that publish a topic and should not, where there are too many."""
+        """Names of nodes that publish a topic and should not.
+
+        A driver of another name may stand for the suite's node where that has not been there.
+        """
         ends = self.get_publishers_info_by_topic(self.resolve_topic_name(topic.name))
-        if len(ends) <= expected_count(topic.publishers):
-            return []
-        own = {(name, self.get_namespace().rstrip('/')) for kind in topic.publishers
-               if kind in KINDS for name in KINDS[kind].instances}
-        return sorted({f'{end.node_namespace.rstrip("/")}/{end.node_name}' for end in ends
-                       if (end.node_name, end.node_namespace.rstrip('/')) not in own})
+        space, own = self.get_namespace(), {
+            name for kind in topic.publishers if kind in KINDS for name in KINDS[kind].instances}
+        others = {f'{end.node_namespace.rstrip("/")}/{end.node_name}' for end in ends
+                  if end.node_name not in own or end.node_namespace != space}
+        if ends and not others:
+            self._own_writers.add(topic.name)
+        few = len(ends) <= expected_count(topic.publishers)
+        return [] if few and topic.name not in self._own_writers else sorted(others)
 
     def _none_but_writers(self, topic: Interface) -> bool:
         """Whether the graph knows no strangers; it is not asked at every message."""

@@ -29,6 +29,11 @@ LEARNING = 50
 SHORTEST_TICK_NS = 500_000
 """Stamps of two ticks differ by so much at least [ns]."""
 
+MADE_UP_NS, FASTEST = 200_000_000, 4
+"""In real time: robot's time between two messages beyond that of the clock [ns], and how much
+faster than the clock a robot's time may go.
+"""
+
 LOST = 20
 """Messages in a row that may be lost of a writer that sends on change, or is not known yet."""
 
@@ -42,14 +47,17 @@ class WriterWatch:
         Whether the graph knows nobody who should not write this topic.
     ticked : bool
         Whether the topic has one stamped message for every tick; else one for every change.
+    lock_step : bool
+        Whether no message is lost and robot's time does not keep to the clock.
     """
 
-    __slots__ = ('_heard_ns', '_last', '_learned', '_may_take_over', '_stamp_ns', '_stranger',
-                 '_stranger_ns', '_tick_ns', '_ticked')
+    __slots__ = ('_heard_ns', '_last', '_learned', '_lock_step', '_may_take_over', '_stamp_ns',
+                 '_stranger', '_stranger_ns', '_tick_ns', '_ticked')
 
-    def __init__(self, may_take_over: Callable[[], bool], *, ticked: bool = True) -> None:
+    def __init__(self, may_take_over: Callable[[], bool], *, ticked: bool = True,
+                 lock_step: bool = False) -> None:
         """Know no writer yet."""
-        self._may_take_over, self._ticked = may_take_over, ticked
+        self._may_take_over, self._ticked, self._lock_step = may_take_over, ticked, lock_step
         self._stranger, self._stranger_ns = -1, -REMEMBERED_NS
         self._begin(0, 0, -SILENT_NS)
 
@@ -70,7 +78,7 @@ class WriterWatch:
             Time of its reception [ns].
         """
         ahead, passed_ns = (number or 0) - self._last, stamp_ns - self._stamp_ns
-        if number is None or self._continues(ahead, passed_ns):
+        if number is None or self._continues(ahead, passed_ns, now_ns):
             if self._learned < LEARNING and ahead > 0:
                 self._learned += 1
                 self._tick_ns = min(self._tick_ns or passed_ns, passed_ns // ahead)
@@ -91,13 +99,13 @@ class WriterWatch:
     def may_admit(self, number: int | None, stamp_ns: int, now_ns: int) -> bool:
         """Whether :meth:`admits` can be true: False for most of what is not the writer's."""
         return (number is None or now_ns - self._heard_ns > SILENT_NS
-                or self._continues(number - self._last, stamp_ns - self._stamp_ns))
+                or self._continues(number - self._last, stamp_ns - self._stamp_ns, now_ns))
 
     def has_strangers(self, now_ns: int) -> bool:
         """Whether strangers have been heard lately."""
         return now_ns - self._stranger_ns < REMEMBERED_NS
 
-    def _continues(self, ahead: int, passed_ns: int) -> bool:
+    def _continues(self, ahead: int, passed_ns: int, now_ns: int) -> bool:
         """Whether a message can be the writer's next one, with losses before it perhaps."""
         if ahead < 1 or not self._last:
             return False
@@ -106,4 +114,7 @@ class WriterWatch:
                 ahead == 1 or (ahead <= LOST and self._may_take_over()))
         if self._learned < LEARNING:
             return ahead <= LOST and passed_ns >= ahead * SHORTEST_TICK_NS
-        return ahead * self._tick_ns <= passed_ns
+        if self._lock_step:
+            return ahead == 1 and passed_ns == self._tick_ns
+        return ahead * self._tick_ns <= passed_ns <= (
+            FASTEST * (now_ns - self._heard_ns) + MADE_UP_NS)
