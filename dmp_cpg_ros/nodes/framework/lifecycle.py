@@ -27,10 +27,13 @@ from rclpy.timer import Timer
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.nodes.framework.health import NodeHealth
 
-MOST_CHANGES, CHANGES_PER_S = 100, 10
-"""Changes of parameters that are looked at at a time, and that are allowed again each second: to
-judge one can take longer than a tick.
+CHANGES_S, CHANGES_SHARE = 0.5, 0.1
+"""Processor time that changes of parameters may take at once [s], and in the long run its share:
+to judge one takes longer than a tick.
 """
+
+MOST_CHANGES = 200
+"""Parameters that one request may change."""
 
 
 class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
@@ -65,7 +68,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
     def __init__(self, name: str, **options: Any) -> None:
         """Create the node, unconfigured."""
         self._traced: set[tuple[str, type[Exception]]] = set()
-        self._changes = float(MOST_CHANGES), time.monotonic()
+        self._changes = CHANGES_S, time.monotonic()
         self.active = self.configured = False
         self.state_label = 'unconfigured'
         self.failure: Exception | None = None
@@ -219,20 +222,22 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
             srv_type, srv_name, self.guarded(srv_name, callback), *arguments, **options)
 
     def _limited(self, callback: Callable[..., Any]) -> Callable[..., Any]:
-        """Refuse changes of parameters that come so fast that ticks would starve."""
+        """Refuse changes of parameters when those before took so long that ticks would starve."""
         def answer(request: Any, response: Any) -> Any:
-            count, now = len(request.parameters), time.monotonic()
-            allowance, then = self._changes
-            allowance = min(MOST_CHANGES, allowance + CHANGES_PER_S * (now - then))
-            self._changes = max(0.0, allowance - count), now
-            if count <= allowance:
-                return callback(request, response)
+            begin, (left_s, then) = time.thread_time(), self._changes
+            now = time.monotonic()
+            left_s = min(CHANGES_S, left_s + CHANGES_SHARE * (now - then))
+            if left_s > 0.0 and len(request.parameters) <= MOST_CHANGES:
+                try:
+                    return callback(request, response)
+                finally:
+                    self._changes = left_s - (time.thread_time() - begin), now
+            self._changes = left_s, now
             refusal = SetParametersResult(successful=False, reason=(
-                f'too many changes of parameters: {MOST_CHANGES} at a time and '
-                f'{CHANGES_PER_S} a second are looked at'))
+                'too many changes of parameters; ask again in a few seconds'))
             self.health.reject('set_parameters', refusal.reason)
             if hasattr(response, 'results'):
-                response.results = [refusal] * min(count, MOST_CHANGES)
+                response.results = [refusal] * min(len(request.parameters), MOST_CHANGES)
             else:
                 response.result = refusal
             return response
