@@ -140,6 +140,9 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
     assert payload_digests(blocks / 'bag') == digests
     manifest = json.loads((first / 'manifest.json').read_text(encoding='utf-8'))
     assert manifest['digests'] == digests
+    for run in (first, loaded, composed, blocks):
+        counts = load_recording(run / 'bag').counts
+        assert counts['/inhibition_gains'] == counts['/canonical_state'], run.name
 
     recording, (states, ticks) = load_recording(first / 'bag'), plain_run(scenario)
     assert len(recording.joints.time) == len(ticks) == 1500

@@ -36,6 +36,7 @@ from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
 from dmp_cpg_ros.nodes.framework.writers import WriterWatch
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader, serialized_stamp
 from dmp_cpg_ros.nodes.messages.interfaces import (
+    PUBLISHER_DEPTH,
     Interface,
     expected_count,
     interface,
@@ -157,8 +158,9 @@ class SuiteNode(GuardedLifecycleNode):
 
     @property
     def lock_step(self) -> bool:
-        """Whether ticks wait for all their inputs."""
-        return self.parameters_of(parameters.LockStepParameters).lock_step
+        """Whether ticks wait for all their inputs; the recorder has none."""
+        own = self._sets.get(parameters.LockStepParameters)
+        return own is not None and cast(parameters.LockStepParameters, own).lock_step
 
     def parameters_of(self, parameter_set: type[P]) -> P:
         """Return the values in effect of one parameter set."""
@@ -243,7 +245,10 @@ class SuiteNode(GuardedLifecycleNode):
     def publisher(self, name: str) -> SuitePublisher:
         """Create a publisher of an interface of the table."""
         topic = interface(name)
-        publisher = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
+        qos = topic.publisher_qos
+        if topic.latched and self.lock_step:  # it tells at every tick, and the recorder may lag
+            qos.depth = PUBLISHER_DEPTH
+        publisher = self.create_publisher(topic.type, topic.name, qos)
         self._undo.append(partial(self.destroy_publisher, publisher))
         self._outputs.append((topic, publisher))
         return SuitePublisher(publisher, topic.name, self.local)

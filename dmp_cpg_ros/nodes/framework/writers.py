@@ -116,5 +116,6 @@ class WriterWatch:
             return ahead <= LOST and passed_ns >= ahead * SHORTEST_TICK_NS
         if self._lock_step:
             return ahead == 1 and passed_ns == self._tick_ns
+        # A clock that is set back must not make the writer a stranger.
         return ahead * self._tick_ns <= passed_ns <= (
-            FASTEST * (now_ns - self._heard_ns) + MADE_UP_NS)
+            FASTEST * max(0, now_ns - self._heard_ns) + MADE_UP_NS)
