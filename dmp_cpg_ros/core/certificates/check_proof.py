@@ -24,7 +24,8 @@ def read(value: Any) -> Any:
         return [read(one) for one in value]
     if isinstance(value, dict):
         return {key: read(one) for key, one in value.items()}
-    need(isinstance(value, str) and str(F(value)) == value, f'{value!r} is no fraction')
+    need(isinstance(value, str) and not value.strip('-/0123456789') and str(F(value)) == value,
+         f'{value!r} is no fraction')
     return F(value)
 
 
@@ -75,31 +76,25 @@ def pull(p: Any, u: Any) -> list[F]:
 
 def disagreement(p: Any, xi: Any, b: F) -> list[list[F]]:
     """Symmetric part of P (L - b I), and b xi xi', with P = diag(xi) - xi xi'."""
+    N = range(len(xi))
     P = [[x * ((i == j) - y) for j, y in enumerate(xi)] for i, x in enumerate(xi)]
     PL = [times(zip(*laplacian(p, 0), strict=True), row) for row in P]
-    return [[(x + z) / 2 + b * (xi[i] * xi[j] - P[i][j]) for j, (x, z) in enumerate(
-        zip(row, (other[i] for other in PL), strict=True))] for i, row in enumerate(PL)]
+    return [[(PL[i][j] + PL[j][i]) / 2 + b * (xi[i] * xi[j] - P[i][j]) for j in N] for i in N]
 
 
-def turned(t: F) -> tuple[F, F]:
-    """Cosine and sine of the angle of which t is the tangent of the half."""
-    return (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
-
-
-def plane_rates(p: Any, u: Any, t: F, h: Any) -> list[F]:
+def plane_rates(p: Any, u: Any, c: F, s: F, h: Any) -> list[F]:
     """What drives states on the edge of the half-plane n.y >= h into it, n = (c, -s)."""
-    r, (c, s) = p['radius'], turned(t)
+    r = p['radius']
     return [x - p['omega_max'] * min(max(d - r * s, F(0)), r)
             for x, d in zip(times(laplacian(p, 1), [r * c - x for x in h]), u, strict=True)]
 
 
-def entry_height(p: Any, t: F, sine: F) -> F:
-    """Lowest n.y where |y| >= 0.98 r in C."""
-    r, r0, (c, s), short = p['radius'], p['region_radius'], turned(t), (1 - FEW) * p['radius']
+def entry_height(p: Any, c: F, s: F, sine: F) -> F:
+    """Lowest n.y where |y| >= 0.98 r in C; the sine is of the angle at which both circles meet."""
+    r, r0, short = p['radius'], p['region_radius'], (1 - FEW) * p['radius']
     cosine = (short**2 + r**2 - r0**2) / (2 * short * r)
     corner = short * (cosine * c - root(sine, 1 - cosine**2) * s)
-    reached = r**2 + r0**2 - 2 * r * r0 * c >= short**2 or not 0 <= cosine <= 1
-    return r * c - r0 if reached else max(r * c - r0, corner)
+    return r * c - r0 if r**2 + r0**2 - 2 * r * r0 * c >= short**2 else corner
 
 
 def shrinks(p: Any, v: Any, inner: Any, rate: F) -> list[F]:
@@ -125,77 +120,69 @@ def leads_outwards(p: Any, size: F) -> bool:
 
 
 def time_to_rest(p: Any, w: Any, inner: Any, size: F, arc: F) -> F:
-    """Bound on the time from a request to rest [s]."""
+    """Bound on the time from arming to rest [s]."""
     u, v, rate, r, slow = w['u'], w['v'], w['rate'], p['radius'], p['omega_armed_min']
-    fastest = p['omega_armed_max'] * r + F('0.385') * p['rho'] * r**3 + 2 * max(u) * max(
-        row[i] for i, row in enumerate(laplacian(p, 1)))
-    a, e = fastest / min(v), 2 * max(u) / min(v)
+    own = p['omega_armed_max'] * r + F('0.385') * p['rho'] * r**3
+    a = max((own + g * d + sum(row) * (d + max(u))) / x for g, d, row, x in zip(
+        p['gains'], u, p['coupling'], v, strict=True))
+    e = max(2 * d / x for d, x in zip(u, v, strict=True))
     wait, activity = (F(710, 113) - arc) / slow, F(1)                          # 355/113 > pi
-    speed, drive = p['armed_speed'] * decay(p['alpha_r'] * wait), up(
-        p['omega_slope'] * r / (rate * min(v)))
+    speed = p['armed_speed'] * decay(p['alpha_r'] * wait)
+    drive = up(p['omega_slope'] * r / (rate * min(v)))
     keep, fade, swing = (decay(x * CELL) for x in (rate, p['alpha_r'], p['activity_rate']))
     for k in range(1000):
         lows = [max(x, size - e * y) for x, y in zip(inner, v, strict=True)]
         a, e = max(a, drive * p['alpha_r'] * speed), max(e, drive * speed)
         phase = max(a * y / x for x, y in zip(lows, v, strict=True)) if min(lows) > 0 else slow + 1
         if phase <= F('0.05') and speed <= F('0.01') and activity <= FEW:
-            return w['arming_time'] + wait + k * CELL + 6 * p['tick']
+            return wait + k * CELL + 6 * p['tick']
         wanted = min(F(1), phase / slow)
-        activity, a, e, speed = map(up, (
-            wanted + max(F(0), activity - wanted) * swing,
-            drive * p['alpha_r'] * speed * (1 - keep) + a * keep,
-            drive * speed * (1 - keep) + e * keep, speed * fade))
+        activity = up(wanted + max(F(0), activity - wanted) * swing)
+        a = up(drive * p['alpha_r'] * speed * (1 - keep) + a * keep)
+        e, speed = up(drive * speed * (1 - keep) + e * keep), up(speed * fade)
     raise ValueError('no time to rest')
 
 
 def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
     """Both sides of every inequality."""
-    r, r0, omega, tick = (p[x] for x in ('radius', 'region_radius', 'omega_max', 'tick'))
-    u, v, b, D, xi, planes = (w[x] for x in ('u', 'v', 'connectivity', 'D', 'xi', 'half_planes'))
-    L, gains, growth, N = laplacian(p, 0), p['gains'], p['rho'] * r * r, len(p['gains'])
-    legs, found = [i for i, gain in enumerate(gains) if gain > 0], {}  # type: Any, Any
-    numbers = {name: x for name, x in p.items() if name not in ('coupling', 'gains')}
-    need(min(gains) >= 0 and max(p['omega_at_rest'], p['omega_armed_max']) <= omega and all(
-        x > 0 or x == 0 and name in ('omega_slope', 'clearance', 'foot_speed', 'armed_speed')
-        for name, x in numbers.items()) and all(len(row) == N and min(row) >= 0 == row[i]
-                                                for i, row in enumerate(p['coupling'])), 'range')
-    found['premises'] = F(0), sum(numbers.values()) + sum(gains) + sum(map(sum, p['coupling']))
-    T = [[*row, F(1)] + [F(0)] * (N - 1 - i) for i, row in enumerate(w['T'])]
+    r, r0, omega, tick, gains, coupling = (p[x] for x in (
+        'radius', 'region_radius', 'omega_max', 'tick', 'gains', 'coupling'))
+    u, v, b, D, T, xi, rate, planes = (w[x] for x in (
+        'u', 'v', 'connectivity', 'D', 'T', 'xi', 'rate', 'half_planes'))
+    numbers = sum(coupling, gains + [x for x in p.values() if isinstance(x, F)])
+    growth, places = p['rho'] * r**2, r * min(FEW, p['omega_at_rest'] / max(map(sum, coupling)))
+    need(len(p) == 19 and len(w) == 16, 'names')
+    need(min(numbers) >= 0 and max(p['omega_at_rest'], p['omega_armed_max']) <= omega
+         and not any(row[i] for i, row in enumerate(coupling)), 'range')
+    found: Any = {'premises': (F(0), sum(numbers)), 'synchronisation': (growth, b)}
     need(min(D) >= 0 < min(xi) and sum(xi) == 1 and disagreement(p, xi, b) == [
-        times(T, [x * d for x, d in zip(row, D, strict=True)]) for row in T],
-         'factors of another matrix')
-    found['synchronisation'] = growth, b
-    places = r * min(FEW, p['omega_at_rest'] / max(L[i][i] for i in range(N)))
+        times(T, [x * d for x, d in zip(row, D, strict=True)]) for row in T], 'factors')
     need(pull(p, u) == w['pull'] and all(
-        d == r0 if i in legs else d == 2 * r or x <= 0 <= d - r0 - places
-        for i, (d, x) in enumerate(zip(u, w['pull'], strict=True))), 'box')
-    found['capture'] = max(w['pull'][i] / (r0 * gains[i]) for i in legs), F(1)
-    for plane in planes:
-        t, h = plane['tangent'], plane['height']
-        need(plane_rates(p, u, t, h) == plane['rates'] and min(plane['rates']) >= 0 <= min(h)
-             and 0 <= t < 1 and max(h) <= entry_height(p, t, plane['sine']) - places, 'half-plane')
-    inner = [max(F(0), r - d, *(plane['height'][i] for plane in planes)) * bool(planes)
-             for i, d in enumerate(u)]
-    need(shrinks(p, v, inner, w['rate']) == w['shrinks'] and min(v) > 0 <= min(w['shrinks']),
-         'contraction')
-    found['contraction'], rest = (F(0), w['rate']), []
-    for name, at in (('fast', omega), ('rest', p['omega_at_rest'])):
-        y, flow = w[f'y_{name}'], w[f'flow_{name}']
-        squares = [((z[0] - r)**2 + z[1]**2, z[0]**2 + z[1]**2) for z in y]
-        need(flow == speeds(p, at, y) and all(
-            far <= d * d and size <= r * r for (far, size), d in zip(squares, u, strict=True))
-             and all(c * z[0] - s * z[1] >= x for plane in planes for c, s in [turned(
-                 plane['tangent'])] for z, x in zip(y, plane['height'], strict=True)), 'outside')
-        most = max(f / q**2 for f, q in zip(flow, v, strict=True)) / w['rate']**2
-        rest.append((max(squares[i][0] for i in legs), min(size for _, size in squares),
-                     root(w[f'error_{name}'], most) * max(v)))
+        d == r0 if gain else d == 2 * r or x <= 0 <= d - r0 - places
+        for d, x, gain in zip(u, w['pull'], gains, strict=True)), 'box')
+    found['capture'] = max(x / (r0 * a) for x, a in zip(w['pull'], gains, strict=True) if a), F(1)
+    for c, s, height, sine, rates in planes:
+        need(plane_rates(p, u, c, s, height) == rates and min(*rates, *height, s) >= 0 < c
+             and c**2 + s**2 == 1 and max(height) <= entry_height(p, c, s, sine) - places, 'plane')
+    inner = [max(F(0), r - d, *heights) * bool(planes) for d, *heights in zip(
+        u, *(plane[2] for plane in planes), strict=True)]
+    need(shrinks(p, v, inner, rate) == w['shrinks'] and min(v) > 0 <= min(w['shrinks']), 'rate')
+    found['contraction'], rest = (F(0), rate), []
+    for at, (y, flow, error) in zip((omega, p['omega_at_rest']), w['equilibria'], strict=True):
+        far, size = ([(z[0] - x)**2 + z[1]**2 for z in y] for x in (r, F(0)))
+        need(flow == speeds(p, at, y) and max(size) <= r**2 and all(
+            x <= d**2 for x, d in zip(far, u, strict=True)) and all(
+                c * z[0] - s * z[1] >= x for c, s, height, *_ in planes
+                for z, x in zip(y, height, strict=True)), 'equilibrium')
+        off = max(v) * root(error, max(x / y**2 for x, y in zip(flow, v, strict=True)) / rate**2)
+        rest.append((max(x for x, gain in zip(far, gains, strict=True) if gain), min(size), off))
     found['rest_in_region'] = root(w['rest_distance'], rest[0][0]) + rest[0][2], r0
     size = -least(-w['rest_size'], lambda x: x >= 0 or x * x <= rest[1][1]) - rest[1][2]
     found['rest_radius'], mild = (r / 2, size), root(w['mild_root'], omega**2 + growth**2) + growth
-    slowest, d, k = min(b - growth, w['rate'], 2 * growth), p['damping'], p['stiffness']
+    slowest, d, k = min(b - growth, rate, 2 * growth), p['damping'], p['stiffness']
     rates = p['alpha_r'], p['slowest_filter'], slowest, d * k / (k + d * d) / 3
     found['time_step'] = max(tick * mild / F('1.4'), tick**3 * mild**4 / 40 / slowest), F(1)
-    found['cycle_radius'] = least(w['cycle_error'], lambda x: leads_outwards(
+    found['cycle_radius'] = least(w['cycle_error'], lambda x: x >= 0 and leads_outwards(
         p, r - r * x) and not leads_outwards(p, r + r * x)), min(FEW, (r0 / r)**2)
     q = min(F(1), r0 / (2 * r))
     arc = 4 * (q + q**3 / 6 + 3 * q**5 / 40 + 5 * q**7 / 112)              # below 4 asin q
@@ -203,23 +190,30 @@ def rows(p: Any, w: Any) -> dict[str, tuple[F, F]]:
     found['reference'], found['transformation'] = (F(0), rates[0]), (F(0), rates[3])
     found['hierarchy'] = F(0), 1 / sum(1 / x for x in rates)
     found['rest_posture'] = p['clearance'] * FEW, F(1, 100)
-    least(w['arming_time'], lambda x: x >= 0 and p['armed_speed'] >= p['foot_speed'] * decay(
-        p['alpha_r'] * x))
-    found['time_to_rest'] = time_to_rest(p, w, inner, size, arc), F(10)
+    arming = least(w['arming_time'], lambda x: x >= 0 and p['armed_speed'] >= p[
+        'foot_speed'] * decay(p['alpha_r'] * x))
+    found['time_to_rest'] = arming + time_to_rest(p, w, inner, size, arc), F(10)
     return found
 
 
 def check(proof: Any) -> dict[str, tuple[F, F]]:
     """Return both sides of every inequality; raise an error unless the proof is one."""
-    found = rows(*(read(proof[name]) for name in ('parameters', 'witnesses')))
+    need(len(proof) == 4 and proof['format'] == 'dmp_cpg_ros proof 2', 'format')
+    found = rows(read(proof['parameters']), read(proof['witnesses']))
     need(read(proof['rows']) == {name: list(sides) for name, sides in found.items()} and all(
         left < right for left, right in found.values()), 'rows')
     return found
 
 
+def once(pairs: Any) -> dict[str, Any]:
+    """Names and values as a dictionary, if no name is there twice."""
+    need(len(dict(pairs)) == len(pairs), 'a name twice')
+    return dict(pairs)
+
+
 if __name__ == '__main__':
     try:
         with open(sys.argv[1], encoding='utf-8') as file:
-            print('accepted:', *check(json.load(file)))
-    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+            print('accepted:', *check(json.load(file, object_pairs_hook=once)))
+    except (ArithmeticError, LookupError, TypeError, ValueError, RecursionError) as error:
         sys.exit(f'refused: {error!r}')

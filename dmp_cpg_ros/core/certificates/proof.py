@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from fractions import Fraction
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from dmp_cpg_ros.core.certificates.network import NetworkAnalysis, analyse_netwo
 from dmp_cpg_ros.core.certificates.step import cycle_radius_error
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL
+from dmp_cpg_ros.core.contraction.synchronisation import cascade_weights, slowest_rate
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.maths import Array
@@ -33,6 +35,8 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters
 Values = dict[str, Any]
 
 _ROUNDING = 1e-9  # share that is given away, so that rounding does not decide
+_SLOWER = (1e-4, 0.1, 0.3, 0.5)  # shares of the rate that are given away for a norm of even weights
+_CASCADE = 2.0**-64  # weight of a component of a graph, as a share of those before it
 
 
 def proof_of(network: GaitNetwork, inhibition: InhibitionParameters,
@@ -59,13 +63,14 @@ def proof_of(network: GaitNetwork, inhibition: InhibitionParameters,
     span = operating_range(network, inhibition, reference)
     analysis = analyse_network(network, inhibition, span)
     p = _parameters(network, inhibition, reference, leg, posture, tick_s, span, analysis)
+    shares = cascade_weights(network.system.graph, _CASCADE) if (
+        analysis.found.weights is None) else analysis.found.weights
     reason = 'it does not contract'
-    for regional in (False, True):
-        if not regional and analysis.contraction.reach != GLOBAL:
-            continue
+    reaches = (False, True) if analysis.contraction.reach == GLOBAL else (True,)
+    for regional, slower in product(reaches, _SLOWER):
         try:
-            w = _witnesses(p, analysis, regional)
-            proof = {'format': 'dmp_cpg_ros proof 1', 'parameters': _written(p),
+            w = _witnesses(p, analysis, shares, regional, slower)
+            proof = {'format': 'dmp_cpg_ros proof 2', 'parameters': _written(p),
                      'witnesses': _written(w), 'rows': _written(exact.rows(p, w))}
             exact.check(proof)
             return proof
@@ -97,35 +102,34 @@ def _parameters(network: GaitNetwork, inhibition: InhibitionParameters,
             'gains': [Fraction(gain) for gain in analysis.capture.gains.tolist()]}
 
 
-def _witnesses(p: Values, analysis: NetworkAnalysis, regional: bool) -> Values:
+def _witnesses(p: Values, analysis: NetworkAnalysis, shares: Array, regional: bool,
+               slower: float) -> Values:
     """Everything that is not a parameter."""
     rest, fast, found = analysis.rest, analysis.rest_at_speed, analysis.found
     if rest is None or fast is None or not analysis.capture.holds:
         raise ValueError('there is no equilibrium, or C is left')
-    if found.weights is None:
-        raise ValueError('components of the graph follow one another')
     b = _down(found.connectivity * (1.0 - _ROUNDING))
-    xi = [_down(share) for share in found.weights.tolist()[:-1]]
-    xi.append(Fraction(1 - sum(xi)))
+    xi, largest = [Fraction(share) for share in shares.tolist()], int(shares.argmax())
+    xi[largest] += 1 - sum(xi)
     T, D = _factors(exact.disagreement(p, xi, b))
     u = _box(p, analysis)
     planes = _half_planes(p, u) if regional else []
-    rows = [plane['height'] for plane in planes]
-    inner = [max(Fraction(0), *(h[i] for h in rows), p['radius'] - d) if rows else Fraction(0)
-             for i, d in enumerate(u)]
-    v, rate, left = _shrinking(p, inner)
+    inner = [max(Fraction(0), p['radius'] - d, *(plane[2][i] for plane in planes)) if planes
+             else Fraction(0) for i, d in enumerate(u)]
+    v, rate, left = _shrinking(p, inner, slower)
     w: Values = {
         'connectivity': b, 'xi': xi, 'T': T, 'D': D, 'u': u, 'pull': exact.pull(p, u),
-        'half_planes': planes, 'v': v, 'rate': rate, 'shrinks': left}
+        'half_planes': planes, 'v': v, 'rate': rate, 'shrinks': left, 'equilibria': []}
     r = p['radius']
-    for name, at, equilibrium in (('fast', 'omega_max', fast), ('rest', 'omega_at_rest', rest)):
-        y = w[f'y_{name}'] = _places(equilibrium)
-        flow = w[f'flow_{name}'] = exact.speeds(p, p[at], y)
-        w[f'error_{name}'] = _root(
-            max(f / q**2 for f, q in zip(flow, v, strict=True)) / rate**2)
-    far = max((z[0] - r)**2 + z[1]**2 for z, gain in zip(w['y_fast'], p['gains'], strict=True)
+    for at, equilibrium in (('omega_max', fast), ('omega_at_rest', rest)):
+        y = _places(equilibrium)
+        flow = exact.speeds(p, p[at], y)
+        w['equilibria'].append([y, flow, _root(
+            max(f / q**2 for f, q in zip(flow, v, strict=True)) / rate**2)])
+    (y_fast, *_), (y_rest, *_) = w['equilibria']
+    far = max((z[0] - r)**2 + z[1]**2 for z, gain in zip(y_fast, p['gains'], strict=True)
               if gain > 0)
-    size = min(z[0]**2 + z[1]**2 for z in w['y_rest'])
+    size = min(z[0]**2 + z[1]**2 for z in y_rest)
     rho, radius, fastest, tick = (float(p[name]) for name in (
         'rho', 'radius', 'omega_max', 'tick'))
     ratio = p['foot_speed'] / p['armed_speed'] if p['foot_speed'] else Fraction(1)
@@ -152,7 +156,7 @@ def _factors(S: list[list[Fraction]]) -> tuple[list[list[Fraction]], list[Fracti
         for i in range(k + 1, N):
             T[i][k] = S[i][k] / S[k][k]
             S[i] = [x - T[i][k] * y for x, y in zip(S[i], S[k], strict=True)]
-    return [row[:i] for i, row in enumerate(T)], D
+    return T, D
 
 
 def _box(p: Values, analysis: NetworkAnalysis) -> list[Fraction]:
@@ -172,44 +176,38 @@ def _box(p: Values, analysis: NetworkAnalysis) -> list[Fraction]:
     return box
 
 
-def _half_planes(p: Values, u: list[Fraction]) -> list[Values]:
+def _half_planes(p: Values, u: list[Fraction]) -> list[list[Any]]:
     """Half-planes of which each holds one leg farther from the origin than all others do."""
     r, M = float(p['radius']), _float(exact.laplacian(p, 1))
     sine = _root(1 - (((1 - exact.FEW)**2 + 1 - (p['region_radius'] / p['radius'])**2)
                       / (2 * (1 - exact.FEW)))**2)
     degree = max(row[i] for i, row in enumerate(exact.laplacian(p, 0)))
     places = p['radius'] * min(exact.FEW, p['omega_at_rest'] / degree)
-    planes: list[Values] = []
+    planes: list[list[Any]] = []
     for beta in np.linspace(0.0, 1.2, 13):
         t = _down(math.tan(0.5 * beta))
-        c, s = (float(x) for x in exact.turned(t))
-        loss = float(p['omega_max']) * np.clip(_float(u) - r * s, 0.0, r)
+        c, s = (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
+        loss = float(p['omega_max']) * np.clip(_float(u) - r * float(s), 0.0, r)
         below = np.linalg.solve(M, loss + _ROUNDING * (1.0 + loss.max()))
-        entry = float(exact.entry_height(p, t, sine) - places)
-        below += max(0.0, float((r * c - below).max()) - entry) + 1e-11
-        h = [_down(x) for x in (r * c - below).tolist()]
-        rates = exact.plane_rates(p, u, t, h)
+        entry = float(exact.entry_height(p, c, s, sine) - places)
+        below += max(0.0, float((r * float(c) - below).max()) - entry) + 1e-11
+        h = [_down(x) for x in (r * float(c) - below).tolist()]
+        rates = exact.plane_rates(p, u, c, s, h)
         if min(h) >= 0 and min(rates) >= 0:
-            planes.append({'tangent': t, 'height': h, 'sine': sine, 'rates': rates})
-    most = np.max([_float(plane['height']) for plane in planes], axis=0, initial=0.0)
-    return [plane for plane in planes if np.any(_float(plane['height']) == most)]
+            planes.append([c, s, h, sine, rates])
+    most = np.max([_float(plane[2]) for plane in planes], axis=0, initial=0.0)
+    return [plane for plane in planes if np.any(_float(plane[2]) == most)]
 
 
-def _shrinking(p: Values, inner: list[Fraction]
+def _shrinking(p: Values, inner: list[Fraction], slower: float
                ) -> tuple[list[Fraction], Fraction, list[Fraction]]:
     """Weights and rate of the norm in which solutions approach each other."""
     M = _float(exact.laplacian(p, 1)) - np.diag(float(p['rho']) * (
         float(p['radius'])**2 - _float(inner)**2))
-    values, vectors = np.linalg.eig(M)
-    slowest = int(values.real.argmin())
-    weights = np.abs(vectors[:, slowest].real)
-    v = [_down(x) for x in (weights / weights.max()).tolist()]
-    for room in 10.0 ** np.arange(-9.0, -2.0):
-        rate = _down(float(values[slowest].real) * (1.0 - room))
-        left = exact.shrinks(p, v, inner, rate)
-        if min(left) >= 0:
-            break
-    return v, rate, left
+    slowest = (1.0 - slower) * slowest_rate(M)
+    weights = np.linalg.solve(M - slowest * np.eye(len(M)), np.ones(len(M)))
+    v, rate = [_down(x) for x in (weights / weights.max()).tolist()], _down(slowest)
+    return v, rate, exact.shrinks(p, v, inner, rate)
 
 
 def _places(rest: InhibitedEquilibrium) -> list[tuple[Fraction, Fraction]]:

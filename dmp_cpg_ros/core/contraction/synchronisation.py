@@ -118,17 +118,21 @@ def _hierarchical(graph: CouplingGraph, L: Array, scalar: Array,
     its grounded Laplacian minus the growth; the hierarchy's rate is the smallest of all.
     """
     root, *others = components(graph)
-    within = [2 * i + axis for i in root for axis in range(2)]
-    L_root = L[np.ix_(within, within)]
-    smallest = connectivity(L_root, len(root))
-    xi = left_null_weights(scalar[np.ix_(root, root)]) if len(root) > 1 else None
-    if xi is not None:
-        smallest = max(smallest, connectivity(L_root, len(root), xi))
+    smallest, _ = _of_root(L, scalar, root)
     for group in others:
         smallest = min(smallest, slowest_rate(scalar[np.ix_(group, group)]))
     if not others or not np.isfinite(smallest) or smallest <= 1e-9:
         return None
     return Synchronisation(float(smallest), growth, None, 'hierarchical')
+
+
+def _of_root(L: Array, scalar: Array, root: list[int]) -> tuple[float, Array]:
+    """Connectivity of a root component, and the better of even and natural weights."""
+    even, within = np.full(len(root), 1.0 / len(root)), [2 * i + axis for i in root
+                                                         for axis in range(2)]
+    natural = left_null_weights(scalar[np.ix_(root, root)]) if len(root) > 1 else None
+    return max(((connectivity(L[np.ix_(within, within)], len(root), xi), xi)
+                for xi in (even, natural) if xi is not None), key=lambda found: found[0])
 
 
 _TINY = 1e-9
@@ -267,6 +271,38 @@ def left_null_weights(laplacian: Array) -> Array | None:
     xi = np.abs(np.linalg.svd(laplacian.T)[2][-1])
     xi /= xi.sum()
     return xi if xi.min() > _TINY else None
+
+
+def cascade_weights(graph: CouplingGraph, share: float) -> Array:
+    """Weights ξ in which a graph of components that follow one another is nearly as connected as
+    each of them.
+
+    In weighted coordinates the couplings between components shrink with the root of the share,
+    so that what is left is the blocks. A grounded block M with Perron vectors M v = λv and
+    Mᵀw = λw has λ_min of its symmetric part equal to λ in the weights w_i/v_i: (w_i v_i)^½ > 0 is
+    an eigenvector from both sides.
+
+    Parameters
+    ----------
+    graph : CouplingGraph
+        Couplings; a root reaches all.
+    share : float
+        Weight of each component as a share of the one before it, ≪ 1.
+
+    Returns
+    -------
+    ndarray (N,)
+        ξ > 0, adding up to 1.
+    """
+    scalar, (root, *others) = comparison_laplacian(graph), components(graph)
+    xi = np.zeros(graph.size)
+    _, xi[root] = _of_root(graph.block_laplacian(), scalar, root)
+    for place, group in enumerate(others, 1):
+        M = scalar[np.ix_(group, group)]
+        right, left = (np.abs(vectors[:, values.real.argmin()].real)
+                       for values, vectors in map(np.linalg.eig, (M, M.T)))
+        xi[group] = share**place * left / right / (left / right).max()
+    return xi / xi.sum()
 
 
 def components(graph: CouplingGraph) -> list[list[int]]:
