@@ -11,10 +11,9 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.studies.adversary_runs import Batch, Setting
+from dmp_cpg_ros.studies.certificate_settings import GRAPHS, random_edges
 
 __all__ = ['Batch', 'Setting', 'locked', 'random_graph', 'random_setting']
-
-GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')
 
 
 def locked(setting: Setting, phi: float, radius: float = 1.0) -> np.ndarray:
@@ -27,9 +26,7 @@ def random_graph(name: str, size: int, gain: float, rng: np.random.Generator) ->
     phases = rng.uniform(-np.pi, np.pi, size)
     if name != 'directed':
         return graph_from_edges(size, topology(name, size), gain, phases)
-    edges = {(i, int(rng.integers(i))) for i in range(1, size)}
-    edges |= {(int(i), int(j)) for i, j in rng.integers(size, size=(size, 2)) if i != j}
-    return graph_from_edges(size, tuple(sorted(edges)), gain, phases)
+    return graph_from_edges(size, random_edges(size, rng), gain, phases)
 
 
 def random_setting(rng: np.random.Generator, size: int = 4) -> Setting:

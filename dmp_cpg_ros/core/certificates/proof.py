@@ -35,7 +35,8 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters
 Values = dict[str, Any]
 
 _ROUNDING = 1e-9  # share that is given away, so that rounding does not decide
-_SLOWER = (1e-4, 0.1, 0.3, 0.5)  # shares of the rate that are given away for a norm of even weights
+_SLOWER = (1e-4, 0.1, 0.3, 0.5)  # shares of the rate that are given away for weights more even
+_MOST_STEPS = 10_000  # of the grid, from a guess
 _CASCADE = 2.0**-64  # weight of a component of a graph, as a share of those before it
 
 
@@ -69,14 +70,19 @@ def proof_of(network: GaitNetwork, inhibition: InhibitionParameters,
     reaches = (False, True) if analysis.contraction.reach == GLOBAL else (True,)
     for regional, slower in product(reaches, _SLOWER):
         try:
-            w = _witnesses(p, analysis, shares, regional, slower)
-            proof = {'format': 'dmp_cpg_ros proof 2', 'parameters': _written(p),
-                     'witnesses': _written(w), 'rows': _written(exact.rows(p, w))}
+            w = completed(p, _chosen(p, analysis, shares, regional, slower))
+            proof = written(p, w, exact.rows(p, w))
             exact.check(proof)
             return proof
         except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
             reason = str(error)
     raise ParameterError(f'no exact proof is found: {reason}')
+
+
+def written(p: Values, w: Values, rows: Values) -> Values:
+    """Parameters, witnesses and rows as they stand in a file."""
+    return {'format': 'dmp_cpg_ros proof 2', 'parameters': _written(p),
+            'witnesses': _written(w), 'rows': _written(rows)}
 
 
 def _parameters(network: GaitNetwork, inhibition: InhibitionParameters,
@@ -87,6 +93,8 @@ def _parameters(network: GaitNetwork, inhibition: InhibitionParameters,
     coupling = np.zeros((graph.size, graph.size))
     for (i, j), gain in zip(graph.edges, graph.gains, strict=True):
         coupling[i, j] = gain[0, 0]
+    if not np.array_equal(graph.gains, graph.gains[:, :1, :1] * np.eye(2)):
+        raise ParameterError('no exact proof is known for couplings other than k_ij I')
     values = {
         'rho': network.parameters.rho, 'radius': network.parameters.radius,
         'region_radius': inhibition.region_radius, 'tick': tick_s,
@@ -102,49 +110,73 @@ def _parameters(network: GaitNetwork, inhibition: InhibitionParameters,
             'gains': [Fraction(gain) for gain in analysis.capture.gains.tolist()]}
 
 
-def _witnesses(p: Values, analysis: NetworkAnalysis, shares: Array, regional: bool,
-               slower: float) -> Values:
-    """Everything that is not a parameter."""
-    rest, fast, found = analysis.rest, analysis.rest_at_speed, analysis.found
+def _chosen(p: Values, analysis: NetworkAnalysis, shares: Array, regional: bool, slower: float
+            ) -> Values:
+    """Witnesses from which the others follow."""
+    rest, fast = analysis.rest, analysis.rest_at_speed
     if rest is None or fast is None or not analysis.capture.holds:
         raise ValueError('there is no equilibrium, or C is left')
-    b = _down(found.connectivity * (1.0 - _ROUNDING))
     xi, largest = [Fraction(share) for share in shares.tolist()], int(shares.argmax())
     xi[largest] += 1 - sum(xi)
-    T, D = _factors(exact.disagreement(p, xi, b))
     u = _box(p, analysis)
     planes = _half_planes(p, u) if regional else []
-    inner = [max(Fraction(0), p['radius'] - d, *(plane[2][i] for plane in planes)) if planes
-             else Fraction(0) for i, d in enumerate(u)]
-    v, rate, left = _shrinking(p, inner, slower)
-    w: Values = {
-        'connectivity': b, 'xi': xi, 'T': T, 'D': D, 'u': u, 'pull': exact.pull(p, u),
-        'half_planes': planes, 'v': v, 'rate': rate, 'shrinks': left, 'equilibria': []}
-    r = p['radius']
-    for at, equilibrium in (('omega_max', fast), ('omega_at_rest', rest)):
-        y = _places(equilibrium)
+    v, rate = _shrinking(p, _inner(p, u, planes), slower)
+    return {'connectivity': on_grid(analysis.found.connectivity * (1.0 - _ROUNDING)), 'xi': xi,
+            'u': u, 'half_planes': planes, 'v': v, 'rate': rate,
+            'equilibria': [[_places(fast)], [_places(rest)]]}
+
+
+def completed(p: Values, chosen: Values) -> Values:
+    """All witnesses of parameters, from ``connectivity``, ``xi``, ``u``, ``v``, ``rate``, cosine,
+    sine and heights of ``half_planes`` and the states of ``equilibria``; they prove nothing yet.
+
+    Raises
+    ------
+    ArithmeticError, ValueError
+        If one of them does not exist.
+    """
+    b, xi, u, v, rate = (chosen[name] for name in ('connectivity', 'xi', 'u', 'v', 'rate'))
+    T, D = _factors(exact.disagreement(p, xi, b))
+    r, foot, armed, alpha_r = (p[name] for name in (
+        'radius', 'foot_speed', 'armed_speed', 'alpha_r'))
+    sine, inner = _corner(p), _inner(p, u, chosen['half_planes'])
+    (y_fast, *_), (y_rest, *_) = chosen['equilibria']
+    equilibria = []
+    for at, y in (('omega_max', y_fast), ('omega_at_rest', y_rest)):
         flow = exact.speeds(p, p[at], y)
-        w['equilibria'].append([y, flow, _root(
+        equilibria.append([y, flow, _root(
             max(f / q**2 for f, q in zip(flow, v, strict=True)) / rate**2)])
-    (y_fast, *_), (y_rest, *_) = w['equilibria']
     far = max((z[0] - r)**2 + z[1]**2 for z, gain in zip(y_fast, p['gains'], strict=True)
               if gain > 0)
     size = min(z[0]**2 + z[1]**2 for z in y_rest)
-    rho, radius, fastest, tick = (float(p[name]) for name in (
-        'rho', 'radius', 'omega_max', 'tick'))
-    ratio = p['foot_speed'] / p['armed_speed'] if p['foot_speed'] else Fraction(1)
-    w['rest_distance'] = _root(far)
-    w['rest_size'] = -_least(-math.sqrt(size), lambda x: x >= 0 or x * x <= size)
-    w['mild_root'] = _root(p['omega_max']**2 + (p['rho'] * r * r)**2)
-    w['cycle_error'] = _least(
-        cycle_radius_error(rho, radius, fastest, tick), lambda x: exact.leads_outwards(
-            p, r * (1 - x)) and not exact.leads_outwards(p, r * (1 + x)))
     # Where the lower bound (1 + x/64 + x²/8192)^64 of the exponential reaches the ratio.
-    logarithm = 64.0 * (math.sqrt(2.0 * float(ratio)**(1.0 / 64.0) - 1.0) - 1.0)
-    w['arming_time'] = _least(
-        logarithm / float(p['alpha_r']), lambda x: x >= 0 and p['armed_speed'] >= (
-            p['foot_speed'] * exact.decay(p['alpha_r'] * x)))
-    return w
+    ratio = float(foot / armed) if foot else 1.0
+    logarithm = 64.0 * (math.sqrt(2.0 * ratio**(1.0 / 64.0) - 1.0) - 1.0)
+    return {
+        'connectivity': b, 'xi': xi, 'T': T, 'D': D, 'u': u, 'pull': exact.pull(p, u),
+        'half_planes': [[c, s, h, sine, exact.plane_rates(p, u, c, s, h)]
+                        for c, s, h, *_ in chosen['half_planes']],
+        'v': v, 'rate': rate, 'shrinks': exact.shrinks(p, v, inner, rate),
+        'equilibria': equilibria, 'rest_distance': _root(far),
+        'rest_size': -_least(-math.sqrt(size), lambda x: x >= 0 or x * x <= size),
+        'mild_root': _root(p['omega_max']**2 + (p['rho'] * r**2)**2),
+        'cycle_error': _least(cycle_radius_error(*(float(p[name]) for name in (
+            'rho', 'radius', 'omega_max', 'tick'))), lambda x: x >= 0 and exact.leads_outwards(
+                p, r * (1 - x)) and not exact.leads_outwards(p, r * (1 + x))),
+        'arming_time': _least(logarithm / float(alpha_r), lambda x: x >= 0 and (
+            armed >= foot * exact.decay(alpha_r * x)))}
+
+
+def _inner(p: Values, u: list[Fraction], planes: list[list[Any]]) -> list[Fraction]:
+    """Lower bounds on |y_i|."""
+    return [max(Fraction(0), p['radius'] - d, *(plane[2][i] for plane in planes)) if planes
+            else Fraction(0) for i, d in enumerate(u)]
+
+
+def _corner(p: Values) -> Fraction:
+    """Sine of the angle at which the circle of C meets the one of 0.98 r."""
+    short = 1 - exact.FEW
+    return _root(1 - ((short**2 + 1 - (p['region_radius'] / p['radius'])**2) / (2 * short))**2)
 
 
 def _factors(S: list[list[Fraction]]) -> tuple[list[list[Fraction]], list[Fraction]]:
@@ -168,7 +200,7 @@ def _box(p: Values, analysis: NetworkAnalysis) -> list[Fraction]:
     if free.any():
         larger[free] = np.linalg.solve(L[np.ix_(free, free)], np.ones(int(free.sum())))
     for room in 10.0 ** np.arange(-10.0, -4.0):
-        box = [p['region_radius'] if leg else min(edge, _down(d) + exact.GRID) for leg, d in zip(
+        box = [p['region_radius'] if leg else min(edge, on_grid(d) + exact.GRID) for leg, d in zip(
             legs, (u + room * larger * float(p['omega_max'] * p['radius'])).tolist(), strict=True)]
         if all(x <= 0 or leg or d == edge for x, d, leg in zip(
                 exact.pull(p, box), box, legs, strict=True)):
@@ -179,51 +211,52 @@ def _box(p: Values, analysis: NetworkAnalysis) -> list[Fraction]:
 def _half_planes(p: Values, u: list[Fraction]) -> list[list[Any]]:
     """Half-planes of which each holds one leg farther from the origin than all others do."""
     r, M = float(p['radius']), _float(exact.laplacian(p, 1))
-    sine = _root(1 - (((1 - exact.FEW)**2 + 1 - (p['region_radius'] / p['radius'])**2)
-                      / (2 * (1 - exact.FEW)))**2)
+    sine = _corner(p)
     degree = max(row[i] for i, row in enumerate(exact.laplacian(p, 0)))
     places = p['radius'] * min(exact.FEW, p['omega_at_rest'] / degree)
     planes: list[list[Any]] = []
     for beta in np.linspace(0.0, 1.2, 13):
-        t = _down(math.tan(0.5 * beta))
+        t = on_grid(math.tan(0.5 * beta))
         c, s = (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
         loss = float(p['omega_max']) * np.clip(_float(u) - r * float(s), 0.0, r)
         below = np.linalg.solve(M, loss + _ROUNDING * (1.0 + loss.max()))
         entry = float(exact.entry_height(p, c, s, sine) - places)
         below += max(0.0, float((r * float(c) - below).max()) - entry) + 1e-11
-        h = [_down(x) for x in (r * float(c) - below).tolist()]
+        h = [on_grid(x) for x in (r * float(c) - below).tolist()]
         rates = exact.plane_rates(p, u, c, s, h)
         if min(h) >= 0 and min(rates) >= 0:
-            planes.append([c, s, h, sine, rates])
+            planes.append([c, s, h])
     most = np.max([_float(plane[2]) for plane in planes], axis=0, initial=0.0)
     return [plane for plane in planes if np.any(_float(plane[2]) == most)]
 
 
 def _shrinking(p: Values, inner: list[Fraction], slower: float
-               ) -> tuple[list[Fraction], Fraction, list[Fraction]]:
+               ) -> tuple[list[Fraction], Fraction]:
     """Weights and rate of the norm in which solutions approach each other."""
     M = _float(exact.laplacian(p, 1)) - np.diag(float(p['rho']) * (
         float(p['radius'])**2 - _float(inner)**2))
     slowest = (1.0 - slower) * slowest_rate(M)
     weights = np.linalg.solve(M - slowest * np.eye(len(M)), np.ones(len(M)))
-    v, rate = [_down(x) for x in (weights / weights.max()).tolist()], _down(slowest)
-    return v, rate, exact.shrinks(p, v, inner, rate)
+    return [on_grid(x) for x in (weights / weights.max()).tolist()], on_grid(slowest)
 
 
 def _places(rest: InhibitedEquilibrium) -> list[tuple[Fraction, Fraction]]:
     """States of an equilibrium in locked coordinates."""
-    return [(_down(size * math.cos(ahead)), _down(-size * math.sin(ahead)))
+    return [(on_grid(size * math.cos(ahead)), on_grid(-size * math.sin(ahead)))
             for size, ahead in zip(rest.radius.tolist(), rest.phase_ahead.tolist(), strict=True)]
 
 
 def _least(guess: float, holds: Callable[[Fraction], bool]) -> Fraction:
     """Smallest number of the grid, near a guess, for which something holds."""
-    x = _down(guess)
-    while not holds(x):
-        x += exact.GRID
-    while holds(x - exact.GRID):
-        x -= exact.GRID
-    return x
+    x = on_grid(guess)
+    for _ in range(_MOST_STEPS):
+        if not holds(x):
+            x += exact.GRID
+        elif holds(x - exact.GRID):
+            x -= exact.GRID
+        else:
+            return x
+    raise ValueError(f'{guess} is not close to what is looked for')
 
 
 def _root(square: Fraction) -> Fraction:
@@ -231,7 +264,8 @@ def _root(square: Fraction) -> Fraction:
     return _least(math.sqrt(max(square, Fraction(0))), lambda x: x >= 0 and x * x >= square)
 
 
-def _down(x: float) -> Fraction:
+def on_grid(x: float | Fraction) -> Fraction:
+    """x, rounded downwards to the grid."""
     return math.floor(Fraction(x) / exact.GRID) * exact.GRID
 
 

@@ -9,107 +9,19 @@ certificate does not is simulated too: among it are settings that fail.
 
 from __future__ import annotations
 
-import functools
 from collections import Counter
-from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 import pytest
 from checkout import ROOT
-from contraction_batches import Batch, Setting, locked, random_graph
-from core_examples import GAITS, TICK, quadruped
+from contraction_batches import Batch, Setting, locked
 
-from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.canonical.coupling import graph_from_edges
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
-from dmp_cpg_ros.core.contraction.capture import capture_set
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
-from dmp_cpg_ros.core.contraction.synchronisation import (
-    Synchronisation,
-    synchronisation,
-    synchronisation_complement,
-)
-from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.core.reference.operating_range import operating_range
-from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale
+from dmp_cpg_ros.core.contraction.synchronisation import synchronisation_complement
+from dmp_cpg_ros.studies.certificate_settings import GRAPHS, TICK, Case, grid
+from dmp_cpg_ros.studies.proofs import accepted, attempt
 
-GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')
-LARGEST_MISMATCH = 0.05
 SECONDS = 8.0
-SCALE, LEG, POSTURE = body_scale(quadruped()), LegParameters(), PostureParameters()
-
-
-@dataclass(frozen=True)
-class Case:
-    """One setting with its certificate and what naive checks would say."""
-
-    setting: Setting
-    certificate: Certificate
-    free: Synchronisation
-    misread: bool
-    contracts: bool
-
-
-def case_of(graph: str, gait: str, gain: float, share: float, region: float, leg: str, rho: float,
-            rng: np.random.Generator) -> Case:
-    """Certify a setting of the grid; radius, speed, cadence and frequencies are drawn."""
-    radius = float(rng.uniform(0.5, 2.0))
-    canonical = CanonicalParameters(
-        rho=rho / radius**2, radius=radius, coupling_gain=gain,
-        coupling_graph='ring' if graph == 'directed' else graph,
-        cadence_scale=float(rng.uniform(0.6, 1.6)))
-    reference = ReferenceParameters(max_speed=float(rng.uniform(0.2, 1.5)))
-    network = GaitNetwork(canonical, GAITS[gait], SCALE)
-    if graph == 'directed':
-        edges = random_graph('directed', len(LEGS), gain, rng).edges
-        network.system = CanonicalSystem(
-            graph_from_edges(len(LEGS), edges, gain, network.gait.phases),
-            network.system.oscillators, network.system.target)
-    plain = InhibitionParameters(inhibited_legs=(leg,), region_radius=region * radius)
-    omega = operating_range(network, plain, reference).omega[1]
-    inhibition = InhibitionParameters(
-        inhibited_legs=(leg,), region_radius=region * radius,
-        inhibition_gain=share * len(LEGS) * omega * radius / (region * radius))
-    certificate = certify(network, inhibition, reference, LEG, POSTURE, TICK)
-    gains = inhibition.armed_gains
-    free = synchronisation(network.system.graph, rho)
-    omegas = omega * (1.0 - own_frequencies(network.system, omega, gains, free, inhibition, rng))
-    setting = Setting(network.system, omegas, gains, inhibition.region_radius, graph)
-    eigenvalues = np.linalg.eigvals(network.system.graph.block_laplacian()).real
-    contraction = certificate['contraction']
-    return Case(setting, certificate, free, bool(np.sort(eigenvalues)[len(LEGS)] > rho),
-                contraction.right > rho)
-
-
-def own_frequencies(system: CanonicalSystem, omega: float, gains: np.ndarray,
-                    free: Synchronisation, inhibition: InhibitionParameters,
-                    rng: np.random.Generator) -> np.ndarray:
-    """Shares by which legs turn slower than ω, so unequal that they are still in their places
-    within what capture allows; none where nothing is known.
-    """
-    if not free.synchronises or free.weights is None:
-        return np.zeros(len(LEGS))
-    oscillator = system.oscillators
-    allowed = 0.5 * capture_set(system, omega, gains, inhibition.region_radius).tolerance
-    share = LARGEST_MISMATCH
-    while share > 1e-4 and not mismatch_bound(
-            free, oscillator.rho, oscillator.radius, share * omega).distance <= allowed:
-        share *= 0.5
-    return rng.uniform(0.0, share, len(LEGS)) if share > 1e-4 else np.zeros(len(LEGS))
-
-
-@functools.lru_cache(maxsize=1)
-def grid() -> tuple[Case, ...]:
-    """The whole grid."""
-    rng = np.random.default_rng(4)
-    return tuple(case_of(*values, rng) for values in product(
-        GRAPHS, ('amble', 'trot', 'bound'), (10.0, 25.0, 60.0, 200.0), (0.65, 0.95, 1.15, 2.0),
-        (0.15, 0.35), ('fl', 'rr'), (3.0, 9.0)))
 
 
 def disagreement(case: Case, x: np.ndarray) -> float:
@@ -248,3 +160,9 @@ def test_settings_that_contract_without_capture_are_refused_and_some_walk_on(gra
     assert not any(case.certificate.holds for case in cases)
     kept, at_rest = stopped(cases, np.random.default_rng(5))
     assert np.any(~(kept & at_rest))
+
+
+def test_a_setting_has_a_proof_if_and_only_if_it_is_certified() -> None:
+    for case in grid()[3::29]:
+        certified, text = attempt(case.arguments)
+        assert certified == case.certificate.holds == bool(text) == (bool(text) and accepted(text))

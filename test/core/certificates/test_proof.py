@@ -19,8 +19,11 @@ from typing import Any
 import numpy as np
 import pytest
 from core_examples import GAITS, TICK, network, suite_parameters
+from house import code_lines
 
+from dmp_cpg_ros.core.canonical.coupling import Edges, graph_from_edges
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates import check_proof
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.certificates.proof import proof_of
@@ -98,6 +101,36 @@ def test_settings_that_contract_on_a_region_alone_have_proofs() -> None:
         check_proof.check(found)
 
 
+@pytest.mark.parametrize('edges', [
+    ((1, 0), (2, 1), (3, 2)),                                # each follows the one before
+    ((1, 0), (2, 0), (3, 0)),                                # all follow one, uncoupled ones
+    ((0, 1), (1, 0), (2, 1), (2, 3), (3, 2)),                # a pair that follows a pair
+    ((0, 3), (1, 0), (1, 3), (2, 1), (2, 3), (3, 1)),        # one that follows three
+    ((1, 0), (1, 2), (2, 0), (2, 1), (3, 0))])
+def test_graphs_whose_components_follow_one_another_have_proofs(edges: Edges) -> None:
+    gait = coupled(edges, np.eye(2))
+    inhibition = InhibitionParameters(inhibition_gain=2000.0)
+    certificate = certify(gait, inhibition, P.reference, P.leg, P.posture, TICK)
+    assert certificate.holds, certificate.explained()
+    found = check_proof.check(proof(gait, inhibition))
+    assert float(found['synchronisation'][1]) == pytest.approx(
+        certificate['synchronisation'].right, rel=1e-6)
+
+
+def coupled(edges: Edges, gain: np.ndarray) -> GaitNetwork:
+    """The oscillators of an amble on a graph of its own."""
+    gait = network()
+    system = gait.system
+    gait.system = CanonicalSystem(graph_from_edges(4, edges, 100.0 * gain, gait.gait.phases),
+                                  system.oscillators, system.target)
+    return gait
+
+
+def test_couplings_that_are_not_multiples_of_one_have_no_proof() -> None:
+    with pytest.raises(ParameterError, match='k_ij I'):
+        proof(coupled(((0, 1), (1, 0), (2, 1), (3, 2)), np.diag([1.0, 1.1])))
+
+
 def test_what_is_not_certified_has_no_proof() -> None:
     for changes in ({'coupling_gain': 2.0}, {'coupling_gain': 8.0}):
         with pytest.raises(ParameterError, match='no exact proof'):
@@ -166,6 +199,10 @@ def test_a_proof_is_not_accepted_for_parameters_that_are_worse(name: str, value:
         check_proof.check(changed)
 
 
+def test_the_checker_can_be_read_at_a_sitting() -> None:
+    assert code_lines(Path(check_proof.__file__)) <= 150
+
+
 def test_the_checker_is_a_script_of_its_own(tmp_path: Path) -> None:
     path, script = tmp_path / 'proof.json', tmp_path / 'check_proof.py'
     script.write_bytes(Path(check_proof.__file__).read_bytes())
@@ -177,6 +214,10 @@ def test_the_checker_is_a_script_of_its_own(tmp_path: Path) -> None:
                               capture_output=True, check=False).returncode
 
     assert status() == 0
+    text = path.read_text(encoding='utf-8')
     found['witnesses']['rate'] = '1'
-    path.write_text(json.dumps(found), encoding='utf-8')
-    assert status() == 1
+    for changed in (json.dumps(found), text[:-1], text.replace('{', '{"format": "", ', 1),
+                    text.replace('"rho": "8"', '"rho": NaN'),
+                    text.replace('"rho": "8"', '"rho": "8e999999999"'), '[' * 100_000):
+        path.write_text(changed, encoding='utf-8')
+        assert changed != text and status() == 1

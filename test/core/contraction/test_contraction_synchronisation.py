@@ -14,6 +14,7 @@ from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges,
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.synchronisation import (
+    cascade_weights,
     components,
     connectivity,
     grounded_connectivity,
@@ -27,6 +28,7 @@ from dmp_cpg_ros.paper.matrix_measure import (
     hopf_jacobian_vertices,
     matrix_measure,
 )
+from dmp_cpg_ros.studies.certificate_settings import random_edges
 
 SEEDS = st.integers(0, 10_000)
 
@@ -38,6 +40,25 @@ def test_the_connectivity_is_the_smallest_eigenvalue_that_is_not_one_of_the_zero
         graph = graph_from_edges(4, topology(name, 4), 7.0)
         assert connectivity(graph.block_laplacian(), 4) == pytest.approx(7.0 * value)
         assert synchronisation(graph, 0.0).connectivity == pytest.approx(7.0 * value)
+
+
+@pytest.mark.parametrize('size', [2, 3, 4, 6, 9])
+def test_in_its_cascade_weights_a_graph_is_as_connected_as_its_components(size: int) -> None:
+    rng, seen = np.random.default_rng(size), 0
+    for _ in range(60):
+        edges = random_edges(size, rng)
+        gains = rng.uniform(5.0, 50.0, len(edges)) if rng.random() < 0.5 else np.full(
+            len(edges), 20.0)
+        graph = CouplingGraph(size, edges, gains[:, None, None] * np.eye(2),
+                              rng.uniform(-np.pi, np.pi, size))
+        found = synchronisation(graph, 1.0)
+        if found.method == 'hierarchical':
+            weights = cascade_weights(graph, 2.0**-30)
+            assert weights.min() > 0.0 and weights.sum() == pytest.approx(1.0)
+            assert connectivity(graph.block_laplacian(), size, weights) == pytest.approx(
+                found.connectivity, rel=1e-3)
+            seen += 1
+    assert seen > 10
 
 
 def unsynchronised(name: str, gain: float, seconds: float = 2.0) -> float:

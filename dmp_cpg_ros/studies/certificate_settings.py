@@ -1,0 +1,152 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Settings of the suite through its certificate: a grid of 2,304, and random ones."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, Edges, graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.contraction.capture import capture_set
+from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
+from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchronisation
+from dmp_cpg_ros.core.gait.gait import BodyScale
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import operating_range
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.studies.adversary_runs import Setting
+from dmp_cpg_ros.suite import load_gaits
+
+GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')
+LARGEST_MISMATCH = 0.05
+TICK = 0.004
+SCALE, LEG, POSTURE = BodyScale(0.28, math.hypot(0.19, 0.11)), LegParameters(), PostureParameters()
+
+Arguments = tuple[Any, ...]
+"""What :func:`~dmp_cpg_ros.core.certificates.certify.certify` takes: network, inhibition,
+reference, leg, posture, tick."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One setting of the grid with its certificate and what naive checks would say."""
+
+    arguments: Arguments
+    setting: Setting
+    certificate: Certificate
+    free: Synchronisation
+    misread: bool
+    contracts: bool
+
+
+@functools.lru_cache(maxsize=1)
+def grid() -> tuple[Case, ...]:
+    """The whole grid."""
+    rng = np.random.default_rng(4)
+    return tuple(grid_case(*values, rng) for values in product(
+        GRAPHS, ('amble', 'trot', 'bound'), (10.0, 25.0, 60.0, 200.0), (0.65, 0.95, 1.15, 2.0),
+        (0.15, 0.35), ('fl', 'rr'), (3.0, 9.0)))
+
+
+def grid_case(graph: str, gait: str, gain: float, share: float, region: float, leg: str,
+              rho: float, rng: np.random.Generator) -> Case:
+    """Certify a setting of the grid; radius, speed, cadence and frequencies are drawn."""
+    radius = float(rng.uniform(0.5, 2.0))
+    canonical = CanonicalParameters(
+        rho=rho / radius**2, radius=radius, coupling_gain=gain,
+        coupling_graph='ring' if graph == 'directed' else graph,
+        cadence_scale=float(rng.uniform(0.6, 1.6)))
+    reference = ReferenceParameters(max_speed=float(rng.uniform(0.2, 1.5)))
+    network = GaitNetwork(canonical, load_gaits()[gait], SCALE)
+    if graph == 'directed':
+        rng.random(len(LEGS))                        # once phases; what is drawn next stays so
+        _couple(network, graph_from_edges(len(LEGS), random_edges(len(LEGS), rng), gain,
+                                          network.gait.phases))
+    plain = InhibitionParameters(inhibited_legs=(leg,), region_radius=region * radius)
+    omega = operating_range(network, plain, reference).omega[1]
+    inhibition = InhibitionParameters(
+        inhibited_legs=(leg,), region_radius=region * radius,
+        inhibition_gain=share * len(LEGS) * omega * radius / (region * radius))
+    arguments = network, inhibition, reference, LEG, POSTURE, TICK
+    certificate = certify(*arguments)
+    gains = inhibition.armed_gains
+    free = synchronisation(network.system.graph, rho)
+    omegas = omega * (1.0 - _own_frequencies(network.system, omega, gains, free, inhibition, rng))
+    setting = Setting(network.system, omegas, gains, inhibition.region_radius, graph)
+    eigenvalues = np.linalg.eigvals(network.system.graph.block_laplacian()).real
+    return Case(arguments, setting, certificate, free,
+                bool(np.sort(eigenvalues)[len(LEGS)] > rho),
+                certificate['contraction'].right > rho)
+
+
+def random_arguments(rng: np.random.Generator) -> Arguments:
+    """Draw a setting on any graph, with weights, one to four inhibited legs and a tick of 1 to
+    10 ms, whose gains may or may not do.
+    """
+    def some(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    radius, growth = some(0.3, 1.6), some(0.5, 30.0)
+    gain, graph = growth * some(1.5, 60.0), str(rng.choice([*GRAPHS, 'directed', 'cascade']))
+    canonical = CanonicalParameters(
+        rho=growth / radius**2, radius=radius, coupling_gain=gain,
+        coupling_graph='ring' if graph in ('directed', 'cascade') else graph,
+        cadence_scale=some(0.25, 3.0))
+    network = GaitNetwork(canonical, load_gaits()[str(rng.choice(list(load_gaits())))], SCALE)
+    edges: Edges = {'directed': random_edges(len(LEGS), rng),
+                    'cascade': ((0, 1), (1, 0), (2, int(rng.integers(2))), (2, 3), (3, 2))}.get(
+                        graph) or topology(graph, len(LEGS))
+    weights = gain * np.exp(rng.uniform(-0.7, 0.7, len(edges)) * rng.integers(2))
+    _couple(network, CouplingGraph(len(LEGS), edges, weights[:, None, None] * np.eye(2),
+                                   network.gait.phases))
+    reference = ReferenceParameters(max_speed=some(0.1, 2.0), alpha_r=some(1.0, 30.0))
+    legs = tuple(LEGS[leg] for leg in rng.permutation(len(LEGS))[:rng.integers(1, 5)])
+    region = radius * some(0.05, 1.0)
+    plain = InhibitionParameters(inhibited_legs=legs, region_radius=region)
+    omega = operating_range(network, plain, reference).omega[1]
+    inhibition = InhibitionParameters(
+        inhibited_legs=legs, region_radius=region, capture_speed=some(0.02, 0.5),
+        inhibition_gain=some(0.7, 6.0) * len(LEGS) * omega * radius / region / len(legs))
+    leg = LegParameters(stiffness=some(400.0, 2e4), damping=some(20.0, 400.0),
+                        activity_rate=some(5.0, 40.0), clearance=float(rng.uniform(0.0, 0.4)))
+    return network, inhibition, reference, leg, POSTURE, float(rng.uniform(0.001, 0.01))
+
+
+def random_edges(size: int, rng: np.random.Generator) -> Edges:
+    """Directed edges among which node 0 reaches all."""
+    edges = {(i, int(rng.integers(i))) for i in range(1, size)}
+    edges |= {(int(i), int(j)) for i, j in rng.integers(size, size=(size, 2)) if i != j}
+    return tuple(sorted(edges))
+
+
+def _couple(network: GaitNetwork, graph: CouplingGraph) -> None:
+    """Give the oscillators of a gait another graph."""
+    network.system = CanonicalSystem(graph, network.system.oscillators, network.system.target)
+
+
+def _own_frequencies(system: CanonicalSystem, omega: float, gains: Array, free: Synchronisation,
+                     inhibition: InhibitionParameters, rng: np.random.Generator) -> Array:
+    """Shares by which legs turn slower than ω, so unequal that they are still in their places
+    within what capture allows; none where nothing is known.
+    """
+    if not free.synchronises or free.weights is None:
+        return np.zeros(len(LEGS))
+    allowed = 0.5 * capture_set(system, omega, gains, inhibition.region_radius).tolerance
+    share = LARGEST_MISMATCH
+    while share > 1e-4 and not mismatch_bound(
+            free, system.rho[0], system.radius[0], share * omega).distance <= allowed:
+        share *= 0.5
+    return rng.uniform(0.0, share, len(LEGS)) if share > 1e-4 else np.zeros(len(LEGS))

@@ -1,0 +1,52 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A sample of the study of proofs, and that it would notice a checker that is too kind."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+from dmp_cpg_ros.studies import proofs
+
+
+@functools.lru_cache(maxsize=1)
+def drawn() -> tuple[tuple[bool, str], ...]:
+    """Random settings: whether they are certified, and their proofs."""
+    return tuple(proofs.random_attempt((7, seed)) for seed in range(24))
+
+
+def texts() -> list[str]:
+    return [text for _, text in drawn() if text]
+
+
+def verdicts(kind: str, count: int) -> list[str]:
+    rng = np.random.default_rng(list(kind.encode()))
+    return [proofs.verdict(one, kind, other, rng) for one, other in [
+        (texts()[k], texts()[k - 1]) for k in rng.integers(len(texts()), size=count)]]
+
+
+def test_a_random_setting_has_a_proof_if_and_only_if_it_is_certified() -> None:
+    for certified, text in drawn():
+        assert certified == bool(text)
+        assert not text or proofs.accepted(text)
+    assert 5 < len(texts()) < len(drawn())
+
+
+def test_no_claim_of_a_proof_is_refuted_by_other_formulas() -> None:
+    assert [proofs.refuted(*proofs.parts(text)) for text in texts()] == [[]] * len(texts())
+
+
+@pytest.mark.parametrize('kind', [*proofs.DAMAGES, *proofs.FORGERIES])
+def test_spoiled_proofs_are_refused(kind: str) -> None:
+    found = verdicts(kind, 12)
+    assert proofs.REFUSED in found and proofs.WRONG not in found
+
+
+@pytest.mark.parametrize('kind', proofs.FORGERIES)
+def test_a_checker_that_accepts_everything_is_noticed(kind: str,
+                                                      monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(proofs, 'accepted', lambda text: True)
+    assert proofs.WRONG in verdicts(kind, 12)
