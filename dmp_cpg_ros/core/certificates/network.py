@@ -124,7 +124,8 @@ def analyse_network(network: GaitNetwork, inhibition: InhibitionParameters,
 def network_inequalities(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
     """Inequalities (a), (b), (c) and (g) of a setting."""
     found, p, span = analysis.found, s.network.parameters, s.span
-    margin = mismatch_margin(found, p.rho, p.radius, LOCKED_PHASE_ERROR)
+    margin = mismatch_margin(s.network.system.graph, found, p.rho, p.radius,
+                             LOCKED_PHASE_ERROR)
     return [
         Inequality('synchronisation', found.growth, found.connectivity, '1/s', 'rho r^2',
                    'connectivity of L_K', PROVED,

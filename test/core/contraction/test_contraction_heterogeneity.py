@@ -10,17 +10,19 @@ from contraction_batches import Batch, Setting, locked
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.coupling import CouplingGraph, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.heterogeneity import (
     disagreement_bound,
     mismatch_bound,
     mismatch_margin,
+    phase_gain,
 )
-from dmp_cpg_ros.core.contraction.synchronisation import synchronisation
+from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian, synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.paper.transverse_metric import hopf_tube, metric_condition, tube_radius
+from dmp_cpg_ros.studies.certificate_settings import random_edges
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 
@@ -56,12 +58,51 @@ def test_disagreement_stays_below_its_bound_for_every_mismatch(name: str) -> Non
 
 @pytest.mark.parametrize('name', GRAPHS)
 def test_within_the_margin_phases_stay_together_and_far_beyond_they_do_not(name: str) -> None:
-    found = synchronisation(graph_from_edges(4, topology(name, 4), 60.0), 8.0)
-    margin = mismatch_margin(found, 8.0, 1.0, 0.05)
+    graph = graph_from_edges(4, topology(name, 4), 60.0)
+    margin = mismatch_margin(graph, synchronisation(graph, 8.0), 8.0, 1.0, 0.05)
     signs = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1], [1, 1, 1, -1]])
     assert margin > 0.0
     assert spreads(name, 60.0, margin * signs)[0].max() <= 0.05
     assert spreads(name, 60.0, 3.0 * margin * signs)[0].max() > 0.05
+
+
+@pytest.mark.parametrize('size', [2, 3, 5])
+def test_the_gain_of_phases_is_what_the_worst_signs_in_time_reach(size: int) -> None:
+    rng = np.random.default_rng(size)
+    edges = random_edges(size, rng)
+    L = comparison_laplacian(graph_from_edges(size, edges, 30.0))
+    gain, h = phase_gain(L), 2e-4
+    assert gain is not None
+    i, j = np.unravel_index(gain.argmax(), gain.shape)
+    z, reached = np.eye(size)[i] - np.eye(size)[j], 0.0
+    decay = np.eye(size) - h * L + 0.5 * h * h * L @ L
+    for _ in range(20_000):
+        reached += h * np.abs(0.5 * (z + z @ decay)).sum()
+        z = z @ decay
+    assert reached <= gain[i, j] * (1.0 + 1e-6) <= 1.01 * reached
+
+
+def test_phases_stay_within_the_margin_on_random_weighted_graphs() -> None:
+    rng, seen = np.random.default_rng(8), 0
+    for _ in range(12):
+        edges = {(int(i), int(j)) for i, j in rng.integers(4, size=(4, 2)) if i != j}
+        edges = tuple(sorted({*edges, *((j, i) for i, j in edges), *topology('path', 4)}))
+        graph = CouplingGraph(4, edges, rng.uniform(30.0, 120.0, len(edges))[:, None, None]
+                              * np.eye(2), np.zeros(4))
+        margin = mismatch_margin(graph, synchronisation(graph, 8.0), 8.0, 1.0, 0.05)
+        system = CanonicalSystem(graph, AndronovHopf(8.0))
+        signs = rng.choice([-1.0, 1.0], (40, 4))
+        batch = Batch([Setting(system, 10.0 + margin * row, np.array([1.0, 0, 0, 0]), 1.0)
+                       for row in signs], 0.004)
+        x = np.stack([locked(case, 0.0) for case in batch.settings])
+        for step in range(500):
+            if step % 20 == 0:
+                batch.omega = 10.0 + margin * rng.choice([-1.0, 1.0], (40, 4))
+            x = batch.step(x, armed=False)
+            z = x[:, :, 0] - 1j * x[:, :, 1]
+            assert np.ptp(np.angle(z / z[:, :1]), axis=1).max() <= 0.05
+        seen += margin > 0.0
+    assert seen > 6
 
 
 def test_stronger_coupling_makes_the_disagreement_as_small_as_one_likes() -> None:
@@ -71,8 +112,9 @@ def test_stronger_coupling_makes_the_disagreement_as_small_as_one_likes() -> Non
 
 
 def test_nothing_is_promised_for_networks_that_are_not_certified() -> None:
-    weak = synchronisation(graph_from_edges(4, topology('path', 4), 5.0), 8.0)
-    assert mismatch_margin(weak, 8.0, 1.0, 0.05) == 0.0
+    graph = graph_from_edges(4, topology('path', 4), 5.0)
+    weak = synchronisation(graph, 8.0)
+    assert mismatch_margin(graph, weak, 8.0, 1.0, 0.05) == 0.0
     assert mismatch_bound(weak, 8.0, 1.0, 0.1).distance == np.inf
     with pytest.raises(ParameterError, match='must be positive'):
         disagreement_bound(0.0, 1.0, np.full(4, 0.25))
