@@ -65,7 +65,7 @@ STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
 FIGURE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-adversary benchmark-walking doc-images paper-figures bench lint install clean
+.PHONY: help demo test study-stops study-recovery study-adversary study-files benchmark-walking doc-images paper-figures bench lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -87,6 +87,9 @@ study-recovery: $(INSTALLED) ## stand up, lie down, recover from 50 falls (STUDY
 
 study-adversary: $(INSTALLED) ## search for a certificate that is wrong (STUDY_ARGS='--seconds 600')
 	$(BIN)/python -m dmp_cpg_ros.studies.adversary $(STUDY_ARGS)
+
+study-files: $(INSTALLED) ## read 20,000 spoiled files of every kind (STUDY_ARGS=...)
+	$(BIN)/python -m dmp_cpg_ros.studies.fuzz_files $(STUDY_ARGS)
 
 benchmark-walking: $(INSTALLED) ## measure speeds, pushes, rough ground, gait changes (BENCHMARK_ARGS=...)
 	$(ACTIVATED) benchmark_walking $(BENCHMARK_ARGS)

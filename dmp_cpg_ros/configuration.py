@@ -12,6 +12,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from itertools import count
 from math import inf
@@ -20,7 +21,7 @@ from typing import Any
 
 import yaml
 
-from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
 from dmp_cpg_ros.core.parameters import shown
 
 PACKAGE = 'dmp_cpg_ros'
@@ -56,6 +57,8 @@ def find_config(name: str | Path) -> Path:
     MissingFileError
         If there is no such file; the text lists the folders searched and the names that exist.
     """
+    if not isinstance(name, (str, Path)) or '\0' in str(name):
+        raise MissingFileError(f'{shown(name)} is no name of a file')
     given = Path(os.path.expanduser(name))
     if os.path.isfile(given):
         return given.absolute()
@@ -117,6 +120,19 @@ def load_yaml(path: str | Path) -> dict[str, Any]:
         raise DataError(f"'{path}', line 1: must be a mapping (name: value), "
                         f'not {type(content).__name__}')
     return content or {}
+
+
+@contextmanager
+def naming(path: str | Path) -> Iterator[None]:
+    """Name a file in the errors about what it holds; too much of it is such an error as well."""
+    try:
+        yield
+    except DmpCpgError as error:
+        if str(path) in str(error):
+            raise
+        raise type(error)(f"'{path}': {error}") from error
+    except (MemoryError, OverflowError, RecursionError) as error:
+        raise DataError(f"'{path}' holds more than can be read: {error}") from error
 
 
 def parse_yaml(text: str, where: str) -> Any:

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 
-from dmp_cpg_ros.configuration import find_config, load_yaml
-from dmp_cpg_ros.core.errors import DataError, MissingFileError, ParameterError
+from dmp_cpg_ros.configuration import find_config, load_yaml, naming
+from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.parameters import check_names, shown
 from dmp_cpg_ros.core.primitives.basis import GaussianBases, VonMisesBases
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
@@ -117,7 +117,11 @@ def load_primitive(path: str | Path) -> Primitive:
     if content.get('format') != _FORMAT:
         raise DataError(
             f'{path}: format {shown(content.get("format"))} is not known; valid is {_FORMAT}')
-    of = _KINDS[kind]
+    with naming(path):
+        return _read(_KINDS[kind], content, path)
+
+
+def _read(of: _Kind, content: dict[str, Any], path: str | Path) -> Primitive:
     keys = (*_WORDS, *_SHARED, *of.scalars, *of.vectors)
     check_names(content, keys, keys, str(path))
     names = content['names']
@@ -171,14 +175,12 @@ def load_motion(name: str) -> Motion | None:
         motion: Motion = offered.load()()
         return motion
     path = find_config(name)
-    try:
+    with naming(path):
         primitive = load_primitive(path)
         if not isinstance(primitive, RhythmicPrimitive):
             raise DataError('a motion is a rhythmic primitive, and this one is discrete')
-        return LearnedMotion(primitive)
-    except (DataError, ParameterError) as error:
-        told = str(error)
-        raise DataError(told if str(path) in told else f'{path}: {told}') from error
+        with np.errstate(all='ignore'):  # what is not finite no foot can walk with
+            return LearnedMotion(primitive)
 
 
 def motion_overrides(name: str) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
+from dmp_cpg_ros.configuration import find_config, load_yaml, naming, node_parameters
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
@@ -80,7 +80,8 @@ def load_gaits(name: str | Path = 'gaits.yaml') -> dict[str, Gait]:
     gaits = load_yaml(path).get('gaits')
     if not isinstance(gaits, Mapping) or not gaits:
         raise ParameterError(f"'{path}' must have a mapping 'gaits'")
-    return {key: Gait.from_mapping(key, values) for key, values in gaits.items()}
+    with naming(path):
+        return {key: Gait.from_mapping(key, values) for key, values in gaits.items()}
 
 
 def load_gait(name: str, file: str | Path = 'gaits.yaml') -> Gait:
@@ -119,6 +120,11 @@ def load_suite(file: str | Path | None = None, overrides: Mapping[str, Any] | No
         if name not in SUITE_NAMES:
             raise ParameterError(
                 f"there is no parameter '{name}'; valid are {', '.join(sorted(SUITE_NAMES))}")
+    with naming(path):
+        return _suite(path, overrides, namespace)
+
+
+def _suite(path: Path, overrides: Mapping[str, Any], namespace: str) -> Suite:
     content = load_yaml(path)
     sets = {kind.name: node_sets(path, kind.name, overrides, namespace, content=content)
             for kind in WALKING}

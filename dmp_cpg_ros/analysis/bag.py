@@ -27,13 +27,17 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC, Writer
-from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
-from rosbags.rosbag2 import ReaderError
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from dmp_cpg_ros.configuration import numbered
+from dmp_cpg_ros.configuration import naming, numbered
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.core.parameters import LONGEST_SHOWN, shown
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+"""Definitions of the messages that are read; those in a bag are not trusted."""
 
 STORAGE_SUFFIXES = ('.mcap', '.db3')
 
@@ -83,7 +87,7 @@ def opened(bag: Path) -> Iterator[AnyReader]:
         If the bag cannot be read, also later, or a folder holds several that do not belong
         together.
     """
-    with ExitStack() as stack:
+    with ExitStack() as stack, naming(bag):
         try:
             reader = _reader([bag])
         except DataError as damage:
@@ -93,15 +97,23 @@ def opened(bag: Path) -> Iterator[AnyReader]:
             except DataError:
                 reader = _reader([ros_part(file, stack) for file in files])
         stack.callback(reader.close)
-        try:
-            yield reader
-        except (AnyReaderError, ReaderError, OSError) as error:
-            raise DataError(f"the bag '{bag}' is damaged: {error}") from error
+        yield reader
 
 
 def base_name(topic: str) -> str:
     """Topic without namespace."""
     return topic.rsplit('/', 1)[-1]
+
+
+def recorded(reader: AnyReader, connections: Collection[Connection]
+             ) -> Iterator[tuple[Connection, int, bytes]]:
+    """Messages of some connections with their record times [ns], as they were recorded; raises
+    DataError where the bag is damaged.
+    """
+    try:
+        yield from reader.messages(connections) if connections else ()
+    except Exception as error:
+        raise DataError(f'the bag is damaged: {told(error)}') from error
 
 
 def decoded(reader: AnyReader, connections: Collection[Connection], skipped: Counter[str],
@@ -118,10 +130,9 @@ def decoded(reader: AnyReader, connections: Collection[Connection], skipped: Cou
         Gets by topic how many messages were left out because they could not be decoded; a warning
         names them at the end.
     """
-    for connection, bag_ns, raw in reader.messages(connections) if connections else ():
-        try:
-            message = reader.deserialize(raw, connection.msgtype)
-        except AnyReaderError:
+    for connection, bag_ns, raw in recorded(reader, connections):
+        message = _message(raw, connection)
+        if message is None:
             skipped[connection.topic] += 1
         else:
             yield connection, bag_ns, message
@@ -130,13 +141,31 @@ def decoded(reader: AnyReader, connections: Collection[Connection], skipped: Cou
         logging.getLogger(__name__).warning('left out what cannot be decoded: %s', listed)
 
 
+def _message(raw: bytes, connection: Connection) -> Any | None:
+    """Message that some bytes are; None when they are none."""
+    try:
+        return STORE.deserialize_cdr(raw, connection.msgtype)
+    except (SerdeError, ArithmeticError, LookupError, MemoryError, ValueError, struct.error):
+        return None
+
+
 def _reader(paths: Sequence[Path]) -> AnyReader:
     try:
-        reader = AnyReader(paths, default_typestore=get_typestore(Stores.ROS2_JAZZY))
+        reader = AnyReader(paths, default_typestore=STORE)
         reader.open()
-    except (AnyReaderError, OSError, AssertionError, TypeError, KeyError, ValueError) as error:
-        raise DataError(f"the bag '{paths[0]}' cannot be read: {error}") from error
+        try:
+            assert all(of.msgcount >= 0 for of in reader.topics.values()), 'less than no message'
+        except BaseException:
+            reader.close()
+            raise
+    except Exception as error:
+        raise DataError(f"the bag '{paths[0]}' cannot be read: {told(error)}") from error
     return reader
+
+
+def told(error: Exception) -> str:
+    """What an error of a library says, or is."""
+    return shown(error) if len(str(error)) > LONGEST_SHOWN else str(error) or repr(error)
 
 
 def _parts(bag: Path, damage: DataError) -> list[Path]:
@@ -181,16 +210,16 @@ def payload_digests(path: Path | str) -> dict[str, str]:
     hashes: dict[str, hashlib._Hash] = {}
     with opened(find_bag(path)) as reader:
         used = [c for c in reader.connections if base_name(c.topic) in DIGESTED]
-        for connection, _, raw in reader.messages(used) if used else ():
+        for connection, _, raw in recorded(reader, used):
             key = base_name(connection.topic)
-            if key != 'joint_states':
-                message = reader.deserialize(raw, connection.msgtype)
-            if key == 'joint_targets':  # one publisher per leg; they interleave as they like
+            message = None if key == 'joint_states' else _message(raw, connection)
+            # One publisher per leg; they interleave as they like.
+            if message is not None and key == 'joint_targets':
                 key += f'/{message.name[0].split("_", 1)[0] if message.name else "unnamed"}'
-            elif key == 'canonical_state':
+            elif message is not None:
                 # Its texts change their length, and then the middleware leaves pieces of earlier
                 # messages in the alignment bytes; written anew they are zeros.
-                raw = bytes(reader.typestore.serialize_cdr(message, connection.msgtype))
+                raw = bytes(STORE.serialize_cdr(message, connection.msgtype))
             hashes.setdefault(key, hashlib.sha256()).update(raw)
     return {key: value.hexdigest() for key, value in sorted(hashes.items())}
 
@@ -321,5 +350,5 @@ def _complete_records(file: BinaryIO) -> Iterator[McapRecord]:
     """Records up to where the file breaks off."""
     try:
         yield from StreamReader(file).records
-    except (McapError, EOFError, struct.error, UnicodeDecodeError):
+    except (McapError, EOFError, MemoryError, OverflowError, ValueError, struct.error):
         return

@@ -17,6 +17,7 @@ from dmp_cpg_ros import layouts
 from dmp_cpg_ros.analysis import recording
 from dmp_cpg_ros.analysis.bag import base_name, decoded, find_bag, opened
 from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent
+from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
@@ -64,9 +65,14 @@ def load_recording(path: Path | str) -> Recording:
         If it is not a readable bag, or holds the topics of more than one robot. Single messages
         that cannot be decoded are no error: they are left out, counted and warned of.
     """
+    with naming(path):
+        return _loaded(find_bag(path))
+
+
+def _loaded(bag: Path) -> Recording:
     messages: dict[str, list[Received]] = defaultdict(list)
     skipped = Counter[str]()
-    with opened(find_bag(path)) as reader:
+    with opened(bag) as reader:
         robots = sorted(topic for topic in reader.topics if base_name(topic) == 'joint_states')
         if len(robots) > 1:
             raise DataError(f'the bag holds {len(robots)} robots ({", ".join(robots)}); '

@@ -8,14 +8,18 @@ One is of joints, or of how the feet of a robot walked in a run.
 from __future__ import annotations
 
 import csv
+import io
+import math
+import zipfile
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
+from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis import bag, episodes, motion
@@ -23,8 +27,9 @@ from dmp_cpg_ros.analysis.context import find_parameter
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.commands.run_folder import read_json, run_context
+from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rate
-from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
@@ -37,6 +42,12 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters, body_scale, nomin
 _TIME_NAMES = ('t', 'time', 'time_s', 'timestamp', 'stamp')
 _ARRAYS = {'positions': '', 'velocities': '_velocity', 'accelerations': '_acceleration'}
 _JOINT_STATE = 'sensor_msgs/msg/JointState'
+
+LARGEST_TABLE, LARGEST_ARRAY = 2**24, 2**25
+"""Longest CSV file and largest array that are read [B]."""
+
+LARGEST_VALUE = 1e12
+"""Largest number in a demonstration."""
 
 SLOWEST = 0.1
 """Speed of the reference from which the robot walks [m/s]."""
@@ -77,6 +88,12 @@ def read_demonstration(path: Path, joints: Sequence[str] = (), topic: str = 'joi
     DataError
         If it cannot be read; the text says what is valid.
     """
+    with naming(path):
+        return _read(path, joints, topic, start, end)
+
+
+def _read(path: Path, joints: Sequence[str], topic: str, start: float | None, end: float | None
+          ) -> Demonstration:
     if not path.exists():
         raise MissingFileError(f"'{path}' does not exist; name a CSV, .npy or .npz file or a bag")
     suffix = path.suffix.lower()
@@ -91,6 +108,10 @@ def read_demonstration(path: Path, joints: Sequence[str] = (), topic: str = 'joi
     _check_joints(path, joints, whole.names)
     names = tuple(joints) or whole.names
     columns = [whole.names.index(name) for name in names] if names else slice(None)
+    for values in (whole.times, *(getattr(whole, field) for field in _ARRAYS)):
+        if values is not None and not np.abs(values).max(initial=0.0) <= LARGEST_VALUE:
+            raise DataError(f'{np.abs(values).max():.3g} is no number of a movement; valid are '
+                            f'numbers up to {LARGEST_VALUE:g}')
     since = whole.times - whole.times[0]
     rows = (since >= (start or 0.0)) & (since <= (np.inf if end is None else end))
     parts: dict[str, Any] = {field: values[rows][:, columns] for field in _ARRAYS
@@ -108,10 +129,10 @@ def _check_joints(path: Path, joints: Iterable[str], known: Collection[str]) -> 
 def _from_csv(path: Path) -> Demonstration:
     """Columns by name: time, NAME, and NAME_velocity, NAME_acceleration where they exist."""
     try:
-        text = path.read_text(encoding='utf-8-sig')
-    except (OSError, UnicodeDecodeError) as error:
+        text = _bytes(path.open('rb'), LARGEST_TABLE).decode('utf-8-sig')
+        rows = [row for row in csv.reader(text.splitlines()) if ''.join(row).strip()]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"'{path}' cannot be read as text: {error}") from error
-    rows = [row for row in csv.reader(text.splitlines()) if ''.join(row).strip()]
     if not rows:
         raise DataError(f"'{path}' is empty; its first column must be time [s]")
     try:
@@ -139,28 +160,56 @@ def _from_csv(path: Path) -> Demonstration:
 
 
 def _from_numpy(path: Path) -> Demonstration:
+    """Arrays that are no larger than they say, and hold numbers or names."""
     try:
-        content = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise DataError(f"'{path}' is no NumPy file of plain arrays: {error}") from error
-    if isinstance(content, np.ndarray):
-        if content.ndim != 2 or content.shape[1] < 2 or not np.isrealobj(content):
-            raise DataError(
-                f"'{path}' must hold an array (m, 1 + n) with the time [s] in its first column, "
-                f'not one of shape {content.shape}')
-        return Demonstration(content[:, 0], content[:, 1:])
-    with content:
-        for needed in ('times', 'positions'):
-            if needed not in content.files:
-                raise DataError(f"'{path}' has no array '{needed}'; needed are times, positions, "
-                                'possible velocities, accelerations, names')
-        try:
-            arrays: dict[str, Any] = {name: content[name] for name in ('times', *_ARRAYS, 'names')
-                                      if name in content.files}
-        except ValueError as error:
-            raise DataError(f"'{path}' holds more than plain arrays: {error}") from error
-    names = tuple(map(str, arrays.pop('names', ())))
+        if not zipfile.is_zipfile(path):
+            table = _array(path.open('rb'))
+            if table.ndim != 2 or table.shape[1] < 2 or table.dtype.kind == 'U':
+                raise DataError(
+                    f"'{path}' must hold an array (m, 1 + n) with the time [s] in its first "
+                    f'column, not one of shape {table.shape}')
+            return Demonstration(table[:, 0], table[:, 1:])
+        with zipfile.ZipFile(path) as archive:
+            held = {name: f'{name}.npy' for name in ('times', *_ARRAYS, 'names')
+                    if f'{name}.npy' in archive.namelist()}
+            arrays: dict[str, Any] = {name: _array(archive.open(file))
+                                      for name, file in held.items()}
+    except DmpCpgError:
+        raise
+    except Exception as error:
+        raise DataError(
+            f"'{path}' is no NumPy file of plain arrays: {error or 'it ends early'}") from error
+    for needed in ('times', 'positions'):
+        if needed not in arrays:
+            raise DataError(f"'{path}' has no array '{needed}'; needed are times, positions, "
+                            'possible velocities, accelerations, names')
+    names = tuple(map(str, arrays.pop('names', np.array([])).ravel()))
     return Demonstration(**arrays, names=names)
+
+
+def _array(file: IO[bytes]) -> NDArray[Any]:
+    """One array; nothing is unpickled, and no memory is taken on a header's word."""
+    data = io.BytesIO(_bytes(file, LARGEST_ARRAY))
+    head = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+    shape, _, kind = head[npy.read_magic(data)](data)
+    size = math.prod(shape) * kind.itemsize
+    if kind.kind not in 'biufU' or min(shape, default=0) < 0 or math.prod(shape) > LARGEST_ARRAY:
+        raise DataError(f'an array of {kind} and shape {shape} is no demonstration; valid are '
+                        'numbers, and words for names')
+    if size != len(data.getvalue()) - data.tell():
+        raise DataError(f'an array says that it has {size} bytes, and has '
+                        f'{len(data.getvalue()) - data.tell()}')
+    data.seek(0)
+    array: NDArray[Any] = np.load(data, allow_pickle=False)
+    return array
+
+
+def _bytes(file: IO[bytes], most: int) -> bytes:
+    with file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise DataError(f'it is larger than the {most / 2**20:g} MiB that are read')
+    return data
 
 
 def _from_bag(path: Path, topic: str, joints: Sequence[str]) -> Demonstration:

@@ -17,6 +17,9 @@ from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 BAD_INPUT = 2
 """Exit status of a command whose arguments or files cannot be used."""
 
+LONGEST_LINE = 5000
+"""Length of an error on the terminal; the names of all parameters fit."""
+
 LEVELS = ('debug', 'info', 'warn', 'error', 'fatal')
 """Log levels of ROS; Python's have the same names."""
 
@@ -78,8 +81,15 @@ def run_command(parser: argparse.ArgumentParser, arguments: Sequence[str] | None
         problem = str(error)
     except OSError as error:
         problem = f"cannot write '{error.filename or 'output'}': {error.strerror}"
-    print(f'{parser.prog}: {problem}', file=sys.stderr)
+    print(f'{parser.prog}: {one_line(problem)}', file=sys.stderr)
     return BAD_INPUT
+
+
+def one_line(text: str) -> str:
+    """Text of libraries, or from files, as one line that changes nothing in a terminal."""
+    words = '; '.join(line.strip() for line in text.splitlines() if line.strip())
+    shown = ''.join(c if c.isprintable() else ascii(c)[1:-1] for c in words[:LONGEST_LINE])
+    return shown if len(words) <= LONGEST_LINE else f'{shown}...'
 
 
 def parse_arguments(parser: argparse.ArgumentParser, arguments: Sequence[str] | None, *,

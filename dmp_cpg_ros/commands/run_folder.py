@@ -22,6 +22,7 @@ from dmp_cpg_ros.analysis.run import Draw
 from dmp_cpg_ros.configuration import find_config, first_free
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
 from dmp_cpg_ros.suite import load_gait, load_gaits, node_sets
@@ -105,7 +106,7 @@ def read_json(path: Path) -> dict[str, Any]:
     """Read an earlier result; empty where there is none that can be read."""
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return content if isinstance(content, dict) else {}
 
@@ -145,7 +146,8 @@ def run_context(parameters: Mapping[str, Any] | None, robot_file: Path | str | N
         lambda: _parameter_set(InhibitionParameters, parameters))
     world = _read_or(World(), 'the world is taken to be flat',
                      lambda: _parameter_set(WorldParameters, parameters).build())
-    radius = float(find_parameter(parameters, 'radius', 1.0))
+    radius = _read_or(1.0, 'the radius is taken to be 1', lambda: CanonicalParameters(
+        radius=find_parameter(parameters, 'radius', 1.0)).radius)
     return RunContext(robot, gait, inhibition, radius, world, gaits), path
 
 

@@ -18,7 +18,13 @@ from typing import Any
 from dmp_cpg_ros.commands import film, ros_arguments, run_folder
 from dmp_cpg_ros.commands.analyze import analyze_run, print_facts
 from dmp_cpg_ros.commands.certify import running_parameters
-from dmp_cpg_ros.configuration import config_folders, find_config, load_yaml, unused_sections
+from dmp_cpg_ros.configuration import (
+    config_folders,
+    find_config,
+    load_yaml,
+    naming,
+    unused_sections,
+)
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
@@ -82,7 +88,11 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
         overrides['robot'] = str(find_config(options.robot).resolve())
     if options.rate is not None:
         overrides['control_rate'] = options.rate
-    suite = load_suite(options.parameters or ros.parameters_file, overrides, ros.namespace)
+    file = options.parameters or ros.parameters_file
+    if scenario.parameters:
+        with naming(options.scenario):
+            load_suite(file, scenario.parameters, ros.namespace)
+    suite = load_suite(file, overrides, ros.namespace)
     events = {event.kind for event in scenario.events}
     if 'push' in events and suite.robot.physics != 'mujoco':
         raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.roots import last_that_holds
@@ -21,7 +22,7 @@ from dmp_cpg_ros.robot import model_parts
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_parts import ModelIds, foot_position
 from dmp_cpg_ros.robot.mujoco_import import mujoco
-from dmp_cpg_ros.robot.robot_file import RobotFile, load_robot_file
+from dmp_cpg_ros.robot.robot_file import OWN_MODEL, RobotFile, load_robot_file
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 Vector = NDArray[np.float64]
@@ -49,8 +50,9 @@ def load_description(path: Path | str | None = None) -> RobotDescription:
     MissingFileError, ParameterError
         If a file is missing, or the model is no quadruped of the kind that this package drives.
     """
-    file = load_robot_file(path)
-    return read_description(load_model(file.model, file.base), file)
+    with naming(path or OWN_MODEL):
+        file = load_robot_file(path)
+        return read_description(load_model(file.model, file.base), file)
 
 
 def pose(model: mujoco.MjModel, ids: ModelIds, joint_position: Vector) -> mujoco.MjData:
@@ -263,6 +265,11 @@ def inspect_model(path: Path | str) -> Inspection:
         the text says what was found.
     """
     path = Path(path).expanduser()
+    with naming(path):
+        return _inspected(path)
+
+
+def _inspected(path: Path) -> Inspection:
     model = load_model(path, '')
     base = _base(model, path)
     data = mujoco.MjData(model)

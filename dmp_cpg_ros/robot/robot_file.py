@@ -13,7 +13,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dmp_cpg_ros.configuration import load_yaml
+from dmp_cpg_ros.configuration import load_yaml, naming
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.parameters import check_names, shown
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
@@ -98,6 +98,11 @@ def load_robot_file(robot: RobotFile | Path | str | None) -> RobotFile:
     if robot is None:
         return own_robot_file()
     path = Path(os.path.expanduser(robot))
+    with naming(path):
+        return _read(path)
+
+
+def _read(path: Path) -> RobotFile:
     content, where = load_yaml(path), f"robot file '{path}'"
     check_names(content, (*_REQUIRED, 'stance_height', *_PER_JOINT), _REQUIRED, where)
     for key in ('joints', 'feet'):
