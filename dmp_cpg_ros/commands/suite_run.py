@@ -123,8 +123,10 @@ def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
 
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say, *,
-              lock_step: bool, processes: str) -> None:
+              lock_step: bool, processes: str) -> str:
     """Run the suite from nothing to nothing.
+
+    A walk goes on without its recorder, which says at once when it cannot write any more.
 
     Parameters
     ----------
@@ -142,6 +144,11 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         Whether the robot waits for the targets of every tick.
     processes : str
         How nodes share processes, a key of :data:`~dmp_cpg_ros.suite_table.PROCESSES`.
+
+    Returns
+    -------
+    str
+        How the recorder ended before its time; empty where it did not.
 
     Raises
     ------
@@ -172,6 +179,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
                 player.begin()
                 watch.until(player.finished, math.inf)
                 player.finished.result()
+                return watch.unrecorded
             finally:
                 # In lock-step no time passes that nobody asks for: nothing can fall.
                 if not lock_step and player.time_ns > 0:
@@ -202,7 +210,7 @@ class _Watch:
         self._interrupted, self._say = interrupted, say
         self._transitions = {name: player.create_client(ChangeState, f'{name}/change_state')
                              for name in (*WALKING_NODES, RECORDER)}
-        self._recording, self._ending = True, False
+        self._recording, self._ending, self.unrecorded = True, False, ''
         self._recorded: Any = None
         topic = interface('~/recorded')
         player.create_subscription(
@@ -217,10 +225,20 @@ class _Watch:
             self._executor.spin_until_future_complete(future, timeout_sec=SLICE_S)
             if self._interrupted and not self._ending:
                 raise InterruptedRunError(self._interrupted[0])
-            ended = self._group.ended()
-            if ended:
+            if ended := self._ended():
                 raise SuiteError('; '.join(ended))
         return bool(future.done())
+
+    def _ended(self) -> list[str]:
+        """Processes that have ended; of a recorder, while it walks, it is told once."""
+        ended = self._group.ended()
+        lost = [how for how in ended if how.startswith(f'{RECORDER} ')]
+        if lost and self._player.begun:
+            if self._recording:
+                self._recording, self.unrecorded = False, lost[0]
+                self._say(self._player.time_ns * 1e-9, f'{lost[0]}; the walk goes on unrecorded')
+            ended.remove(lost[0])
+        return ended
 
     def until_ready(self) -> None:
         """Ask every node whether it is active and connected until all say yes."""
@@ -237,11 +255,12 @@ class _Watch:
     def lay_down(self) -> None:
         """End the recording, then lay the robot down; a second Ctrl-C cuts it short."""
         self._ending, begun = True, len(self._interrupted)
-        if self._group.ended():
+        if self._ended():
             return
         with suppress(DmpCpgError):
             for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
-                self._change_state(RECORDER, transition)
+                if self._recording:
+                    self._change_state(RECORDER, transition)
             self._recording = False
             down, deadline = self._player.lie_down(), time.monotonic() + LYING_WITHIN_S
             while len(self._interrupted) == begun and time.monotonic() < deadline:
@@ -251,7 +270,7 @@ class _Watch:
     def finish_work(self) -> None:
         """Stop the robot, let the recorder take all that was said, deactivate everything."""
         self._ending = True
-        if self._group.ended():
+        if self._ended():
             return
         with suppress(DmpCpgError):
             self._change_state(ROBOT)

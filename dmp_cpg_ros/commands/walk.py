@@ -169,9 +169,12 @@ def _run(plan: _Plan, folder: Path) -> int:
     arguments = ['--ros-args', '--params-file', str(file), *ros.others,
                  *(word for name, to in rules for word in ('-r', f'{name}:={to}'))]
     try:
-        run_suite(plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say,
-                  lock_step=options.lock_step, processes=options.processes)
-        return OK
+        unrecorded = run_suite(
+            plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say,
+            lock_step=options.lock_step, processes=options.processes)
+        if unrecorded:
+            print(f'walk: {unrecorded}; the rest of the walk was not recorded', file=sys.stderr)
+        return FAILED if unrecorded else OK
     except InterruptedRunError as error:
         print(f'walk: {error}; the recording up to here is complete', file=sys.stderr)
         return INTERRUPTED + error.signal

@@ -181,6 +181,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         Stamp of the robot's last tick [ns].
     mode : str
         What the body does, as last told; empty before.
+    begun : bool
+        Whether the scenario plays.
     """
 
     def __init__(self, scenario: Scenario, tick_ns: int, lock_step: bool,
@@ -190,7 +192,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._tick_ns, self._lock_step, self._say = tick_ns, lock_step, say
         self._actions, self._next = scenario.timeline(tick_ns), 0
         self._end_ns = scenario.ticks(tick_ns) * tick_ns
-        self._begun, self._busy, self._word = False, False, ''
+        self.begun, self._busy, self._word = False, False, ''
         self._holding_ns, self._inhibition_ns = -1, -1
         self.time_ns, self.mode, self.finished = 0, '', Future()
         self._lain: Future | None = None
@@ -223,7 +225,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     def begin(self) -> None:
         """Begin with the first tick."""
-        self._begun = True
+        self.begun = True
         if self._lock_step:
             self._continue()
         else:
@@ -251,7 +253,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """Deliver what acts at the held tick once all nodes have finished the tick before, then
         open the gate.
         """
-        if (not self._begun or not self._lock_step or self._holding_ns < 0 or self._busy
+        if (not self.begun or not self._lock_step or self._holding_ns < 0 or self._busy
                 or self.finished.done()):
             return
         if self._holding_ns > 0 and self._inhibition_ns < self._holding_ns - self._tick_ns:
@@ -352,7 +354,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
     def _on_clock(self, message: Clock) -> None:
         self.time_ns = stamp_ns(message.clock)
         self._watch_lying()
-        if not self._begun or self.finished.done():
+        if not self.begun or self.finished.done():
             return
         if self.time_ns >= self._end_ns:
             self.finished.set_result(None)

@@ -195,6 +195,21 @@ def test_whatever_ends_walk_ends_its_nodes_and_closes_the_bag(
     assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
 
 
+def test_a_walk_goes_on_without_its_recorder_and_says_so_at_once(
+        processes: Processes, tmp_path: Path) -> None:
+    """A full disk ends the recorder as a signal does."""
+    process = walk(processes, scenario(tmp_path, 4.0), '--lock-step', '--out',
+                   str(tmp_path / 'run'), '--no-report', '--composed')
+    process.wait_for_output('  walking\n', RUN_S)
+    (recorder,) = (pid for pid in children(process.pid) if 'bag_recorder' in Path(
+        f'/proc/{pid}/cmdline').read_text(encoding='utf-8'))
+    os.kill(recorder, signal.SIGKILL)
+    process.wait_for_output(' s  bag_recorder was ended by signal 9.*; the walk goes on', RUN_S)
+    assert process.wait(RUN_S) == 1, process
+    assert 'the rest of the walk was not recorded' in process.output
+    assert f'; see {tmp_path}' not in process.output  # the scenario was played to its end
+
+
 def test_a_terminal_that_is_closed_ends_walk_in_order(
         processes: Processes, tmp_path: Path) -> None:
     """What walk has to say then goes nowhere, and is no reason to end otherwise."""
