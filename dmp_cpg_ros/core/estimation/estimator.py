@@ -8,7 +8,8 @@ position is integrated, the ground is a plane through the newest footholds. An a
 IMU's driver may give is not used: here yaw is the gyroscope's, whose bias the standing legs
 correct.
 
-What cannot be used (not finite, impossible, absent) never reaches the filter and is named in
+What cannot be used (not finite, impossible, absent, or
+:mod:`~dmp_cpg_ros.core.estimation.frozen`) never reaches the filter and is named in
 ``BodyEstimate.problems``: a leg without joints measures nothing, a foot without contact sensor is
 judged by its joint torques, and without IMU the standing feet tell how the body turns.
 """
@@ -20,12 +21,13 @@ from math import exp, isfinite
 
 import numpy as np
 
-from dmp_cpg_ros.core.estimation import leg_odometry, velocity_filter
+from dmp_cpg_ros.core.estimation import frozen, leg_odometry, velocity_filter
 from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion, TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.velocity_filter import FilterState
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.rotations import levelled
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
@@ -57,6 +59,9 @@ class BodyEstimate:
         Of ``velocity_in_base``, as the filter believes [m^2/s^2].
     problems : tuple of str
         Sensors that could not be used at this tick.
+    readings : SensorReadings, optional
+        Where there are any: the readings without those of the sensors that failed, whose joints
+        keep their last angles.
     """
 
     time_ns: int
@@ -69,10 +74,12 @@ class BodyEstimate:
     trust: Array
     velocity_variance: Array
     problems: tuple[str, ...] = ()
+    readings: SensorReadings | None = None
 
 
 def estimated_state(readings: SensorReadings, estimate: BodyEstimate) -> RobotState:
     """Robot's state with an estimate in place of the ground truth, for the controllers."""
+    readings = estimate.readings or readings
     return RobotState(
         readings.time_ns, readings.joint_position, readings.joint_velocity, readings.joint_effort,
         estimate.position_in_world, estimate.quaternion, estimate.velocity_in_base,
@@ -125,6 +132,8 @@ class EstimatorState:
         Time since the IMU could be used [s].
     still : float
         Time for which the robot has stood still [s].
+    watch : SensorWatch
+        For sensors that freeze.
     """
 
     filter: FilterState
@@ -133,6 +142,7 @@ class EstimatorState:
     rate: Array
     blind: float
     still: float
+    watch: frozen.SensorWatch
 
 
 class BodyEstimator:
@@ -173,6 +183,7 @@ class BodyEstimator:
         """
         if memory is None or readings.time_ns <= memory.estimate.time_ns:
             return self._begin(readings)
+        watch, readings = frozen.without_frozen(memory.watch, readings)
         dt = (readings.time_ns - memory.estimate.time_ns) * 1e-9
         seeing = readings.imu_is_usable
         blind = 0.0 if seeing and dt <= BLIND else memory.blind + dt
@@ -199,7 +210,9 @@ class BodyEstimator:
             problems, state = (*problems, 'filter'), memory.filter
         terrain, estimate = self._finished(
             memory, state, readings.time_ns, rate, motion, trust, problems)
-        return EstimatorState(state, terrain, estimate, rate, blind, still), estimate
+        if problems:
+            estimate = replace_unchecked(estimate, readings=frozen.with_joints(watch, readings))
+        return EstimatorState(state, terrain, estimate, rate, blind, still, watch), estimate
 
     def _begin(self, readings: SensorReadings) -> tuple[EstimatorState, BodyEstimate]:
         """Start at rest: the accelerometer tells the vertical, the feet the ground."""
@@ -222,7 +235,10 @@ class BodyEstimator:
             _problems(readings))
         terrain = leg_odometry.initial_terrain(
             [(x, y, z + height) for x, y, z in contact]) if all(legs) else flat
-        return EstimatorState(state, terrain, estimate, rate, 0.0, 0.0), estimate
+        watch = frozen.first_watch(readings)
+        if estimate.problems:
+            estimate = replace_unchecked(estimate, readings=frozen.with_joints(watch, readings))
+        return EstimatorState(state, terrain, estimate, rate, 0.0, 0.0, watch), estimate
 
     def _guessed(self, memory: EstimatorState, readings: SensorReadings, blind: float
                  ) -> tuple[Array, Array]:
