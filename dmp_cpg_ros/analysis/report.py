@@ -188,6 +188,8 @@ def render(title: str, subtitle: str, metrics: Mapping[str, Any], manifest: Mapp
         PNG files and captions by name.
     """
     shown = ''.join(_figure(path, caption) for path, caption in pictures.values())
+    listed = manifest.get('failures')
+    failures = [of for of in listed if isinstance(of, Mapping)] if isinstance(listed, list) else []
     sections = {
         'Summary': _summary(metrics, manifest) + (
             f'<div class="pictures">{shown}</div>' if shown else ''),
@@ -198,6 +200,7 @@ def render(title: str, subtitle: str, metrics: Mapping[str, Any], manifest: Mapp
             if (entries := metrics[name.lower()]['all'])),
         'Steady speeds': _records(metrics['tracking']['steady'], STEADY_NOTE),
         'Metrics': _metrics(metrics),
+        'Injected failures': _records(failures),
         'Certificate': _records([entry if isinstance(entry, Mapping) else {'inequality': entry}
                                  for entry in metrics['certificate'] or ()]),
         'Manifest': _manifest(manifest)}

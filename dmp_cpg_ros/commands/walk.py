@@ -53,6 +53,12 @@ class _Plan:
     options: argparse.Namespace
     ros: ros_arguments.RosArguments
 
+    def failures(self) -> dict[str, Any]:
+        """What the scenario lets fail, for the manifest and the report."""
+        listed = [{'at_s': event.at, **event.value.as_mapping()}
+                  for event in self.scenario.events if event.kind == 'fail']
+        return {'failures': listed} if listed else {}
+
     def resolved(self, **more: Any) -> dict[str, dict[str, Any]]:
         """Every parameter of every node that walks, by the node's name."""
         overrides = {**self.overrides, **more}
@@ -96,6 +102,9 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
     events = {event.kind for event in scenario.events}
     if 'push' in events and suite.robot.physics != 'mujoco':
         raise ParameterError(f'pushes need physics: mujoco, not {suite.robot.physics}')
+    if 'fail' in events and not suite.robot.failures_allowed:
+        raise ParameterError(f"scenario '{scenario.name}' lets components fail, which needs "
+                             'failures_allowed:=true')
     if 'votes' in events and not suite.parameters.voting.voting:
         raise ParameterError(f"scenario '{scenario.name}' votes, which needs voting:=true")
     certificate = certify(**running_parameters(suite), voting=suite.parameters.voting)
@@ -192,6 +201,7 @@ def _analyze(plan: _Plan, folder: Path) -> int:
             certificate=[entry.as_mapping() for entry in plan.certificate.inequalities],
             seeds={'robot': plan.suite.robot.seed}, lock_step=lock_step,
             report=not plan.options.no_report, scenario=plan.scenario.name,
+            **plan.failures(),
             processes=plan.options.processes)
     except DmpCpgError as error:
         print(f'walk: cannot analyze the recording: {error}', file=sys.stderr)

@@ -8,19 +8,22 @@ In real time it keeps the wall clock's pace; in lock-step it waits for every tar
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from rosgraph_msgs.msg import Clock
 
-from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.configuration import find_config, parse_yaml
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.balance.body_command import BALANCED
-from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
+from dmp_cpg_ros.core.scenario.fault import Fault, FaultInjector
+from dmp_cpg_ros.nodes.framework.certified import Sets
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers, RobotTiming
 from dmp_cpg_ros.nodes.framework.parameters import NodeParameters
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -66,6 +69,7 @@ class MujocoRobotNode(SuiteNode):
     """Publishes the robot's state at every control tick and moves its joints to their targets."""
 
     KIND = ROBOT
+    CHANGEABLE = ('fail',)
 
     def configure(self) -> None:
         """Stand the robot up and create its topics."""
@@ -79,6 +83,8 @@ class MujocoRobotNode(SuiteNode):
         self._state = self._robot.reset()
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._silent_ns = -1
+        self._faults: FaultInjector | None = None
+        self._arrived: dict[str, int] = {}
         work = () if self._state.joint_work is None else ('joint_work',)
         self._state_publishers = {name: self.publisher(name) for name in (*work, *STATE_TOPICS)}
         self.listen('joint_targets', self._on_targets)
@@ -136,6 +142,30 @@ class MujocoRobotNode(SuiteNode):
         return {**self._timing.values(), 'fell': self._fell, 'time_s': self._state.time_ns * 1e-9,
                 'silent_legs': ' '.join(self._guard.silent(self._state.time_ns)) or 'none'}
 
+    def check_parameters(self, sets: Sets) -> None:
+        """Refuse what is no failure, and every one unless they are allowed."""
+        options: Any = sets[core.RobotParameters]
+        if options.fail:
+            if not options.failures_allowed:
+                raise ParameterError(
+                    'no failures are injected here: start it with failures_allowed:=true')
+            self._fault(options)
+
+    def on_parameters(self) -> None:
+        """Inject the failure that was set."""
+        self._options = self.parameters_of(core.RobotParameters)
+        if self._options.fail:
+            self._faults = self._faults or FaultInjector(self._options.seed)
+            self._faults.add(self._fault(self._options), self._state.time_ns)
+
+    def _fault(self, options: core.RobotParameters) -> Fault:
+        """Failure that a parameter names; those that a lock-step would wait for are refused."""
+        fault = Fault.from_mapping(parse_yaml(options.fail, 'fail'))
+        if fault.component == 'clock' and self.lock_step:
+            raise ParameterError('fail: clock needs real time; in lock-step all would wait for '
+                                 'the stamp of the tick')
+        return fault
+
     # The tick ------------------------------------------------------------------------------------
 
     def _publish_state(self) -> None:
@@ -147,6 +177,9 @@ class MujocoRobotNode(SuiteNode):
         except DataError as error:
             self._start_over(stamp, f'the robot at {stamp * 1e-9:.3f} s: {error}')
             writer.fill(self._state)
+        if self._faults is not None:
+            writer.fill_failing(self._faults.sensed(self._state))
+            self._tell_failures(self._faults.acting)
         self._timing.published(stamp)
         clock_ticks = self.lock_step or stamp // self._tick_ns % CLOCK_EVERY == 0
         for name, publisher in self._state_publishers.items():
@@ -155,10 +188,19 @@ class MujocoRobotNode(SuiteNode):
                 publisher.publish(message)
         self.end_tick()
 
+    def _tell_failures(self, faults: Sequence[Fault]) -> None:
+        """Tell what fails on purpose, and when nothing does any more."""
+        if faults:
+            self.warn('failing', f'injected: {", ".join(map(str, faults))}')
+        else:
+            self.clear('failing')
+
     def _step(self) -> None:
         """Move the robot by one tick under the targets that are there."""
         now = self._state.time_ns
         targets = self._guard.targets(self._state)
+        if self._faults is not None:
+            targets = self._faults.driven(targets)
         self._watch_silence(now)
         try:
             self._state = self._robot.step(targets)
@@ -204,10 +246,16 @@ class MujocoRobotNode(SuiteNode):
         if stamp > now:
             raise DataError(f'the stamp {stamp * 1e-9:.3f} s of {leg} is ahead of the clock, '
                             f'{now * 1e-9:.3f} s')
-        self._guard.accept(leg, stamp, targets)
+        known: Collection[int | None] = self._guard.stamps
+        if self._faults is None:
+            self._guard.accept(leg, stamp, targets)
+        else:  # a lock-step waits for what was sent, also where it does not arrive
+            self._arrived[leg] = stamp
+            known = [self._arrived.get(of) for of in LEGS]
+            for message in self._faults.sent([(leg, stamp, targets)]):
+                self._guard.accept(*message)
         self._timing.arrived(stamp)
-        if self.lock_step and not self._holding and all(
-                known == now for known in self._guard.stamps):
+        if self.lock_step and not self._holding and all(of == now for of in known):
             self._step()
             self._hold()
 

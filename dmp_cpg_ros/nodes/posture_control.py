@@ -79,7 +79,8 @@ class BodyState:
             self.readers['odom'] = robot_state.read_odom
             return
         self.optional = BODY_TOPICS[ESTIMATE]
-        self.readers |= {'imu': stamped(robot_state.read_imu),
+        self.readers |= {'joint_states': robot_state.JointsReader(strict=False).read,
+                         'imu': stamped(robot_state.read_imu),
                          'foot_contacts': stamped(robot_state.FootContactsReader().read)}
         self._estimator = BodyEstimator(
             description, node.parameters_of(EstimationParameters), legs)

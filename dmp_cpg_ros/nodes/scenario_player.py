@@ -6,6 +6,7 @@ the robot down at the end.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -23,6 +24,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
+from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Command, Scenario
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
@@ -204,9 +206,11 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._callees = {name: self.create_client(interface(name).type, name)
                          for name in ('inhibit', *REQUESTS)}
         self._setter = ParameterSetter(self)
+        self._robot = self.create_client(
+            SetParametersAtomically, f'{GATE_OWNER}/set_parameters_atomically')
         self._deliver: dict[str, Callable[[Any], None]] = {
             'command': self._send, 'push': self._push, 'votes': self._vote, 'set': self._set,
-            'gait': lambda name: self._set({'gait': name}),
+            'fail': self._fail, 'gait': lambda name: self._set({'gait': name}),
             **{name: partial(self._ask, name) for name in self._callees}}
         heard: dict[str, Callable[[Any], None]] = {
             f'{GATE_OWNER}/holding_at': self._on_holding, 'inhibition_state': self._on_inhibition,
@@ -220,7 +224,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """Whether the gate, the readers of commands and the services are there."""
         return (self._gate.get_subscription_count() > 0
                 and all(client.service_is_ready() for client in self._callees.values())
-                and self._setter.connected()
+                and self._setter.connected() and self._robot.service_is_ready()
                 and all(topic.connected() for topic in self._topics.values()))
 
     def begin(self) -> None:
@@ -348,6 +352,22 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._delivered()
 
         self._setter.set(values, done)
+
+    def _fail(self, fault: Fault) -> None:
+        """Set the robot's parameter; the scenario goes on when it has taken it."""
+        request = SetParametersAtomically.Request(parameters=[Parameter(
+            'fail', value=json.dumps(fault.as_mapping())).to_parameter_msg()])
+
+        def answered(future: Future) -> None:
+            answer = future.result()
+            if answer is None or not answer.result.successful:
+                reason = 'no answer' if answer is None else answer.result.reason
+                if not self.finished.done():
+                    self.finished.set_exception(PlayerError(f'fail: {reason}'))
+                return
+            self._delivered()
+
+        self._robot.call_async(request).add_done_callback(answered)
 
     # Real time -----------------------------------------------------------------------------------
 

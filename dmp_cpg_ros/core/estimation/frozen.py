@@ -86,15 +86,11 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
 
 def _told(watch: SensorWatch, readings: SensorReadings, now: int) -> SensorReadings:
     """Readings to compare the next ones with: a frozen sensor's are those that it still tells."""
-    last = watch.readings
-    return SensorReadings(
-        now, *(np.where(np.isnan(new), old, new) for new, old in (
-            (readings.joint_position, last.joint_position),
-            (readings.joint_velocity, last.joint_velocity))), readings.joint_effort,
-        *(np.where(np.isnan(new), old, new) for new, old in (
-            (readings.rate_in_base, last.rate_in_base),
-            (readings.specific_force_in_base, last.specific_force_in_base),
-            (readings.foot_force, last.foot_force))))
+    return replace_unchecked(readings, time_ns=now, **{
+        name: np.where(np.isnan(new := getattr(readings, name)),
+                       getattr(watch.readings, name), new)
+        for name in ('joint_position', 'joint_velocity', 'rate_in_base',
+                     'specific_force_in_base', 'foot_force')})
 
 
 def _known(watch: SensorWatch, readings: SensorReadings) -> Array:

@@ -229,6 +229,8 @@ def fitted_slope(points: Sequence[Sequence[float]]) -> tuple[float, float]:
         xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
         yy, yz = yy + y * y, yz + y * z
     determinant = xx * yy - xy * xy
+    if not determinant > 0.0:  # numbers so large that nothing is left of their differences
+        return 0.0, 0.0
     a, b = (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
     scale = min(1.0, STEEPEST / max(hypot(a, b), 1e-12))
     return a * scale, b * scale

@@ -35,8 +35,9 @@ READINGS['bus'] = tuple(name for names in READINGS.values() for name in names)
 COMPONENTS = (*READINGS, 'clock', 'link', 'node', 'joint')
 """Besides: the robot's stamps, the way of targets to the robot, who sends them, the drives."""
 
-WRONG = {'gyro_in_base': np.array((0.3, 0.0, 0.0)), 'acceleration_in_base': np.array((2., 0., 0.)),
-         'joint_position': 0.15, 'joint_velocity': 0.0, 'foot_force': 60.0}
+WRONG: dict[str, Any] = {
+    'gyro_in_base': np.array((0.3, 0.0, 0.0)), 'acceleration_in_base': np.array((2.0, 0.0, 0.0)),
+    'joint_position': 0.15, 'joint_velocity': 0.0, 'foot_force': 60.0}
 """By which a wrong sensor is off [rad/s], [m/s^2], [rad], [rad/s], [N]."""
 
 WILD = {'gyro_in_base': 20.0, 'acceleration_in_base': 100.0, 'joint_position': 2.0,
@@ -106,6 +107,10 @@ class Fault:
                             f', not {shown(seconds)}')
         return cls(value['component'], value['kind'], float(seconds), value.get('leg', ''))
 
+    def as_mapping(self) -> dict[str, Any]:
+        """What :meth:`from_mapping` reads."""
+        return {name: value for name, value in vars(self).items() if value != ''}
+
     def __str__(self) -> str:
         """In words, such as ``imu stuck for 0.5 s``."""
         return f'{self.component}{self.leg and " of "}{self.leg} {self.kind} for {self.for_s:g} s'
@@ -135,13 +140,14 @@ class FaultInjector:
         self._random = np.random.default_rng((seed, 77))
         self._acting: list[_Acting] = []
         self._states: deque[RobotState] = deque(maxlen=512)
-        self._sent: deque[list[Message]] = deque(maxlen=512)
+        self._sent: dict[str, deque[Message]] = {leg: deque(maxlen=512) for leg in LEGS}
         self._targets: deque[tuple[int, JointTargets]] = deque(maxlen=512)
         self._now = 0
 
-    def add(self, fault: Fault) -> None:
-        """Let a component fail from the next reading or targets on."""
-        self._acting.append(_Acting(fault, self._now + round(fault.for_s * 1e9)))
+    def add(self, fault: Fault, now_ns: int | None = None) -> None:
+        """Let a component fail from a time on [ns], that of the last state by default."""
+        now = self._now if now_ns is None else now_ns
+        self._acting.append(_Acting(fault, now + round(fault.for_s * 1e9)))
 
     @property
     def acting(self) -> tuple[Fault, ...]:
@@ -166,12 +172,13 @@ class FaultInjector:
 
     def sent(self, messages: list[Message]) -> list[Message]:
         """Messages of the legs' targets as they arrive at the robot."""
-        self._sent.append(messages)
+        for message in messages:
+            self._sent[message[0]].append(message)
         for acting in self._acting:
             if acting.fault.component in ('link', 'node'):
                 legs = (acting.fault.leg,) if acting.fault.leg else LEGS
-                messages = [message for leg, *rest in messages for message in (
-                    self._message(acting, (leg, *rest)) if leg in legs else [(leg, *rest)])]
+                messages = [arriving for message in messages for arriving in (
+                    self._message(acting, message) if message[0] in legs else [message])]
         return messages
 
     def driven(self, targets: JointTargets) -> JointTargets:
@@ -244,20 +251,15 @@ class FaultInjector:
         if kind == 'wrong':
             return [(leg, stamp, replace_unchecked(
                 targets, position=targets.position + WRONG_TARGET))]
-        if kind == 'slow' and stamp // LATE_NS != (stamp - self._period()) // LATE_NS:
+        before = self._sent[leg][-2][1] if len(self._sent[leg]) > 1 else 0
+        if kind == 'slow' and stamp // LATE_NS != before // LATE_NS:
             return [message]
         if kind == 'slow' and not fresh:
             return []
         since = {'slow': stamp // LATE_NS * LATE_NS, 'delayed': stamp - LATE_NS}.get(
             kind, acting.end_ns - round(acting.fault.for_s * 1e9))
-        old = next((of for tick in self._sent for of in tick if of[0] == leg and of[1] >= since),
-                   message)
+        old = next((of for of in self._sent[leg] if of[1] >= since), message)
         return [(leg, stamp, old[2])] if fresh else [old]
-
-    def _period(self) -> int:
-        """Time between the last two ticks [ns]."""
-        stamps = [tick[0][1] for tick in self._sent if tick][-2:]
-        return stamps[-1] - stamps[0] if len(stamps) > 1 else 0
 
     def _followed(self, acting: _Acting, targets: JointTargets) -> JointTargets:
         """Targets that failing drives follow; one without power is moved freely."""

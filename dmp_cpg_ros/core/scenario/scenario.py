@@ -8,7 +8,8 @@ joystick does, so that a timeout of cmd_vel can be tried by ``command: silence``
 A new kind of event is one entry in :data:`EVENT_KINDS` here and one in the tables of those who act
 on it: :class:`~dmp_cpg_ros.nodes.scenario_player.ScenarioPlayer` for the nodes, and
 :meth:`~dmp_cpg_ros.core.loop.WalkingLoop.takers` for the plain loop (pushes go to
-:attr:`~dmp_cpg_ros.robot.mujoco_robot.MujocoRobot.takers`).
+:attr:`~dmp_cpg_ros.robot.mujoco_robot.MujocoRobot.takers`, failures to
+:meth:`~dmp_cpg_ros.core.scenario.fault.FaultInjector.add`).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import world_overrides
+from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.core.scenario.push import FRAMES, LARGEST_MEAN_FORCE, Push
 from dmp_cpg_ros.core.suite_parameters import OWNER, SuiteParameters
 
@@ -173,6 +175,12 @@ def _change(value: Any, where: str) -> tuple[dict[str, Any], str]:
     return values, 'set ' + ', '.join(f'{name} = {entry}' for name, entry in value.items())
 
 
+def _fail(value: Any, where: str) -> tuple[Fault, str]:
+    """Read a failure, such as ``{component: imu, kind: stuck, for_s: 0.5}``."""
+    fault = Fault.from_mapping(value, f'{where}: fail')
+    return fault, f'fail: {fault}'
+
+
 def _request(what: str, value: Any, where: str) -> tuple[bool, str]:
     """Read a request without a value: ``stand_up: true``."""
     if value is not True:
@@ -182,7 +190,7 @@ def _request(what: str, value: Any, where: str) -> tuple[bool, str]:
 
 EVENT_KINDS: dict[str, Read] = {
     'command': _command, 'inhibit': _inhibit, 'gait': _gait, 'push': _push, 'set': _change,
-    'votes': _votes, **{what: partial(_request, what) for what in REQUESTS}}
+    'votes': _votes, 'fail': _fail, **{what: partial(_request, what) for what in REQUESTS}}
 """Kind of event to the function that reads its value, ``(value, where) -> (value, label)``; it
 raises DataError.
 """

@@ -96,7 +96,7 @@ class JointStateWriter:
                 self._message.refilled(**{field: len(names)})
         self._like = SerializedJointState(bytes(self._message.data))
 
-    def fill(self, time_ns: int, *values: Array) -> SerializedJointState:
+    def fill(self, time_ns: int, *values: Array, sound: bool = True) -> SerializedJointState:
         """Refill the message.
 
         Parameters
@@ -105,10 +105,12 @@ class JointStateWriter:
             Stamp [ns].
         *values : ndarrays
             One per field, of any shape, entries in the order of the names.
+        sound : bool
+            Whether numbers that are not finite are refused.
 
         Raises
         ------
         DataError
             If a number is not finite.
         """
-        return self._like.refilled(self._message.filled(time_ns, *values), time_ns)
+        return self._like.refilled(self._message.filled(time_ns, *values, sound=sound), time_ns)

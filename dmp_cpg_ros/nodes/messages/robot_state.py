@@ -68,6 +68,18 @@ class RobotStateWriter:
             state.base_velocity_in_base, state.base_rate_in_base)
         self.joint_work = self._filled_work(state)
 
+    def fill_failing(self, state: RobotState) -> None:
+        """Refill what sensors tell with the readings of failing ones, whatever numbers they are;
+        the truth stays as it is.
+        """
+        stamp = state.time_ns
+        self.joint_states = self._joints.fill(
+            stamp, state.joint_position, state.joint_velocity, state.joint_effort, sound=False)
+        self.foot_contacts = self._feet.fill(stamp, state.foot_force, sound=False)
+        set_stamp(self.clock.clock, stamp)
+        self.imu = cdr.SerializedImu(self._imu.filled(
+            stamp, state.measured_rate_in_base, state.acceleration_in_base, sound=False))
+
     def _filled_work(self, state: RobotState) -> cdr.SerializedJointState | None:
         if state.joint_work is None or state.joint_peak_effort is None:
             return None
@@ -109,10 +121,13 @@ class OdometryWriter:
 class JointsReader:
     """Reads ``joint_states``."""
 
-    def __init__(self) -> None:
-        """Prepare the order of the twelve joints; effort may be absent in others' messages."""
-        self._full = JointStateReader(JOINT_NAMES)
-        self._without_effort = JointStateReader(JOINT_NAMES, ('position', 'velocity'))
+    def __init__(self, *, strict: bool = True) -> None:
+        """Prepare the order of the twelve joints; effort may be absent in others' messages, and
+        numbers that cannot be are NaN unless it is strict.
+        """
+        self._full = JointStateReader(JOINT_NAMES, strict=strict)
+        self._without_effort = JointStateReader(
+            JOINT_NAMES, ('position', 'velocity'), strict=strict)
 
     def read(self, message: JointState | cdr.SerializedJointState) -> list[Array]:
         """Position [rad], velocity [rad/s] and effort [N m] (0 where absent), each (12,)."""
