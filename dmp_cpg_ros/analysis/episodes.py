@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -235,4 +236,4 @@ def planned_stance(recording: Recording, context: RunContext) -> tuple[NDArray[n
 def gaits_walked(recording: Recording) -> list[str]:
     """Names of the gaits in force, each time one takes over; empty in old recordings."""
     names = [gait.before for gait in recording.canonical.gaits if not gait.after]
-    return [name for k, name in enumerate(names) if k == 0 or name != names[k - 1]]
+    return [name for name, _ in groupby(names)]

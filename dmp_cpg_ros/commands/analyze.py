@@ -87,7 +87,19 @@ def analyze_run(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     logging.basicConfig(format='%(levelname)s: %(message)s', level=logging.WARNING)
-    return run_command(_parser(), arguments, _analyze)
+    parser = argparse.ArgumentParser(
+        prog='analyze',
+        description='Make figures, metrics.json, manifest.json and report.html of a recorded run.')
+    add = parser.add_argument
+    add('bag', metavar='BAG_OR_RUN', type=Path,
+        help="rosbag2 folder or file (MCAP or SQLite), or a run's folder with bag/ inside")
+    add('--out', metavar='DIR', type=Path,
+        help="where to write (default: the run's folder; for a bare bag NAME_analysis beside it)")
+    add('--robot', metavar='FILE', type=Path,
+        help="the robot's YAML file (default: the one that the run's manifest names, else the "
+        "package's own)")
+    add('--no-pictures', action='store_true', help='take no pictures of the robot')
+    return run_command(parser, arguments, _analyze)
 
 
 def _analyze(options: argparse.Namespace, _: RosArguments) -> int:
@@ -112,22 +124,6 @@ def _run_of(bag: Path, given: Path) -> Path | None:
     folder = bag.resolve() if bag.is_dir() else bag.resolve().parent
     is_run = folder.name == 'bag' and (folder.parent / 'manifest.json').is_file()
     return folder.parent if is_run else None
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog='analyze',
-        description='Make figures, metrics.json, manifest.json and report.html of a recorded run.')
-    add = parser.add_argument
-    add('bag', metavar='BAG_OR_RUN', type=Path,
-        help="rosbag2 folder or file (MCAP or SQLite), or a run's folder with bag/ inside")
-    add('--out', metavar='DIR', type=Path,
-        help="where to write (default: the run's folder; for a bare bag NAME_analysis beside it)")
-    add('--robot', metavar='FILE', type=Path,
-        help="the robot's YAML file (default: the one that the run's manifest names, else the "
-        "package's own)")
-    add('--no-pictures', action='store_true', help='take no pictures of the robot')
-    return parser
 
 
 if __name__ == '__main__':

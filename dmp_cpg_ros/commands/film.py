@@ -212,18 +212,6 @@ def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame], f
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    return run_command(_parser(), arguments, _film)
-
-
-def _film(options: argparse.Namespace, _: RosArguments) -> int:
-    height = 2 * round(options.width * 9 / 32)
-    shot = Shot(options.start, options.end, options.fps, options.width, height)
-    frames = film_run(options.run, options.film, shot)
-    print(f'{options.film}: {frames} frames, {options.film.stat().st_size / 1e6:.2f} MB')
-    return 0
-
-
-def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog='film', description="Draw a recorded run as a film, from the run's folder.")
     add = parser.add_argument
@@ -236,7 +224,15 @@ def _parser() -> argparse.ArgumentParser:
         help='frames per second (default: %(default)g)')
     add('--width', metavar='PIXELS', type=int, default=Shot.width,
         help='width, of 16:9 (default: %(default)s)')
-    return parser
+    return run_command(parser, arguments, _film)
+
+
+def _film(options: argparse.Namespace, _: RosArguments) -> int:
+    height = 2 * round(options.width * 9 / 32)
+    shot = Shot(options.start, options.end, options.fps, options.width, height)
+    frames = film_run(options.run, options.film, shot)
+    print(f'{options.film}: {frames} frames, {options.film.stat().st_size / 1e6:.2f} MB')
+    return 0
 
 
 if __name__ == '__main__':

@@ -17,7 +17,15 @@ from dmp_cpg_ros.robot.model_reader import Inspection, inspect_model
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    return run_command(_parser(), arguments, _inspect)
+    parser = argparse.ArgumentParser(prog='inspect_robot', description=(
+        'Find the legs of a quadruped in an MJCF and write its robot file, which walk --robot '
+        'takes.'))
+    add = parser.add_argument
+    add('model', metavar='FILE.xml', type=Path, help='MJCF file')
+    add('--output', metavar='FILE.yaml', type=Path,
+        help='where to write the robot file (default: print it)')
+    add('--picture', metavar='FILE.png', type=Path, help='draw the robot with its legs in colours')
+    return run_command(parser, arguments, _inspect)
 
 
 def _inspect(options: argparse.Namespace, _: RosArguments) -> int:
@@ -79,18 +87,6 @@ def summary(found: Inspection) -> str:
         f'it stands\nlegs of {sum(lengths) / 4:.3f} m, knees bend {" and ".join(sorted(knees))}, '
         f'feet of {1e3 * legs[0].foot_radius:.0f} mm radius\ntorque limits {limits} N m; drive '
         f'gains {kp} N m/rad, {kd} N m s/rad{others}')
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog='inspect_robot', description=(
-        'Find the legs of a quadruped in an MJCF and write its robot file, which walk --robot '
-        'takes.'))
-    add = parser.add_argument
-    add('model', metavar='FILE.xml', type=Path, help='MJCF file')
-    add('--output', metavar='FILE.yaml', type=Path,
-        help='where to write the robot file (default: print it)')
-    add('--picture', metavar='FILE.png', type=Path, help='draw the robot with its legs in colours')
-    return parser
 
 
 if __name__ == '__main__':

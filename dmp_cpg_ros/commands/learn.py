@@ -43,7 +43,32 @@ examples:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    return run_command(_parser(), arguments, _main)
+    parser = argparse.ArgumentParser(
+        prog='learn', epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
+        description='Learn a discrete or rhythmic movement primitive from demonstrations.')
+    add = parser.add_argument
+    add('demonstrations', metavar='DEMO', nargs='+', type=Path, help='CSV or NumPy file, or bag')
+    add('--out', metavar='FILE', type=Path, help='YAML file to write')
+    add('--motion', metavar='FILE', type=Path,
+        help='YAML file to write with what all feet do in a recorded walk, for walk --motion')
+    add('--robot', metavar='FILE', type=Path,
+        help='robot that walked, for --motion (default: the one of the run)')
+    add('--kind', choices=('discrete', 'rhythmic'), default='discrete', help='default: discrete')
+    add('--bases', type=_bases, default=25,
+        help="number of bases, or 'auto' to choose it by the held-out error (default: 25)")
+    add('--period', metavar='S', type=float, help='period of a rhythm (default: found from data)')
+    add('--joints', metavar='A,B', type=_words, default=(), help='joints to take (default: all)')
+    add('--topic', help='topic of a bag (default: joint_states; joint_targets for --motion)')
+    add('--start', metavar='S', type=float, help='take samples from here on, after the first [s]')
+    add('--end', metavar='S', type=float, help='take samples up to here, after the first [s]')
+    add('--positions-only', action='store_true', help='leave recorded derivatives aside')
+    add('--method', choices=METHODS, default=METHODS[0], help=f'default: {METHODS[0]}')
+    add('--ridge', type=float, default=FitOptions.ridge, help='relative (default: %(default)g)')
+    add('--overlap', type=float, help='value of a basis at the centre of its neighbour')
+    add('--stiffness', metavar='K', type=float, help='[1/s^2] (default: suits the duration)')
+    add('--damping', metavar='B', type=float, help='[1/s] (default: critical)')
+    add('--form', choices=FORMS, default=FORMS[0], help='reading of tau (default: scaled)')
+    return run_command(parser, arguments, _main)
 
 
 def _main(options: argparse.Namespace, _: RosArguments) -> int:
@@ -123,35 +148,6 @@ def _irregularity(demonstrations: list[Demonstration], primitive: Primitive) -> 
 def _listed(primitive: Primitive, shares: np.ndarray) -> str:
     names = primitive.names or range(1, primitive.dofs + 1)
     return ', '.join(f'{name} {100.0 * e:.3g} %' for name, e in zip(names, shares, strict=True))
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog='learn', epilog=_EXAMPLES, formatter_class=argparse.RawDescriptionHelpFormatter,
-        description='Learn a discrete or rhythmic movement primitive from demonstrations.')
-    add = parser.add_argument
-    add('demonstrations', metavar='DEMO', nargs='+', type=Path, help='CSV or NumPy file, or bag')
-    add('--out', metavar='FILE', type=Path, help='YAML file to write')
-    add('--motion', metavar='FILE', type=Path,
-        help='YAML file to write with what all feet do in a recorded walk, for walk --motion')
-    add('--robot', metavar='FILE', type=Path,
-        help='robot that walked, for --motion (default: the one of the run)')
-    add('--kind', choices=('discrete', 'rhythmic'), default='discrete', help='default: discrete')
-    add('--bases', type=_bases, default=25,
-        help="number of bases, or 'auto' to choose it by the held-out error (default: 25)")
-    add('--period', metavar='S', type=float, help='period of a rhythm (default: found from data)')
-    add('--joints', metavar='A,B', type=_words, default=(), help='joints to take (default: all)')
-    add('--topic', help='topic of a bag (default: joint_states; joint_targets for --motion)')
-    add('--start', metavar='S', type=float, help='take samples from here on, after the first [s]')
-    add('--end', metavar='S', type=float, help='take samples up to here, after the first [s]')
-    add('--positions-only', action='store_true', help='leave recorded derivatives aside')
-    add('--method', choices=METHODS, default=METHODS[0], help=f'default: {METHODS[0]}')
-    add('--ridge', type=float, default=FitOptions.ridge, help='relative (default: %(default)g)')
-    add('--overlap', type=float, help='value of a basis at the centre of its neighbour')
-    add('--stiffness', metavar='K', type=float, help='[1/s^2] (default: suits the duration)')
-    add('--damping', metavar='B', type=float, help='[1/s] (default: critical)')
-    add('--form', choices=FORMS, default=FORMS[0], help='reading of tau (default: scaled)')
-    return parser
 
 
 def _bases(text: str) -> int | str:

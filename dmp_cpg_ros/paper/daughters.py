@@ -306,16 +306,12 @@ def summed(primitives: Sequence[Primitive], gains: ArrayLike) -> Primitive:
 def _to_share(primitive: DiscretePrimitive | RhythmicPrimitive) -> dict[str, Any]:
     """What primitives that are added must have in common."""
     spring, bases = primitive.transformation, primitive.bases
-    discrete = isinstance(primitive, DiscretePrimitive)
-    phase = ('phase_decay',) if discrete else ('omega', 'rho')
-    rates = ('goal_rate', 'tau_rate') if discrete else (
-        'centre_rate', 'amplitude_rate', 'tau_rate')
-    return {'the kind': float(discrete), 'basis centres': bases.centres,
-            'basis widths': bases.widths, 'stiffness': spring.stiffness,
-            'damping': spring.damping, 'the reading of tau': float(spring.form == 'scaled'),
-            'the phase': [getattr(primitive, name) for name in phase],
-            'the filter rates': [getattr(primitive, name) for name in rates],
-            'degrees of freedom': float(primitive.dofs)}
+    return {'the kind': isinstance(primitive, DiscretePrimitive), 'degrees of freedom':
+            primitive.dofs, 'basis centres': bases.centres, 'basis widths': bases.widths,
+            'stiffness': spring.stiffness, 'damping': spring.damping,
+            'the reading of tau': spring.form == 'scaled',
+            'phase and filter rates': [getattr(primitive, name) for name in primitive.SCALARS
+                                       if name != 'duration']}
 
 
 def _positive(tau: float) -> float:

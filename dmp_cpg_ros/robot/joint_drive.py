@@ -7,13 +7,12 @@ from __future__ import annotations
 from math import isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JointTargets
-
-Vector = NDArray[np.float64]
 
 _STACKED = (3, len(JOINT_NAMES))
 
@@ -87,7 +86,7 @@ class JointDrive:
         reference = position + velocity * (np.minimum(age, self._steps) * self._step_s)
         self._command = self._kp * reference + self._forward * moving + effort
 
-    def torque(self, step: int, position: Vector, velocity: Vector) -> Vector:
+    def torque(self, step: int, position: Array, velocity: Array) -> Array:
         """Return the joint torques of one physics step.
 
         Parameters
@@ -105,7 +104,7 @@ class JointDrive:
         return self.limited(
             self._command[step] - self._kp * position - self._kd * velocity, velocity)
 
-    def limited(self, torque: Vector, velocity: Vector) -> Vector:
+    def limited(self, torque: Array, velocity: Array) -> Array:
         """Clip torques (12,) to what the actuators can give at these speeds.
 
         Torque along the motion is limited to τ_max up to 0.7 of the speed limit and falls linearly
@@ -114,11 +113,11 @@ class JointDrive:
         lost = self._slope * velocity
         upper = np.minimum(self._limit, np.maximum(self._stall - lost, 0.0))
         lower = np.minimum(self._limit, np.maximum(self._stall + lost, 0.0))
-        clipped: Vector = np.minimum(upper, np.maximum(-lower, torque))
+        clipped: Array = np.minimum(upper, np.maximum(-lower, torque))
         return clipped
 
 
-def checked_targets(targets: JointTargets) -> NDArray[np.float64]:
+def checked_targets(targets: JointTargets) -> Array:
     """Return position, velocity and effort as one array (3, 12).
 
     Raises

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import RobotFile
-
-Vector = NDArray[np.float64]
 
 LEG_AXES = 'xyy'
 """Axes of abduction, hip and knee."""
@@ -36,7 +35,7 @@ class Foot:
     """A foot: its body, its point in the body's frame [m], radius [m], and geoms that touch."""
 
     body: int
-    point_in_body: Vector
+    point_in_body: Array
     radius: float
     geoms: tuple[int, ...]
 
@@ -155,14 +154,14 @@ def subtree(model: mujoco.MjModel, root: int) -> set[int]:
     return bodies
 
 
-def foot_position(data: mujoco.MjData, foot: Foot) -> Vector:
+def foot_position(data: mujoco.MjData, foot: Foot) -> Array:
     """Return the centre of the foot's contact sphere in the world [m], after mj_kinematics."""
-    place: Vector = data.xpos[foot.body] + data.xmat[foot.body].reshape(3, 3) @ foot.point_in_body
+    place: Array = data.xpos[foot.body] + data.xmat[foot.body].reshape(3, 3) @ foot.point_in_body
     return place
 
 
 def check_leg(model: mujoco.MjModel, data: mujoco.MjData, leg: str, joints: list[int], foot: Foot,
-              base: int) -> Vector:
+              base: int) -> Array:
     """Check that a leg is base → abduction (x) → hip (y) → knee (y) → foot.
 
     Returns
@@ -275,7 +274,7 @@ class JointActuators:
         self._index = as_slice(model.jnt_dofadr[joints])
         model.actuator_gainprm[actuators] = model.actuator_biasprm[actuators] = 0.0
 
-    def apply(self, data: mujoco.MjData, torque: NDArray[np.float64]) -> None:
+    def apply(self, data: mujoco.MjData, torque: Array) -> None:
         """Set the torques (12,) [N m] of the coming physics step."""
         if self._through_motors:
             data.ctrl[self._index] = torque * self._per_torque
@@ -284,7 +283,7 @@ class JointActuators:
 
 
 def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,
-                    dof: Places) -> NDArray[np.float64]:
+                    dof: Places) -> Array:
     """Return the torques of statics, τ = h(q) − Σ J_iᵀ f_i, with vertical foot forces f_i.
 
     The forces carry the weight and have no moment about the centre of mass; of all such forces
@@ -309,7 +308,7 @@ def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,
     weight = -model.body_subtreemass[ids.base] * model.opt.gravity[2]
     balance = np.array([np.ones(4), arms[:, 0], arms[:, 1]])
     force = np.linalg.lstsq(balance, np.array([weight, 0.0, 0.0]), rcond=None)[0]
-    torque: NDArray[np.float64] = data.qfrc_bias.copy()
+    torque: Array = data.qfrc_bias.copy()
     J = np.zeros((3, model.nv))
     for foot, place, f in zip(ids.feet, places, force, strict=True):
         mujoco.mj_jac(model, data, J, None, place, foot.body)
@@ -332,7 +331,7 @@ class ContactReader:
             kind[list(foot.geoms)] = _FOOT
         self._kind, self._leg = kind.tolist(), leg.tolist()
 
-    def foot_force(self, data: mujoco.MjData) -> NDArray[np.float64]:
+    def foot_force(self, data: mujoco.MjData) -> Array:
         """Return the normal force of each foot (4,), summed over its contacts [N].
 
         Some models wrap the lower leg in a mesh that reaches around the foot; what touches so near

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
@@ -24,8 +24,6 @@ from dmp_cpg_ros.robot.model_parts import ModelIds, foot_position
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import OWN_MODEL, RobotFile, load_robot_file
 from dmp_cpg_ros.robot.start_pose import home_joint_position
-
-Vector = NDArray[np.float64]
 
 STANCE_LEG_SHARE = 0.7  # distance hip-foot over leg length when the model has no usable home pose
 USUAL_VELOCITY_LIMIT = 30.0  # [rad/s] Unitree Go1's published figure, for models that say nothing
@@ -55,7 +53,7 @@ def load_description(path: Path | str | None = None) -> RobotDescription:
         return read_description(load_model(file.model, file.base), file)
 
 
-def pose(model: mujoco.MjModel, ids: ModelIds, joint_position: Vector) -> mujoco.MjData:
+def pose(model: mujoco.MjModel, ids: ModelIds, joint_position: Array) -> mujoco.MjData:
     """Return data with the base at the origin, the joints as given, and kinematics computed."""
     data = mujoco.MjData(model)
     model_parts.place_robot(model, data, ids, np.zeros(3), (1, 0, 0, 0), joint_position)
@@ -101,7 +99,7 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
 
 
 def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, index: int,
-              file: RobotFile, home: Vector | None) -> LegGeometry:
+              file: RobotFile, home: Array | None) -> LegGeometry:
     name, foot = LEGS[index], ids.feet[index]
     joints = [int(joint) for joint in ids.joints[3 * index:3 * index + 3]]
     sign = model_parts.check_leg(model, at_zero, name, joints, foot, ids.base)
@@ -124,7 +122,7 @@ def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, inde
         rotor_inertia=model.dof_armature[model.jnt_dofadr[joints]].copy(), foot_radius=foot.radius)
 
 
-def _knee_sign(leg: str, thigh: Vector, shank: Vector, angle: float) -> int:
+def _knee_sign(leg: str, thigh: Array, shank: Array, angle: float) -> int:
     """Return the sign of the rotation about +y from thigh to shank at a knee angle."""
     bend = angle + np.arctan2(thigh[2] * shank[0] - thigh[0] * shank[2], thigh[::2] @ shank[::2])
     bend = (bend + np.pi) % (2 * np.pi) - np.pi
@@ -136,7 +134,7 @@ def _knee_sign(leg: str, thigh: Vector, shank: Vector, angle: float) -> int:
 
 
 def _stance_height(model: mujoco.MjModel, ids: ModelIds, legs: tuple[LegGeometry, ...],
-                   leg_length: float, home: Vector | None) -> float:
+                   leg_length: float, home: Array | None) -> float:
     """Return the height at which the home keyframe's feet touch, or 0.7 of the leg's length."""
     usual = float(np.mean([STANCE_LEG_SHARE * leg_length + leg.foot_radius
                            - leg.hip_in_base[2] - leg.hip_offset[2] for leg in legs]))
@@ -164,7 +162,7 @@ def _belly_depth(model: mujoco.MjModel, base: int, at_zero: mujoco.MjData) -> fl
 
 
 def _composite_inertia(model: mujoco.MjModel, data: mujoco.MjData,
-                       base: int) -> tuple[Vector, Vector]:
+                       base: int) -> tuple[Array, Array]:
     """Return centre of mass (3,) and inertia about it (3, 3) of the base and all on it."""
     root = model.body_rootid[base]
     bodies = [body for body in range(model.nbody) if model.body_rootid[body] == root]
@@ -335,7 +333,7 @@ def _foot_name(model: mujoco.MjModel, data: mujoco.MjData, leg: list[int]) -> st
     below = model_parts.subtree(model, model.jnt_bodyid[leg[2]])
     touching, spheres = model_parts.touching_geoms(model, below)
 
-    def far(place: NDArray[np.float64]) -> float:
+    def far(place: Array) -> float:
         return float(np.linalg.norm(place - knee))
 
     bodies = sorted({int(model.geom_bodyid[g]) for g in spheres or touching})

@@ -9,9 +9,9 @@ from math import isfinite
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -73,8 +73,6 @@ class SensorNoise:
             acceleration_in_base=state.acceleration_in_base + noise[3:6],
             gyro_in_base=state.measured_rate_in_base + noise[:3])
 
-
-Vector = NDArray[np.float64]
 
 FALLEN_HEIGHT_SHARE = 0.5  # of the stance height
 FALLEN_TILT = np.deg2rad(60.0)
@@ -240,7 +238,7 @@ class MujocoRobot:
         self._peak_effort = np.abs(torques).max(axis=0)
         return self._state()
 
-    def apply_push(self, force_in_world: Vector, duration_ns: int) -> None:
+    def apply_push(self, force_in_world: Array, duration_ns: int) -> None:
         """Push the base's centre of mass with a force [N] from now on, for whole physics steps.
 
         Raises
@@ -285,9 +283,9 @@ class MujocoRobot:
             self._push_steps -= 1
 
     @property
-    def _base_pose(self) -> Vector:
+    def _base_pose(self) -> Array:
         """Position and quaternion (w, x, y, z) of the base, a view of (7,)."""
-        pose: Vector = self.data.qpos[self._ids.base_qpos:self._ids.base_qpos + 7]
+        pose: Array = self.data.qpos[self._ids.base_qpos:self._ids.base_qpos + 7]
         return pose
 
     @property
@@ -329,12 +327,12 @@ class MujocoRobot:
         return state if self._sensors is None else self._sensors.measured(state)
 
 
-def _xyzw(quaternion: Vector) -> Vector:
+def _xyzw(quaternion: Array) -> Array:
     """Quaternion x, y, z, w of one in MuJoCo's order."""
     w, x, y, z = quaternion.tolist()
     return np.array((x, y, z, w))
 
 
-def _rotation(quaternion: Vector) -> Vector:
+def _rotation(quaternion: Array) -> Array:
     """Rotation matrix (3, 3) of a quaternion w, x, y, z."""
     return np.array(rotation(_xyzw(quaternion).tolist()))

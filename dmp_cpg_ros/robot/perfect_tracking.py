@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.modes.motion_library import lying_posture
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -16,8 +17,6 @@ from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.joint_drive import checked_targets
 from dmp_cpg_ros.robot.port import steps_per_tick
 from dmp_cpg_ros.robot.start_pose import home_joint_position
-
-Vector = NDArray[np.float64]
 
 CONTACT_HEIGHT = 0.002  # [m] over the lowest foot within which a foot counts as standing
 
@@ -91,15 +90,15 @@ class PerfectTrackingRobot:
     def close(self) -> None:
         """Nothing to release; here because a robot has it."""
 
-    def _feet_in_base(self, joint_position: Vector) -> tuple[Vector, float, NDArray[np.bool_]]:
+    def _feet_in_base(self, joint_position: Array) -> tuple[Array, float, NDArray[np.bool_]]:
         """Return feet (4, 3), height of the base over the ground, and which feet stand (4,)."""
         feet = np.array([leg.foot_in_base(joint_position[3 * i:3 * i + 3])
                          for i, leg in enumerate(self._legs)])
         soles = feet[:, 2] - self._radius
         return feet, float(-soles.min()), soles <= soles.min() + CONTACT_HEIGHT
 
-    def _state(self, position: Vector, velocity: Vector, effort: Vector,
-               acceleration_in_world: Vector) -> RobotState:
+    def _state(self, position: Array, velocity: Array, effort: Array,
+               acceleration_in_world: Array) -> RobotState:
         half = 0.5 * self._yaw
         specific_force = acceleration_in_world + (0.0, 0.0, GRAVITY)
         return RobotState(
@@ -113,7 +112,7 @@ class PerfectTrackingRobot:
             foot_force=self._standing * (self.description.mass * GRAVITY / self._standing.sum()))
 
 
-def _planar_fit(moved: Vector, fixed: Vector) -> tuple[float, Vector]:
+def _planar_fit(moved: Array, fixed: Array) -> tuple[float, Array]:
     """Return angle and shift of least Σ |R(angle) moved_i + shift − fixed_i|², points (n, 2)."""
     if not len(moved):
         return 0.0, np.zeros(2)
@@ -123,10 +122,10 @@ def _planar_fit(moved: Vector, fixed: Vector) -> tuple[float, Vector]:
     return angle, target - _turned(centre, angle)
 
 
-def _turned(vector: Vector, angle: float) -> Vector:
+def _turned(vector: Array, angle: float) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     return np.array((c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]))
 
 
-def _in_base(in_world: Vector, yaw: float) -> Vector:
+def _in_base(in_world: Array, yaw: float) -> Array:
     return np.array((*_turned(in_world[:2], -yaw), in_world[2]))

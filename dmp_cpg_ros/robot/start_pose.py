@@ -7,15 +7,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.modes.motion_library import lying_posture
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG
-
-Vector = NDArray[np.float64]
 
 START_POSES = ('standing', 'lying', 'fallen')
 """Valid start poses."""
@@ -50,9 +48,9 @@ class StartPose:
         0 for a robot that is at rest where it is put [s].
     """
 
-    base_position: Vector
-    base_quaternion: Vector
-    joint_position: Vector
+    base_position: Array
+    base_quaternion: Array
+    joint_position: Array
     limp: bool = False
     settling_s: float = 0.0
 
@@ -89,7 +87,7 @@ def start_pose_of(name: str, description: RobotDescription, seed: int) -> StartP
     raise ParameterError(f"start_pose = '{name}' must be one of {', '.join(START_POSES)}")
 
 
-def home_joint_position(description: RobotDescription) -> Vector:
+def home_joint_position(description: RobotDescription) -> Array:
     """Return the standing pose.
 
     Abduction is zero; hip and knee put the centre of the foot straight below the hip joint (in the
@@ -109,7 +107,7 @@ def home_joint_position(description: RobotDescription) -> Vector:
                            for leg in description.legs])
 
 
-def _home_of_leg(leg: LegGeometry, height: float) -> Vector:
+def _home_of_leg(leg: LegGeometry, height: float) -> Array:
     kinematics = LegKinematics(leg)
     foot_in_base = leg.hip_in_base + leg.hip_offset
     foot_in_base[1] = leg.hip_in_base[1] + kinematics.lateral_offset

@@ -106,7 +106,24 @@ Results = list[tuple[StopCase, StopOutcome]]
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study and print its table; returns the exit status."""
-    return run_command(_parser(), arguments, _study)
+    parser = parser_of('study_stops', __doc__, 'every case and outcome')
+    parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
+    parser.add_argument('--phases', type=int, default=16, metavar='N',
+                        help='request phases, evenly over a cycle (default: 16)')
+    parser.add_argument('--speeds', type=float, nargs='+', default=[0.2, 0.5, 0.8], metavar='V',
+                        help='commanded speeds [m/s] (default: 0.2 0.5 0.8)')
+    parser.add_argument('--gaits', nargs='+', default=['amble', 'walk', 'trot'], metavar='GAIT',
+                        help='gaits by name (default: amble walk trot)')
+    parser.add_argument('--legs', nargs='+', default=[LEGS[0]], choices=LEGS,
+                        help='legs whose oscillator is inhibited, one at a time (default: fl)')
+    parser.add_argument('--cadences', type=float, nargs='+', default=[1.0], metavar='FACTOR',
+                        help='factors on the cadence of the gait (default: 1)')
+    parser.add_argument('--push', type=float, default=0.0, metavar='IMPULSE',
+                        help='lateral impulse in the instant of the request [N s] (default: 0)')
+    parser.add_argument('--baselines', action='store_true',
+                        help='also stop by freezing all phases, and by finishing every swing')
+    parser.add_argument('--quiet', action='store_true', help='show no progress')
+    return run_command(parser, arguments, _study)
 
 
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
@@ -145,25 +162,16 @@ def suite_of(file: str | None, leg: str) -> Suite:
     return load_suite(file, {'inhibited_legs': [leg], 'cmd_vel_timeout': 0.0})
 
 
-@lru_cache
-def _setting(file: str | None, leg: str, gait: str, cadence: float
-             ) -> tuple[MujocoRobot, SuiteParameters, float]:
-    """The robot, its parameters, and the certified time to rest [s], which holds for every phase
-    and speed, and is infinite without a certificate.
-    """
-    suite = suite_of(file, leg)
-    robot, p = MujocoRobot(suite.robot_file, suite.tick_ns), suite.parameters
-    scale = body_scale(robot.description)
-    network = GaitNetwork(p.canonical, load_gait(gait).scaled(cadence), scale)
-    certificate = certify(network, p.inhibition, p.reference, p.leg, p.posture,
-                          suite.tick_ns * 1e-9, voting=p.voting)
-    return robot, p, certificate.time_to_rest
-
-
 def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
-    """Run the cases of one walk with the robot and the parameters of a parameter file."""
-    robot, parameters, bound = _setting(file, cases[0].leg, cases[0].gait, cases[0].cadence)
-    return list(run_trials(robot, cases, parameters, bound))
+    """Run the cases of one walk with the robot and the parameters of a parameter file, and the
+    certified time to rest, which holds for every phase and is infinite without a certificate.
+    """
+    suite, gait = suite_of(file, cases[0].leg), load_gait(cases[0].gait).scaled(cases[0].cadence)
+    robot, p = MujocoRobot(suite.robot_file, suite.tick_ns), suite.parameters
+    certificate = certify(
+        GaitNetwork(p.canonical, gait, body_scale(robot.description)), p.inhibition, p.reference,
+        p.leg, p.posture, suite.tick_ns * 1e-9, voting=p.voting)
+    return list(run_trials(robot, cases, p, certificate.time_to_rest))
 
 
 def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
@@ -339,27 +347,6 @@ def _cells(outcomes: Sequence[StopOutcome], method: str) -> tuple[str, ...]:
     return (str(count), str(fell), percent(stood, count),
             percent(walked_on, count) if method == METHODS[0] else '-', prediction_error,
             f'{exceeded}/{bounded}' if bounded else '-', *others)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = parser_of('study_stops', __doc__, 'every case and outcome')
-    parser.add_argument('file', nargs='?', help="parameter file; the package's own without")
-    parser.add_argument('--phases', type=int, default=16, metavar='N',
-                        help='request phases, evenly over a cycle (default: 16)')
-    parser.add_argument('--speeds', type=float, nargs='+', default=[0.2, 0.5, 0.8], metavar='V',
-                        help='commanded speeds [m/s] (default: 0.2 0.5 0.8)')
-    parser.add_argument('--gaits', nargs='+', default=['amble', 'walk', 'trot'], metavar='GAIT',
-                        help='gaits by name (default: amble walk trot)')
-    parser.add_argument('--legs', nargs='+', default=[LEGS[0]], choices=LEGS,
-                        help='legs whose oscillator is inhibited, one at a time (default: fl)')
-    parser.add_argument('--cadences', type=float, nargs='+', default=[1.0], metavar='FACTOR',
-                        help='factors on the cadence of the gait (default: 1)')
-    parser.add_argument('--push', type=float, default=0.0, metavar='IMPULSE',
-                        help='lateral impulse in the instant of the request [N s] (default: 0)')
-    parser.add_argument('--baselines', action='store_true',
-                        help='also stop by freezing all phases, and by finishing every swing')
-    parser.add_argument('--quiet', action='store_true', help='show no progress')
-    return parser
 
 
 if __name__ == '__main__':

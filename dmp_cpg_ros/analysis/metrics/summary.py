@@ -31,19 +31,8 @@ REST_SETTLING = 0.5
 """Time after the oscillators' rest from which on the body is expected to be still [s]."""
 
 
-def stop_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
-    """Group ``stop`` of ``metrics.json``: the slowest completed stop, and ``all``."""
-    return _summary([_stop(recording, context, stop)
-                     for stop in episodes.requested_stops(recording)])
-
-
-def start_metrics(recording: Recording) -> dict[str, Any]:
-    """Group ``start`` of ``metrics.json``: the slowest completed start, and ``all``."""
-    return _summary([_start(recording, start)
-                     for start in episodes.episodes(recording, episodes.STARTING)])
-
-
 def _summary(entries: list[dict[str, Any]]) -> dict[str, Any]:
+    """The slowest completed stop or start, and ``all``."""
     completed = [entry for entry in entries if entry['measured_s'] is not None]
     slowest = max(completed, key=lambda entry: float(entry['measured_s']), default={})
     return {
@@ -219,7 +208,10 @@ def compute_metrics(
         'tracking': robot.tracking_metrics(recording),
         'estimation': robot.estimation_metrics(recording, context),
         'gait': gait_metrics(recording, context),
-        'stop': stop_metrics(recording, context), 'start': start_metrics(recording),
+        'stop': _summary([_stop(recording, context, stop)
+                          for stop in episodes.requested_stops(recording)]),
+        'start': _summary([_start(recording, start)
+                           for start in episodes.episodes(recording, episodes.STARTING)]),
         'timing': timing_metrics(recording),
         'recording': {'undecodable_messages': sum(recording.undecodable.values())},
         'certificate': None if certificate is None else list(certificate)}
