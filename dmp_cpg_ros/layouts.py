@@ -80,9 +80,7 @@ def read_gait_rows(names: Sequence[str], position: Sequence[float], velocity: Se
     given.sort(key=lambda row: copysign(1.0, row[2]))
     signs = [copysign(1.0, rate) for _, _, rate in given]
     if signs != [-1.0, 1.0] or not abs(given[0][1] + given[1][1] - 1.0) < 1e-9:
-        raise DataError(
-            f'shares of gaits {given} must be 1 of one gait, or 1 - s with the rate -ds/dt of one '
-            'and s with ds/dt of another')
+        raise DataError(f'shares of gaits {given} must be 1 of one gait, or 1 - s and s of two')
     (before, _, _), (after, share, rate) = given
     return GaitShares(before, after, share, rate, factor)
 
@@ -111,9 +109,7 @@ def read_command_rows(position: Sequence[float], velocity: Sequence[float]) -> B
     if len(modes) != 1 or sum(map(abs, position[:count])) != 1.0:
         raise DataError(f'one of {", ".join(MODE_ROWS)} must be 1 and the others 0')
     if len(moved) != (modes[0] in MOVING):
-        raise DataError(
-            f"mode '{modes[0]}' with {len(moved)} movements: there is one in {', '.join(MOVING)}, "
-            'none in the others')
+        raise DataError(f"mode '{modes[0]}' with {len(moved)} movements; only {MOVING} have one")
     if not moved:
         return BodyCommand(modes[0])
     x, x_dot = position[count + moved[0]], velocity[count + moved[0]]

@@ -57,8 +57,7 @@ def find_bag(path: Path | str) -> Path:
     """
     path = Path(path)
     if not path.exists():
-        raise MissingFileError(
-            f"'{path}' does not exist; name a rosbag2 folder or a run's folder with bag/ inside")
+        raise MissingFileError(f"'{path}' does not exist; name a bag's or a run's folder")
     if path.is_file():
         if path.suffix in STORAGE_SUFFIXES:
             return path

@@ -75,8 +75,7 @@ def _loaded(bag: Path) -> Recording:
     with opened(bag) as reader:
         robots = sorted(topic for topic in reader.topics if base_name(topic) == 'joint_states')
         if len(robots) > 1:
-            raise DataError(f'the bag holds {len(robots)} robots ({", ".join(robots)}); '
-                            'record one robot per bag')
+            raise DataError(f'the bag holds {", ".join(robots)}; record one robot per bag')
         used = [c for c in reader.connections if base_name(c.topic) in TOPICS.get(c.msgtype, ())]
         for connection, bag_ns, message in decoded(reader, used, skipped):
             received = Received(bag_ns, _stamp_ns(message), message)

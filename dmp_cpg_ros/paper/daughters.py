@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import check_positive
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
@@ -89,7 +90,8 @@ class Daughter:
         ndarray (n,)
             ẏ'.
         """
-        tau = _positive(self.tau(t) if callable(self.tau) else self.tau)
+        tau = self.tau(t) if callable(self.tau) else self.tau
+        check_positive(tau=tau)
         y = self.transformation.inverse(y_prime, guess)
         return self.transformation.velocity(y, self.mother(t, y)) / tau
 
@@ -126,8 +128,7 @@ class DaughterSum:
         gains = np.atleast_1d(np.array(self.gains, dtype=float))
         if not (gains.shape == (len(self.daughters),) and np.all(np.isfinite(gains))
                 and gains.min() >= 0.0 < gains.max()):
-            raise ParameterError(f'gains must be {len(self.daughters)} numbers of at least 0, not '
-                                 f'all 0; they are {gains.tolist()}')
+            raise ParameterError(f'gains {gains.tolist()} must be >= 0, one each, not all 0')
         object.__setattr__(self, 'gains', gains)
 
     def __call__(self, t: float, y: Array) -> Array:
@@ -161,14 +162,10 @@ class Homogeneous(Diffeomorphism):
     def __post_init__(self) -> None:
         R, shift = np.array(self.rotation, float), np.atleast_1d(np.array(self.translation, float))
         if R.shape != (len(shift), len(shift)):
-            raise ParameterError(
-                f'rotation and translation must fit; shapes are {R.shape} and {shift.shape}')
-        if not (np.isfinite(self.scale) and self.scale > 0.0 and np.all(np.isfinite(shift))):
-            raise ParameterError(
-                f'scale = {self.scale!r} must be positive and finite, the translation finite')
+            raise ParameterError(f'rotation {R.shape} and translation {shift.shape} must fit')
+        check_positive(scale=self.scale)
         if not (np.allclose(R @ R.T, np.eye(len(R)), atol=1e-9) and np.linalg.det(R) > 0.0):
-            raise ParameterError(
-                'rotation must be orthogonal with determinant 1 (R Rᵀ = I, det R = 1)')
+            raise ParameterError('rotation must be orthogonal with determinant 1')
         object.__setattr__(self, 'rotation', R)
         object.__setattr__(self, 'translation', shift)
 
@@ -217,13 +214,10 @@ def transformed(primitive: Primitive, map_: Homogeneous) -> Primitive:
     """
     n, R, spring = primitive.dofs, map_.rotation, primitive.transformation
     if len(R) != n:
-        raise ParameterError(
-            f'a map of {len(R)} degrees of freedom does not fit a primitive of {n}')
+        raise ParameterError(f'a map of {len(R)} dofs does not fit a primitive of {n}')
     for gains in (spring.stiffness, spring.damping):
         if not np.allclose(R * gains, gains[:, None] * R, atol=1e-12 * float(gains.max())):
-            raise ParameterError(
-                'a rotation can be taken into the weights only when the degrees of freedom that '
-                f'it mixes have equal gains; they have {gains.tolist()}')
+            raise ParameterError('a rotation mixes only degrees of freedom of equal gains')
     names = primitive.names if np.array_equal(R, np.eye(n)) else ()
     if isinstance(primitive, DiscretePrimitive):
         return replace(primitive, weights=map_.direction(primitive.weights),
@@ -252,10 +246,9 @@ def slowed(primitive: Primitive, tau: float) -> Primitive:
     ParameterError
         If τ is not positive or the primitive has the printed form, whose path changes with τ.
     """
-    _positive(tau)
+    check_positive(tau=tau)
     if primitive.form != 'scaled':
-        raise ParameterError(
-            "only primitives of the form 'scaled' keep their path when they are slowed")
+        raise ParameterError("only primitives of the form 'scaled' keep their path when slowed")
     spring = primitive.transformation
     gains = SpringDamper(spring.stiffness / tau**2, spring.damping / tau, spring.form)
     changed: dict[str, Any] = {
@@ -285,16 +278,14 @@ def summed(primitives: Sequence[Primitive], gains: ArrayLike) -> Primitive:
     """
     gains = np.atleast_1d(np.asarray(gains, dtype=float))
     if not primitives or gains.shape != (len(primitives),) or not np.all(np.isfinite(gains)):
-        raise ParameterError(f'a sum needs one finite gain per primitive; there are '
-                             f'{len(primitives)} primitives and gains of shape {gains.shape}')
+        raise ParameterError(f'{len(primitives)} primitives need one finite gain each')
     first = primitives[0]
     ours = _to_share(first)
     for theirs in map(_to_share, primitives[1:]):
         for name, value in ours.items():
             if np.shape(value) != np.shape(theirs[name]) or not np.allclose(
                     value, theirs[name], rtol=1e-12, atol=0.0):
-                raise ParameterError(f'primitives can be added when they share '
-                                     f'{", ".join(ours)}; they differ in {name}')
+                raise ParameterError(f'primitives of one sum must share {name}')
     names = ('weights', 'start', 'goal', 'start_velocity') if isinstance(
         first, DiscretePrimitive) else ('weights', 'centre')
     blended: dict[str, Any] = {
@@ -312,9 +303,3 @@ def _to_share(primitive: DiscretePrimitive | RhythmicPrimitive) -> dict[str, Any
             'the reading of tau': spring.form == 'scaled',
             'phase and filter rates': [getattr(primitive, name) for name in primitive.SCALARS
                                        if name != 'duration']}
-
-
-def _positive(tau: float) -> float:
-    if not (np.isfinite(tau) and tau > 0.0):
-        raise ParameterError(f'tau = {tau!r} must be a positive finite number')
-    return tau

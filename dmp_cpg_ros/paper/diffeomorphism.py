@@ -188,9 +188,7 @@ def newton_inverse(forward: Callable[[Array], Array], jacobian: Callable[[Array]
         if np.abs(found.fun).max() <= tolerance:
             y, done, piece = found.x, done + piece, 2.0 * piece
         elif (piece := 0.5 * piece) < _SMALLEST_PIECE:
-            raise ParameterError(
-                f"T(y) = y' has no solution that is found for y' = {y_prime.tolist()}; give the "
-                'inverse or a guess that is nearer')
+            raise ParameterError("T(y) = y' has no solution that is found from this guess")
     return y
 
 
@@ -251,9 +249,7 @@ class ClosedCurveDiffeomorphism(Diffeomorphism):
             raise ParameterError(f'plane must be two orthonormal rows of length {n}')
         slope = _winding(self.series, self.plane)
         if slope < _LEAST_SLOPE:
-            raise ParameterError(
-                'the projection of the curve must wind once around its centre with its angle '
-                f'always in one direction; the least normalised slope is {slope:.3g}')
+            raise ParameterError(f'the curve must wind once, one way; least slope {slope:.3g}')
         object.__setattr__(self, '_complement', np.linalg.svd(self.plane)[2][2:])
         angles = np.unwrap(np.angle(_projected(self.series, self.plane, _GRID)))
         object.__setattr__(self, '_angles', angles)
@@ -287,9 +283,7 @@ class ClosedCurveDiffeomorphism(Diffeomorphism):
         series = fourier_series(times, demonstration.positions, 2.0 * np.pi / period, harmonics)
         best = max(_planes(series), key=lambda plane: _winding(series, plane))
         if _winding(series, best) < _LEAST_SLOPE:
-            raise DataError(
-                'the curve winds around its centre monotonically in none of the planes that '
-                'were tried (fundamental, principal, coordinate planes)')
+            raise DataError('the curve winds monotonically in none of the planes tried')
         return cls(series, best)
 
     def curve(self, phi: Array) -> Array:

@@ -123,8 +123,7 @@ def _coordinates(Theta: ArrayLike, n: int) -> Array:
             raise ParameterError(f'weights {T.tolist()} must all be positive')
         T = np.diag(T)
     if T.shape != (n, n) or np.linalg.matrix_rank(T) < n:
-        raise ParameterError(f'a change of coordinates must be an invertible {n} x {n} matrix or '
-                             f'{n} positive weights')
+        raise ParameterError(f'Theta must be an invertible {n} x {n} matrix or {n} weights')
     return T
 
 
@@ -194,8 +193,7 @@ def sampled_transverse_contraction(field: Field, region: Region, metric: Matrix 
     for x in region.sample(count, seed):
         f = field(x)
         if not np.linalg.norm(f) > 0.0:
-            raise ParameterError(f'x = {x.tolist()} is an equilibrium; a region of transverse '
-                                 'contraction to an orbit must leave equilibria out')
+            raise ParameterError(f'x = {x.tolist()} is an equilibrium: nothing is transverse')
         A = numerical_jacobian(field, x) if jacobian is None else jacobian(x)
         rates.append(_transverse_rate(x, f, A, metric or (lambda x: np.eye(x.size))))
     rate = min(rates)
@@ -313,8 +311,7 @@ def disagreement_measure(L: Array, size: int, jacobians: Sequence[Array], norm: 
         If the number of vertices to the power of the number of nodes is larger than 200,000.
     """
     if len(jacobians) ** size > _MOST_CASES:
-        raise ParameterError(f'{len(jacobians)} vertices on {size} nodes are more than '
-                             f'{_MOST_CASES} cases; give fewer vertices')
+        raise ParameterError(f'more than {_MOST_CASES} cases; give fewer vertices')
     n = len(L) // size
     V = synchronisation_complement(size, n)
     columns = [V[:, n * i:n * i + n] for i in range(size)]

@@ -37,6 +37,7 @@ from scipy.sparse import coo_array
 from dmp_cpg_ros.core.canonical.coupling import CouplingGraph
 from dmp_cpg_ros.core.canonical.phase import phase_rotation
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.maths import check_positive
 from dmp_cpg_ros.paper.jacobians import Array, Field
 from dmp_cpg_ros.paper.oscillators import OscillatorFamily
 
@@ -129,8 +130,7 @@ class MeanFieldCoupling:
     symmetric = True
 
     def __init__(self, count: int, gain: float, phases: ArrayLike | None = None) -> None:
-        if not (np.isfinite(gain) and gain > 0.0):
-            raise ParameterError(f'gain = {gain!r} 1/s must be finite and greater than 0')
+        check_positive(gain=gain)
         places = np.zeros(count) if phases is None else np.asarray(phases, dtype=float)
         if places.shape != (count,) or not np.all(np.isfinite(places)):
             raise ParameterError(f'phases must be {count} finite numbers')
@@ -202,16 +202,13 @@ class OscillatorNetwork:
         shape = (oscillators.count, oscillators.state_size)
         self.target = np.zeros(shape) if target is None else np.asarray(target, dtype=float)
         if self.target.shape != shape:
-            raise ParameterError(f'the target of inhibition must have shape {shape}, not '
-                                 f'{self.target.shape}')
+            raise ParameterError(f'target {self.target.shape} must have shape {shape}')
         if coupling is None:
             return
         if (coupling.count, coupling.state_size) != shape:
-            raise ParameterError(f'a coupling of {coupling.count} states of size '
-                                 f'{coupling.state_size} does not fit oscillators {shape}')
+            raise ParameterError(f'the coupling does not fit oscillators of shape {shape}')
         if coupling.turned and not oscillators.rotation_invariant:
-            raise ParameterError('phase offsets need oscillators that are rotation invariant, '
-                                 'such as Andronov-Hopf or phase oscillators')
+            raise ParameterError('phase offsets need rotation invariant oscillators')
 
     def field(self, x: Array, gains: Array | None = None) -> Array:
         """Vector field ẋ.

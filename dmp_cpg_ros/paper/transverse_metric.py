@@ -105,8 +105,7 @@ def find_orbit(field: Field, start: ArrayLike, transient: float, step: float,
     states = _flow(field, x, period, step, np.linspace(0.0, period, count + 1)).y.T
     gap = float(np.linalg.norm(states[-1] - x))
     if not gap <= 1e-4 * float(np.ptp(states, axis=0).max()):
-        raise DataError(f'the orbit does not close: after {period:.6g} s the state is {gap:.3g} '
-                        'away; give a longer transient')
+        raise DataError(f'the orbit leaves a gap of {gap:.3g}; give a longer transient')
     return Orbit(states[:-1].copy(), period)
 
 

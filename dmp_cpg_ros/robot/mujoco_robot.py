@@ -249,8 +249,7 @@ class MujocoRobot:
         """
         force = np.array(force_in_world, dtype=float)
         if force.shape != (3,) or not np.isfinite(force).all():
-            raise ParameterError(
-                f'a push must be three finite numbers [N], not {force_in_world!r}')
+            raise ParameterError(f'a push must be three finite numbers, not {force}')
         self._push_steps = steps_per_tick(duration_ns, self._step_ns)
         self._push_force = force
 

@@ -49,8 +49,7 @@ class PerfectTrackingRobot:
         steps_per_tick(tick_ns, 1)
         poses = {'standing': home_joint_position, 'lying': lying_posture}
         if start_pose not in poses:
-            raise ParameterError(f"start_pose = '{start_pose}': a robot that tracks perfectly "
-                                 'is standing or lying')
+            raise ParameterError(f'start_pose {start_pose!r} must be standing or lying')
         self.description, self.tick_ns = description, tick_ns
         self._legs = [LegKinematics(leg) for leg in description.legs]
         self._radius = np.array([leg.foot_radius for leg in description.legs])

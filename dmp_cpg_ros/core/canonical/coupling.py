@@ -59,8 +59,7 @@ class CouplingGraph:
             raise ParameterError('coupling gains and phase offsets must be finite')
         for i, j in self.edges:
             if not (0 <= i < self.size and 0 <= j < self.size and i != j):
-                raise ParameterError(
-                    f'edge ({i}, {j}) is not between two of the nodes 0 to {self.size - 1}')
+                raise ParameterError(f'edge ({i}, {j}) must join two nodes 0 to {self.size - 1}')
         symmetric = 0.5 * (self.gains + np.swapaxes(self.gains, 1, 2))
         for edge, smallest in zip(self.edges, np.linalg.eigvalsh(symmetric)[:, 0], strict=True):
             if smallest <= 0.0:
@@ -149,6 +148,5 @@ def topology(name: str, size: int) -> Edges:
     if name == 'directed_ring':
         return tuple((j, i) for i, j in following + [(size - 1, 0)])
     if name not in undirected:
-        raise ParameterError(
-            f"topology '{name}' is not known; valid are {', '.join(undirected)}, directed_ring")
+        raise ParameterError(f"topology '{name}' must be {', '.join(undirected)} or directed_ring")
     return tuple(edge for i, j in undirected[name] for edge in ((i, j), (j, i)))

@@ -10,8 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.phase import phase_generator
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, check_positive
 
 
 class Oscillators(Protocol):
@@ -65,10 +64,7 @@ class AndronovHopf:
 
     def __post_init__(self) -> None:
         """Validate."""
-        for name in ('rho', 'radius'):
-            value = getattr(self, name)
-            if not (np.all(np.isfinite(value)) and np.all(np.greater(value, 0.0))):
-                raise ParameterError(f'{name} = {value!r} must be a positive finite number')
+        check_positive(rho=self.rho, radius=self.radius)
 
     def field(self, x: Array, omega: float | Array) -> Array:
         """Vector field, as one product with the complex number x₁ + i x₂.

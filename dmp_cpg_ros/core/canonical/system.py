@@ -64,18 +64,14 @@ class CanonicalSystem:
             If the oscillators are of another family, of which no bound is known.
         """
         if not isinstance(self.oscillators, AndronovHopf):
-            raise ParameterError(
-                f'no bounds are known of {type(self.oscillators).__name__}; they are of '
-                'AndronovHopf')
+            raise ParameterError(f'no bounds are known of {type(self.oscillators).__name__}')
         return self._one_per_node('rho')
 
     def _one_per_node(self, name: str) -> Array:
-        values = getattr(self.oscillators, name)
-        if np.shape(values) not in ((), (self.graph.size,)):
-            raise ParameterError(
-                f'{self.graph.size} nodes need one {name} or {self.graph.size}, not '
-                f'{np.size(values)}')
-        return np.broadcast_to(np.asarray(values, dtype=float), self.graph.size)
+        values, n = getattr(self.oscillators, name), self.graph.size
+        if np.shape(values) not in ((), (n,)):
+            raise ParameterError(f'{n} nodes need one {name} or {n}, not {np.size(values)}')
+        return np.broadcast_to(np.asarray(values, dtype=float), n)
 
     def linear_part(self, gains: Array) -> tuple[Array, Array]:
         """Matrix and constant of −L x + α (x_d − x).

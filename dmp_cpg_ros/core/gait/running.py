@@ -71,9 +71,7 @@ class GaitChoiceParameters(Parameters):
         if len(set(self.auto_gaits)) != len(self.auto_gaits):
             raise ParameterError(f'auto_gaits = {list(self.auto_gaits)} must not repeat a gait')
         if np.any(np.diff(self.auto_speeds) <= self.auto_hysteresis):
-            raise ParameterError(
-                f'auto_speeds = {list(self.auto_speeds)} must increase by more than '
-                f'auto_hysteresis = {self.auto_hysteresis:g}')
+            raise ParameterError('auto_speeds must increase by more than auto_hysteresis')
 
 
 def highest_speed(parameters: GaitChoiceParameters, name: str,

@@ -73,8 +73,7 @@ class FitOptions:
     def __post_init__(self) -> None:
         """Validate."""
         if self.method not in METHODS:
-            raise ParameterError(
-                f'method must be one of {", ".join(METHODS)}, not {self.method!r}')
+            raise ParameterError(f'method {self.method!r} must be {", ".join(METHODS)}')
         if not (np.isfinite(self.ridge) and self.ridge >= 0.0):
             raise ParameterError(f'ridge = {self.ridge!r} must be a finite number of at least 0')
         if self.overlap is not None and not 0.0 < self.overlap < 1.0:

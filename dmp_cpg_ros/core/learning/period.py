@@ -59,8 +59,7 @@ def find_period(demonstration: Demonstration, shortest: float | None = None,
     low = 1.0 / (longest or span / 1.5)
     high = 1.0 / (shortest or 4.0 * span / (len(times) - 1))
     if not 0.0 < low < high:
-        raise DataError(
-            f'periods from {1.0 / high:g} s to {1.0 / low:g} s: there is none to look for')
+        raise DataError(f'no period from {1.0 / high:g} s to {1.0 / low:g} s: none to look for')
     whole = _Fit(times, values, 0.45 * (len(times) - 1) / span)
     some = _some(whole)
     coarse = [some.best_nearby(f, 0.6 / span, low, high)

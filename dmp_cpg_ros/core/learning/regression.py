@@ -128,8 +128,7 @@ class Task(ABC):
             count = learning.smallest_good(self.held_out_errors())
         samples = sum(len(movement.times) for movement in self.demonstrations)
         if count > samples:  # nothing would tell their weights apart
-            raise DataError(f'{count} bases cannot be learned from {samples} samples; valid are '
-                            'at most as many bases as samples')
+            raise DataError(f'{samples} samples tell at most as many bases, not {count}')
         return self.bases(count)
 
     def held_out_errors(self, candidates: Sequence[int] = BASIS_CANDIDATES) -> dict[int, float]:

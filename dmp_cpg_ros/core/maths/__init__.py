@@ -5,5 +5,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from dmp_cpg_ros.core.errors import ParameterError
+
 Array = NDArray[np.float64]
 """An array of floats."""
+
+
+def check_positive(**values: float | Array) -> None:
+    """Raise ParameterError for a number, or one in an array, that is not positive and finite."""
+    for name, value in values.items():
+        if not (np.all(np.isfinite(value)) and np.all(np.greater(value, 0.0))):
+            raise ParameterError(f'{name} = {value!r} must be a positive finite number')

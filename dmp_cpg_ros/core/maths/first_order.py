@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, check_positive
 
 
 @dataclass(frozen=True)
@@ -40,9 +39,7 @@ class FirstOrderFilter:
 
     def __post_init__(self) -> None:
         """Validate."""
-        if not (np.isfinite(self.rate) and self.rate > 0.0):
-            raise ParameterError(
-                f'filter rate = {self.rate!r} 1/s must be a positive finite number')
+        check_positive(rate=self.rate)
 
     def at(self, value: ArrayLike, command: ArrayLike, elapsed: ArrayLike) -> Array:
         """Filtered value some time after the start of a step.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, check_positive
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,9 @@ class Bases(ABC):
             raise ParameterError(
                 f'centres and widths must be two lists of the same length, at least 1; they have '
                 f'shapes {centres.shape} and {widths.shape}')
-        if not (np.isfinite([centres, widths]).all() and np.all(widths > 0.0)):
-            raise ParameterError('centres must be finite and widths positive and finite')
+        check_positive(widths=widths)
+        if not np.isfinite(centres).all():
+            raise ParameterError('centres must be finite')
         object.__setattr__(self, 'centres', centres)
         object.__setattr__(self, 'widths', widths)
 

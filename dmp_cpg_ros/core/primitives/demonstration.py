@@ -62,21 +62,18 @@ class Demonstration:
         """Validate and convert."""
         times = _numbers(self.times, 'times')
         if times.ndim != 1 or len(times) < 8:
-            raise DataError(
-                f'a demonstration needs one list of at least 8 times, not shape {times.shape}')
+            raise DataError(f'a demonstration needs at least 8 times, not shape {times.shape}')
         if not np.all(np.isfinite(times)):
             raise DataError('times of a demonstration must be finite')
         for i in np.flatnonzero(np.diff(times) <= 0.0)[:1]:
-            raise DataError(f'times of a demonstration must increase; sample {i + 1} at '
-                            f'{times[i + 1]} s follows {times[i]} s')
+            raise DataError(f'times must increase; sample {i + 1} is at {times[i + 1]} s')
         object.__setattr__(self, 'times', times)
         for name in ('positions', 'velocities', 'accelerations'):
             if getattr(self, name) is not None:
                 values = _samples(getattr(self, name), len(times), name)
                 object.__setattr__(self, name, values)
                 if values.shape != self.positions.shape:
-                    raise DataError(
-                        f'{name} have shape {values.shape}, positions {self.positions.shape}')
+                    raise DataError(f'{name} {values.shape} must have the shape of positions')
         if self.names and len(self.names) != self.dofs:
             raise DataError(f'{len(self.names)} names do not match {self.dofs} degrees of freedom')
 
@@ -132,8 +129,7 @@ def derivatives(times: ArrayLike, values: ArrayLike, half_window: int = 3, degre
     times, values = np.asarray(times, dtype=float), np.asarray(values, dtype=float)
     width = 2 * half_window + 1
     if not 2 <= degree < width or width > len(times):
-        raise ParameterError('derivatives need 2 <= degree < window <= samples; they are '
-                             f'{degree}, {width} and {len(times)}')
+        raise ParameterError(f'must be 2 <= degree {degree} < window {width} <= {len(times)}')
     starts = np.clip(np.arange(len(times)) - half_window, 0, len(times) - width)
     window = starts[:, None] + np.arange(width)  # (m, width)
     offsets = times[window] - times[:, None]
@@ -164,8 +160,7 @@ def vector(values: ArrayLike, length: int, name: str) -> Array:
     """
     result = np.atleast_1d(np.array(values, dtype=float))
     if result.shape != (length,) or not np.all(np.isfinite(result)):
-        raise ParameterError(
-            f'{name} must be {length} finite number(s), not {np.asarray(values).tolist()}')
+        raise ParameterError(f'{name} must be {length} finite number(s), not {result.tolist()}')
     return result
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, check_positive
 from dmp_cpg_ros.core.primitives.demonstration import vector
-from dmp_cpg_ros.core.primitives.primitive import Primitive, check_positive
+from dmp_cpg_ros.core.primitives.primitive import Primitive
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, check_positive
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.basis import Bases
 from dmp_cpg_ros.core.primitives.demonstration import Trajectory, columns, vector
@@ -79,8 +79,7 @@ class Primitive(ABC):
         object.__setattr__(self, 'transformation', self.transformation.spread(self.dofs))
         check_positive(**{name: getattr(self, name) for name in self.SCALARS})
         if self.names and len(self.names) != self.dofs:
-            raise ParameterError(
-                f'{len(self.names)} names do not match {self.dofs} degrees of freedom')
+            raise ParameterError(f'{len(self.names)} names do not match {self.dofs} dofs')
 
     @property
     def dofs(self) -> int:
@@ -168,10 +167,3 @@ class Primitive(ABC):
         return Trajectory(
             times, np.array([s.position for s in states]), np.array([s.velocity for s in states]),
             np.array([self.acceleration(s, command) for s in states]))
-
-
-def check_positive(**values: float) -> None:
-    """Raise ParameterError for a number that is not positive and finite."""
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0.0):
-            raise ParameterError(f'{name} = {value!r} must be a positive finite number')

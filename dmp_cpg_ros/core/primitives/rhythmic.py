@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, check_positive
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.primitives.demonstration import vector
-from dmp_cpg_ros.core.primitives.primitive import Primitive, check_positive
+from dmp_cpg_ros.core.primitives.primitive import Primitive
 from dmp_cpg_ros.core.primitives.responses import periodic_responses
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.primitives.time_scaling import StepGrid

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, check_positive
 from dmp_cpg_ros.core.maths.exponential import exponential
 from dmp_cpg_ros.core.primitives.demonstration import columns
 from dmp_cpg_ros.core.primitives.time_scaling import Form, StepGrid
@@ -66,13 +66,10 @@ class SpringDamper:
         """Validate."""
         for name in ('stiffness', 'damping'):
             values = np.atleast_1d(np.array(getattr(self, name), dtype=float))
-            if values.ndim != 1 or not np.all(np.isfinite(values)) or not np.all(values > 0.0):
-                raise ParameterError(
-                    f'{name} must be positive finite numbers, not {values.tolist()}')
+            check_positive(**{name: values})
             object.__setattr__(self, name, values)
         if self.stiffness.shape != self.damping.shape:
-            raise ParameterError(
-                f'{len(self.stiffness)} stiffnesses do not match {len(self.damping)} dampings')
+            raise ParameterError('stiffness and damping must have one length')
         if self.form not in FORMS:
             raise ParameterError(f'form must be one of {", ".join(FORMS)}, not {self.form!r}')
 

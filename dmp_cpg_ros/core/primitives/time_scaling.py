@@ -14,8 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, check_positive
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 
 Form = Literal['scaled', 'printed']
@@ -116,9 +115,7 @@ class TimeScaling(FirstOrderFilter):
         ParameterError
             If τ, τ_ext or dt is not a positive finite number.
         """
-        for name, value in (('tau', tau), ('commanded tau', command), ('dt', dt)):
-            if not (np.isfinite(value) and value > 0.0):
-                raise ParameterError(f'{name} = {value!r} must be a positive finite number')
+        check_positive(tau=tau, commanded_tau=command, dt=dt)
         fraction = np.linspace(0.0, 1.0, count)
         if tau == command:
             elapsed, taus = fraction * dt, np.full(count, tau)

@@ -99,8 +99,7 @@ class LearnedMotion:
         cycle = primitive.centre + primitive.on_cycle(np.linspace(-pi, pi, 200))[0]
         for name, column, most in zip(MOTION_NAMES, cycle.T, LARGEST * len(LEGS), strict=True):
             if not np.abs(column).max() <= most:
-                raise DataError(f'{name} reaches {np.abs(column).max():.3g}; no foot can walk '
-                                f'with more than {most:g}')
+                raise DataError(f'{name} exceeds {most:g}; no foot can walk so')
         lifts = cycle[:, 2::3].max(axis=0)
         if lifts.min() < LEAST_LIFT:
             raise DataError(f'{LEGS[int(lifts.argmin())]}_lift never rises above '
@@ -250,17 +249,15 @@ def _normalised(leg: str, samples: FootSamples, stance_height: float) -> tuple[A
     c, duty = samples.cycle_position, samples.duty
     psi = np.unwrap([warped(*at)[0] for at in zip(c.tolist(), duty.tolist(), strict=True)])
     keep = np.append(True, np.diff(np.maximum.accumulate(psi)) > 1e-9)
-    if psi[-1] - psi[0] < 4.0 * pi:
-        raise DataError(f'{leg} walks {(psi[-1] - psi[0]) / (2.0 * pi):.2g} cycles steadily; two '
-                        'are needed')
+    if (cycles := (psi[-1] - psi[0]) / (2.0 * pi)) < 2.0:
+        raise DataError(f'{leg} walks {cycles:.2g} cycles steadily; two are needed')
     standing = np.abs(c) >= 0.5 * (1.0 - duty)
     since = (c - np.copysign(0.5, c)) * samples.cycle  # time after mid-stance [s]
     line = np.stack([np.ones(len(c)), since], axis=1)
     (middle, velocity), *_ = np.linalg.lstsq(line[standing], samples.foot[standing], rcond=None)
     speed = float(np.hypot(*velocity[:2]))
     if not speed > 0.05:
-        raise DataError(f'{leg} moves at {speed:.2g} m/s over the ground; a motion is learned '
-                        'from a robot that walks, at 0.05 m/s or more')
+        raise DataError(f'{leg} moves at {speed:.2g} m/s; a robot walks, at 0.05 m/s or more')
     away, direction = samples.foot - middle, velocity[:2] / speed
     time = away[:, :2] @ direction / speed  # of a standing foot that would be there [s]
     stride = c - time / samples.cycle - psi / (2.0 * pi)

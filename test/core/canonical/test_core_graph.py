@@ -93,5 +93,5 @@ def test_shapes_must_fit() -> None:
 
 
 def test_an_unknown_topology_lists_the_known_ones() -> None:
-    with pytest.raises(ParameterError, match='all_to_all, ring, path, star, directed_ring'):
+    with pytest.raises(ParameterError, match='all_to_all, ring, path, star or directed_ring'):
         topology('tree', 4)
