@@ -11,7 +11,6 @@ import math
 from collections import Counter, defaultdict
 from copy import copy
 from dataclasses import dataclass
-from functools import cached_property
 from math import ceil, log2
 from typing import Any
 
@@ -216,11 +215,6 @@ class Network:
     case: Case
     settings: list[Certified]
 
-    @cached_property
-    def like_oscillators(self) -> bool:
-        """Whether the cycles and the target have one radius, so that networks lock on it."""
-        return set(self.case['radius']) == {self.case['target_radius']}
-
 
 class Runs:
     """Networks of one size under their events, and what is wrong with them."""
@@ -253,7 +247,9 @@ class Runs:
         self.since = np.zeros(count, dtype=int)
         self.measure, self.closest, self.turned = np.zeros((3, count))
         self.share, self.y = np.ones((count, size)), np.ones((count, size), dtype=complex)
-        self.alike = np.array([net.like_oscillators for net in networks])
+        # networks lock on their cycle where all radii and the target's are one
+        self.alike = np.array([set(net.case['radius']) == {net.case['target_radius']}
+                               for net in networks])
         self.told: dict[int, str] = {}
         self.row = self.first.copy()
         self.tick, self.stale = 0, True

@@ -7,7 +7,7 @@ requests, commands, accepted changes and votes.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -227,28 +227,30 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, fl
     return expected
 
 
-_WORDS = {'coupling_graph': ('all_to_all', 'ring', 'path', 'star', 'directed_ring')}
+_GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 _NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain': (60.0, 4000.0),
             'region_radius': (0.03, 1.2), 'cadence_scale': (0.25, 4.0), 'alpha_r': (0.7, 20.0),
             'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0)}
 _DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': False}
 
 
-def _value(rng: np.random.Generator, name: str) -> Any:
-    low, high = _NUMBERS[name]
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def _legs(rng: np.random.Generator) -> tuple[str, ...]:
-    return tuple(rng.permutation(LEGS)[:1 + rng.choice(4, p=(0.5, 0.3, 0.15, 0.05))].tolist())
+def _change(rng: np.random.Generator, names: Sequence[str]) -> Case:
+    """A random value of one of some parameters."""
+    name = str(rng.choice(names))
+    if name == 'inhibited_legs':
+        count = 1 + rng.choice(4, p=(0.5, 0.3, 0.15, 0.05))
+        return {name: tuple(rng.permutation(LEGS)[:count].tolist())}
+    if name == 'coupling_graph':
+        return {name: str(rng.choice(_GRAPHS))}
+    return {name: float(np.exp(rng.uniform(*np.log(_NUMBERS[name]))))}
 
 
 def setting(rng: np.random.Generator) -> Case:
     """Random parameters, certified or not."""
     names = rng.permutation(list(_NUMBERS))[:rng.integers(0, 7)]
-    parameters: Case = {**_DEFAULTS, **{str(name): _value(rng, str(name)) for name in names}}
-    parameters['coupling_graph'] = str(rng.choice(_WORDS['coupling_graph']))
-    parameters['inhibited_legs'] = _legs(rng)
+    parameters: Case = dict(_DEFAULTS)
+    for name in (*names, 'coupling_graph', 'inhibited_legs'):
+        parameters |= _change(rng, [name])
     if rng.random() < 0.1:
         parameters['voting'] = True
     return {'gait': str(rng.choice(list(GAITS))), 'parameters': parameters,
@@ -266,9 +268,7 @@ def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
                               p=(0.33, 0.25, 0.25, 0.05, 0.09, 0.03)))
         value: Any = None
         if kind == 'set':
-            name = str(rng.choice([*_NUMBERS, 'inhibited_legs', 'coupling_graph']))
-            value = {name: _legs(rng) if name == 'inhibited_legs' else str(rng.choice(
-                _WORDS[name])) if name in _WORDS else _value(rng, name)}
+            value = _change(rng, [*_NUMBERS, 'inhibited_legs', 'coupling_graph'])
         elif kind == 'gait':
             value = str(rng.choice(list(GAITS)))
         elif kind == 'command':
@@ -284,9 +284,8 @@ def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
 
 def _telling(rng: np.random.Generator) -> list[list[Any]]:
     """Sequences that once told that something was missing, at other times and values."""
-    def change(*names: str) -> Any:
-        name = str(rng.choice(names))
-        return {name: _legs(rng) if name == 'inhibited_legs' else _value(rng, name)}
+    def change(*names: str) -> Case:
+        return _change(rng, names)
 
     def soon() -> float:
         return float(np.exp(rng.uniform(np.log(0.004), np.log(0.6))))

@@ -27,12 +27,12 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.analysis.stop_outcome import StopSummary
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.errors import MissingFileError
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies import walking_trials as trials
+from dmp_cpg_ros.studies.loop_recording import StopSummary
 from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
 from dmp_cpg_ros.suite import load_gaits, load_suite
 

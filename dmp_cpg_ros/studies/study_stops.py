@@ -34,9 +34,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.analysis import stop_outcome
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.stop_outcome import StopOutcome
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
@@ -49,7 +47,8 @@ from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.loop_recording import LoopRun, recording_of
+from dmp_cpg_ros.studies import loop_recording as runs
+from dmp_cpg_ros.studies.loop_recording import LoopRun, StopOutcome
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, percent, write_results
 from dmp_cpg_ros.suite import Suite, load_gait, load_suite
 
@@ -293,8 +292,8 @@ def _outcome(run: LoopRun[FreezingLoop], case: StopCase, bound_s: float) -> Stop
     if run.fell():
         return StopOutcome(True, **times)
     robot = run.robot.description
-    at_rest = stop_outcome.body_at_rest(
-        recording_of(run.states), robot, RunContext(robot=robot).contact_force)
+    at_rest = runs.body_at_rest(
+        runs.recording_of(run.states), robot, RunContext(robot=robot).contact_force)
     if case.method != METHODS[0]:
         return at_rest
     run.loop.request(False)
@@ -302,7 +301,7 @@ def _outcome(run: LoopRun[FreezingLoop], case: StopCase, bound_s: float) -> Stop
     last = run.states[-round(SPEED_WINDOW / run.tick_s):]
     resumed = float(np.mean([state.base_velocity_in_base[0] for state in last]))
     return replace(at_rest, fell=run.fell(), **times, resumed_speed=resumed,
-                   walked_on=abs(resumed - case.speed) <= stop_outcome.WALKING_ERROR * case.speed)
+                   walked_on=abs(resumed - case.speed) <= runs.WALKING_ERROR * case.speed)
 
 
 def _held(run: LoopRun[FreezingLoop]) -> tuple[float, float]:
@@ -333,7 +332,7 @@ def _key(case: StopCase) -> tuple[str, float, str, float, str]:
 
 
 def _cells(outcomes: Sequence[StopOutcome], method: str) -> tuple[str, ...]:
-    of = stop_outcome.StopSummary(outcomes)
+    of = runs.StopSummary(outcomes)
     fell, stood, walked_on, bounded, exceeded = map(of.number, (
         'fell', 'standing', 'walked_on', 'bounded', 'bound_exceeded'))
     prediction_error, *others = (

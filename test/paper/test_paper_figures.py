@@ -12,9 +12,11 @@ from core_examples import GAITS
 from matplotlib.collections import PolyCollection
 from PIL import Image
 
-from dmp_cpg_ros.analysis import paper_figures
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.core.robot_model.state import LEGS
+
+pytest.importorskip('mujoco')
+from dmp_cpg_ros.studies import paper_figures
 
 FREE = paper_figures.local_dynamics(False)
 HELD = paper_figures.local_dynamics(True)
@@ -75,7 +77,6 @@ def test_the_gait_diagram_has_bars_of_the_duty_factor_at_the_lags(name: str) -> 
 
 
 def test_the_command_writes_every_figure(tmp_path: Path) -> None:
-    pytest.importorskip('mujoco')
     from dmp_cpg_ros.studies.paper_figures import main
 
     assert main(['--out', str(tmp_path)]) == 0
@@ -88,7 +89,6 @@ def test_the_command_writes_every_figure(tmp_path: Path) -> None:
 
 def test_a_file_that_is_not_there_ends_with_status_2(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip('mujoco')
     from dmp_cpg_ros.studies.paper_figures import main
 
     assert main(['none.yaml', '--out', str(tmp_path)]) == 2

@@ -32,7 +32,7 @@ LAYERS = {
     'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco'}),
     'nodes': ({'core', 'configuration', 'layouts', 'suite_table', 'suite', 'primitive_files',
                'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
-    'analysis': ({'core', 'paper', 'configuration', 'layouts', 'suite_table', 'suite'},
+    'analysis': ({'core', 'configuration', 'layouts', 'suite_table', 'suite'},
                  {'numpy', *RECORDS, *FIGURES}),
     'commands': ({'core', 'configuration', 'layouts', 'suite_table', 'suite',
                   'primitive_files', 'robot', 'nodes', 'analysis'}, EVERYTHING),

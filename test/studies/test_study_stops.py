@@ -17,7 +17,9 @@ from dmp_cpg_ros.analysis.recording import (
     OdometrySeries,
     Recording,
 )
-from dmp_cpg_ros.analysis.stop_outcome import StopOutcome, StopSummary, body_at_rest
+
+pytest.importorskip('mujoco')
+from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest
 
 ROBOT = quadruped()
 
@@ -70,7 +72,6 @@ def test_a_stop_that_never_came_to_rest_exceeds_its_bound() -> None:
 
 def test_the_command_prints_a_row_per_method_and_writes_every_case(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip('mujoco')
     from dmp_cpg_ros.studies.study_stops import main
 
     written = []
@@ -88,7 +89,6 @@ def test_the_command_prints_a_row_per_method_and_writes_every_case(
 @pytest.mark.parametrize('arguments', [['--gaits', 'gallop'], ['--phases', '0'], ['none.yaml']])
 def test_bad_arguments_end_with_status_2_and_a_reason(
         arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip('mujoco')
     from dmp_cpg_ros.studies.study_stops import main
 
     assert main(arguments) == 2
