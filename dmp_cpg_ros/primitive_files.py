@@ -15,8 +15,8 @@ import yaml
 from dmp_cpg_ros.configuration import find_config, load_yaml, naming
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.parameters import check_names, shown
-from dmp_cpg_ros.core.primitives.basis import GaussianBases, VonMisesBases
 from dmp_cpg_ros.core.primitives.discrete import DiscretePrimitive
+from dmp_cpg_ros.core.primitives.primitive import GaussianBases, VonMisesBases
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 from dmp_cpg_ros.core.transformation.foot_path import Motion

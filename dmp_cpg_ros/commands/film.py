@@ -181,13 +181,7 @@ def write_film(path: Path, frames: Iterator[Frame], palette_from: list[Frame], f
         Frames that have the colours of the film, for a GIF.
     fps : float
         Frames per second.
-
-    Raises
-    ------
-    ParameterError
-        See :func:`checked_film_path`.
     """
-    checked_film_path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     first = next(frames)
     frames = chain([first], frames)

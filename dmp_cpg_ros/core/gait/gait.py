@@ -9,6 +9,7 @@ standing height of the hip.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -84,7 +85,7 @@ class Pace(NamedTuple):
     duty: float
 
 
-class CycleOfLegs:
+class CycleOfLegs(ABC):
     """What a gait and a blend of two have in common.
 
     Attributes
@@ -110,15 +111,15 @@ class CycleOfLegs:
     rest_rate: float = 0.0
     _paced: tuple[tuple[float, ...], Pace] | None = None
 
+    @abstractmethod
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω of the oscillators at a foot speed as from
         :meth:`BodyScale.foot_speed` [rad/s].
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed [m/s]."""
-        raise NotImplementedError
 
     def own_omegas(self, omega: float) -> list[float]:
         """Frequencies with which the legs go through their cycles when the gait's is ω: the

@@ -15,8 +15,8 @@ from dmp_cpg_ros.core.learning import learning
 from dmp_cpg_ros.core.learning.learning import Demonstrations, FitOptions
 from dmp_cpg_ros.core.learning.regression import Indices, Rows, Task
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.primitives.basis import Bases, GaussianBases
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive
+from dmp_cpg_ros.core.primitives.primitive import Bases, GaussianBases
 from dmp_cpg_ros.core.primitives.responses import Force, transient_responses
 from dmp_cpg_ros.core.primitives.time_scaling import Form
 

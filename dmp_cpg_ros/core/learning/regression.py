@@ -21,8 +21,8 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.learning import learning
 from dmp_cpg_ros.core.learning.learning import BASIS_CANDIDATES, FitOptions
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.primitives.basis import Bases
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+from dmp_cpg_ros.core.primitives.primitive import Bases
 from dmp_cpg_ros.core.primitives.responses import Force
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 

@@ -18,8 +18,8 @@ from dmp_cpg_ros.core.learning.learning import Demonstrations, FitOptions
 from dmp_cpg_ros.core.learning.period import find_period, fourier_series, phase_lead
 from dmp_cpg_ros.core.learning.regression import Task
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.primitives.basis import VonMisesBases
 from dmp_cpg_ros.core.primitives.demonstration import Demonstration, columns, vector
+from dmp_cpg_ros.core.primitives.primitive import VonMisesBases
 from dmp_cpg_ros.core.primitives.responses import Force, periodic_responses
 from dmp_cpg_ros.core.primitives.rhythmic import RhythmicInput, RhythmicPrimitive
 from dmp_cpg_ros.core.primitives.time_scaling import Form

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.primitives.basis import GaussianBases, VonMisesBases
+from dmp_cpg_ros.core.primitives.primitive import GaussianBases, VonMisesBases
 
 COUNTS = st.integers(1, 60)
 OVERLAPS = st.floats(0.02, 0.9)

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.primitives.basis import GaussianBases
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive
+from dmp_cpg_ros.core.primitives.primitive import GaussianBases
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper
 
 DECAY = 4.6

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.phase import phase, state_at, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.primitives.basis import VonMisesBases
+from dmp_cpg_ros.core.primitives.primitive import VonMisesBases
 from dmp_cpg_ros.core.primitives.rhythmic import (
     RhythmicInput,
     RhythmicPrimitive,
