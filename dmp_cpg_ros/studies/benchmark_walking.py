@@ -242,49 +242,37 @@ def gaits(pool: Processes, seeds: int, phases: int) -> Table:
                  rows, results)
 
 
-@dataclass(frozen=True)
-class RobotOutcome:
-    """What a robot did.
+def run_robot(file: str, phases: int) -> dict[str, Any]:
+    """Walk, trot faster and faster, stop, start, and be pushed.
 
-    Attributes
+    Parameters
     ----------
-    mass : float
-        [kg]
-    amble, trot : SteadyOutcome
-        At 0.5 and 1 m/s.
-    top_speed : float
-        Fastest trot of ``TOP_SPEEDS`` that was reached [m/s]; NaN if none was.
-    stops, stood, walked_on, stop_falls : int
-        Stops from an amble at 0.5 m/s, and what became of them.
-    pushed : float
-        Sideways speed change survived at every phase of the amble at 0.5 m/s [m/s].
+    file : str
+        Robot file.
+    phases : int
+        Number of phases of the stops and the pushes.
+
+    Returns
+    -------
+    dict
+        ``mass`` [kg]; ``amble`` and ``trot`` at 0.5 and 1 m/s, SteadyOutcome; ``top_speed``, the
+        fastest trot of ``TOP_SPEEDS`` that was reached, NaN if none was [m/s]; ``stops`` from an
+        amble at 0.5 m/s, and how many ``stood``, ``walked_on`` and fell, ``stop_falls``;
+        ``pushed``, the sideways speed change survived at every phase of that amble [m/s].
     """
-
-    mass: float
-    amble: trials.SteadyOutcome
-    trot: trials.SteadyOutcome
-    top_speed: float
-    stops: int
-    stood: int
-    walked_on: int
-    stop_falls: int
-    pushed: float
-
-
-def run_robot(file: str, phases: int) -> RobotOutcome:
-    """Walk, trot faster and faster, stop, start, and be pushed, the latter at some phases."""
     # a zero command is no request here, but the first command starts the gait
     suite = load_suite(None, {'robot': file, 'cmd_vel_timeout': 0.0})
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
     shares = [i / phases for i in range(phases)]
     stops = StopSummary(list(run_trials(
         robot, [StopCase('amble', 0.5, phase) for phase in shares], suite.parameters)))
-    stood, walked_on, fell = map(stops.number, ('standing', 'walked_on', 'fell'))
-    return RobotOutcome(
-        robot.description.mass, trials.steady('amble', (0.5, 0.0, 0.0), file),
-        trials.steady('trot', (1.0, 0.0, 0.0), file), _top_speed(file), phases,
-        stood, walked_on, fell,
-        min(min(trials.survived_pushes('amble', 0.5, phase, SIDES, file)) for phase in shares))
+    return {
+        'mass': robot.description.mass, 'amble': trials.steady('amble', (0.5, 0.0, 0.0), file),
+        'trot': trials.steady('trot', (1.0, 0.0, 0.0), file), 'top_speed': _top_speed(file),
+        'stops': phases, 'stood': stops.number('standing'),
+        'walked_on': stops.number('walked_on'), 'stop_falls': stops.number('fell'),
+        'pushed': min(min(trials.survived_pushes('amble', 0.5, phase, SIDES, file))
+                      for phase in shares)}
 
 
 def _top_speed(file: str) -> float:
@@ -305,11 +293,12 @@ def robots(pool: Processes, seeds: int, phases: int) -> Table:
         {'file': file, 'phases': phases} for file in ROBOTS if _is_there(file)])
     rows = []
     for case, of in results:
-        amble, trot = (steady_cells((v, 0.0, 0.0), outcome)
-                       for v, outcome in ((0.5, of.amble), (1.0, of.trot)))
-        rows.append((Path(case['file']).stem, f'{of.mass:.1f}', *amble[1::2], *trot[1::2],
-                     _number(of.top_speed, 1), f'{of.stood}/{of.stops}',
-                     f'{of.walked_on}/{of.stops}', str(of.stop_falls), _number(of.pushed, 1)))
+        amble, trot = (steady_cells((v, 0.0, 0.0), of[gait])
+                       for gait, v in (('amble', 0.5), ('trot', 1.0)))
+        rows.append((Path(case['file']).stem, f'{of["mass"]:.1f}', *amble[1::2], *trot[1::2],
+                     _number(of['top_speed'], 1), f'{of["stood"]}/{of["stops"]}',
+                     f'{of["walked_on"]}/{of["stops"]}', str(of['stop_falls']),
+                     _number(of['pushed'], 1)))
     return Table('Robots; CoT is positive joint work over m g d, the push is survived at every '
                  'phase of the amble',
                  ('robot', 'kg', 'amble 0.5 m/s: error %', 'CoT', 'trot 1 m/s: error %', 'CoT',

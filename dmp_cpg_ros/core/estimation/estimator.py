@@ -234,8 +234,8 @@ class BodyEstimator:
             readings.time_ns, np.array((0.0, 0.0, height)), state.quaternion, zero, rate, height,
             np.array(normal_in_world(flat.slope)), np.array(trust), covariance.diagonal()[3:6],
             _problems(readings))
-        terrain = leg_odometry.initial_terrain(
-            [(x, y, z + height) for x, y, z in contact]) if all(legs) else flat
+        feet = tuple((x, y, z + height) for x, y, z in contact)
+        terrain = TerrainState(feet, leg_odometry.fitted_slope(feet)) if all(legs) else flat
         watch = frozen.first_watch(readings)
         if estimate.problems:
             estimate = replace_unchecked(estimate, readings=frozen.with_joints(watch, readings))

@@ -183,11 +183,6 @@ class TerrainState:
     slope: tuple[float, float]
 
 
-def initial_terrain(contact_in_world: Sequence[Triple]) -> TerrainState:
-    """Plane of a robot that stands on its four feet."""
-    return TerrainState(tuple(contact_in_world), fitted_slope(contact_in_world))
-
-
 def terrain_step(terrain: TerrainState, contact_in_world: Sequence[Triple], trust: Sequence[float],
                  dt: float, time_constant: float) -> TerrainState:
     """Take over new footholds and follow their plane.

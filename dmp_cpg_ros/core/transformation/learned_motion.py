@@ -147,7 +147,8 @@ class LearnedFoot:
                 played = self._primitive.follow(
                     played, nodes, self._held, far / self._primitive.omega)
                 began, on = began + far, on - far
-        place, per_psi = played.position.tolist(), self._per_radian(played)
+        place = played.position.tolist()
+        per_psi = [value / self._primitive.omega for value in played.velocity.tolist()]
         stride, side, lift = (p + max(on, 0.0) * v for p, v in zip(place, per_psi, strict=True))
         psi_rate = stretch * rate
         stride_rate, side_rate, lift_rate = (value * psi_rate for value in per_psi)
@@ -162,11 +163,6 @@ class LearnedFoot:
             (x, y + height * side, path.foothold_in_base[2] + height * lift),
             (x_dot * slower * cycle, y_dot * slower * cycle + height * side_rate,
              height * lift_rate))
-
-    def _per_radian(self, played: RhythmicState) -> list[float]:
-        """Derivatives by ψ [1/rad]."""
-        omega = self._primitive.omega
-        return [value / omega for value in played.velocity.tolist()]
 
 
 def warped(cycle_position: float, duty: float) -> tuple[float, float]:

@@ -202,9 +202,11 @@ class LegPrimitive:
         bounce = gait.bounce(position, duty, omega)
         p_x, p_y, p_z = plus(foot, offset)
         v_x, v_y, v_z = plus(offset_rate, path_velocity)
-        goal, goal_velocity = self._goal(
-            (p_x, p_y, p_z + (stumble.height - activity * bounce.height)),
-            (v_x, v_y, v_z + stumble.rate - activity * bounce.velocity * (rate / omega)))
+        angles = self.kinematics.angles(
+            (p_x, p_y, p_z + (stumble.height - activity * bounce.height)))
+        _, jacobian = self.kinematics.foot_and_jacobian(angles)
+        goal, goal_velocity = np.array(angles), np.array(_joint_velocity(jacobian, (
+            v_x, v_y, v_z + stumble.rate - activity * bounce.velocity * (rate / omega))))
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, np.array(offset), stumble, motion), goal, goal_velocity
 
@@ -241,12 +243,6 @@ class LegPrimitive:
         placement, (height, _) = triple(feedback.shift_in_base.tolist()), swing_height(swung)
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
         return reflex.compliant_offset_rate(stumble, rate, path_velocity, away), stumble
-
-    def _goal(self, foot: Triple, velocity: Triple) -> tuple[Array, Array]:
-        """g_θ [rad] and g_θ̇ [rad/s] of a foot in the base."""
-        angles = self.kinematics.angles(foot)
-        _, jacobian = self.kinematics.foot_and_jacobian(angles)
-        return np.array(angles), np.array(_joint_velocity(jacobian, velocity))
 
     def targets(self, state: LegState, goal: Array, goal_velocity: Array, feedback: Array,
                 measured: SpringState | None = None) -> JointTargets:
