@@ -98,27 +98,23 @@ def _stops(metrics: Mapping[str, Any]) -> list[Fact]:
         if entries:
             found += [Fact(f'Every {word} {end}', f'{done} of {count}', done == count),
                       *_predictions(entries, aim)]
-    speeds = _known(metrics['stop']['all'], 'body_speed_at_rest_m_s')
-    if speeds:
+    if speeds := _known(metrics['stop']['all'], 'body_speed_at_rest_m_s'):
         fastest, = max(speeds)
-        finding = f'at most {1e3 * fastest:.2g} mm/s'
-        found.append(Fact('The body stood still at rest', finding, fastest < STILL_SPEED))
-    down = [loaded for loaded, in _known(metrics['stop']['all'], 'feet_down_at_rest')]
-    if down:
-        finding = f'in {sum(down)} of {len(down)} stops'
-        found.append(Fact('All four feet carried load at rest', finding, all(down)))
+        found.append(Fact('The body stood still at rest', f'at most {1e3 * fastest:.2g} mm/s',
+                          fastest < STILL_SPEED))
+    if down := [loaded for loaded, in _known(metrics['stop']['all'], 'feet_down_at_rest')]:
+        found.append(Fact('All four feet carried load at rest',
+                          f'in {sum(down)} of {len(down)} stops', all(down)))
     return found
 
 
 def _predictions(entries: list[dict[str, Any]], aim: str) -> list[Fact]:
     found = []
-    pairs = _known(entries, 'measured_s', 'predicted_s')
-    if pairs:
+    if pairs := _known(entries, 'measured_s', 'predicted_s'):
         finding = '{:.3f} s measured, {:.3f} s predicted (worst case)'.format(
             *max(pairs, key=lambda pair: float(abs(pair[0] - pair[1]))))
         found.append(Fact(f'Time to {aim} against its prediction', finding, None))
-    pairs = _known(entries, 'measured_s', 'bound_s')
-    if pairs:
+    if pairs := _known(entries, 'measured_s', 'bound_s'):
         measured, bound = max(pairs, key=lambda pair: float(pair[0] / pair[1]))
         finding = f'{measured:.3f} s of {bound:.3f} s (nearest case)'
         found.append(Fact(f'Time to {aim} within its bound', finding, measured <= bound))

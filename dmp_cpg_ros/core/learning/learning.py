@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.primitives.demonstration import Demonstration, columns, vector
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration, vector
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, default_gains
 from dmp_cpg_ros.core.primitives.time_scaling import Form
 
@@ -197,8 +197,7 @@ def chosen_gains(durations: Sequence[float], stiffness: ArrayLike | None,
         damping = 2.0 * np.sqrt(np.maximum(np.asarray(stiffness, dtype=float), 0.0))
     elif stiffness is None:
         stiffness = 0.25 * np.asarray(damping, dtype=float) ** 2
-    k, b = np.asarray(stiffness, dtype=float), np.asarray(damping, dtype=float)
-    return SpringDamper(columns(k, dofs, 'stiffness'), columns(b, dofs, 'damping'), form)
+    return SpringDamper(np.asarray(stiffness), np.asarray(damping), form).spread(dofs)
 
 
 def smallest_good(errors: dict[int, float], tolerance: float = 0.05, floor: float = 1e-3) -> int:

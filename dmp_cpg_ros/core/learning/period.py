@@ -61,7 +61,10 @@ def find_period(demonstration: Demonstration, shortest: float | None = None,
     if not 0.0 < low < high:
         raise DataError(f'no period from {1.0 / high:g} s to {1.0 / low:g} s: none to look for')
     whole = _Fit(times, values, 0.45 * (len(times) - 1) / span)
-    some = _some(whole)
+    # so few samples that the search is quick, drawn at random lest frequencies fold
+    drawn = np.sort(np.random.default_rng(0).choice(
+        len(times), min(len(times), _COARSE_SAMPLES), replace=False))
+    some = _Fit(times[drawn], values[drawn], whole.highest)
     coarse = [some.best_nearby(f, 0.6 / span, low, high)
               for f in _candidates(times, values, low, high)]
     least, reach = min(error for _, error in coarse), 0.06 / span
@@ -188,15 +191,6 @@ def _candidates(times: Array, values: Array, low: float, high: float) -> list[fl
         if low <= f <= high and all(abs(f - other) > 0.05 / times[-1] for other in found):
             found.append(f)
     return found
-
-
-def _some(fit: _Fit) -> _Fit:
-    """So few samples that the search is quick, drawn at random lest frequencies fold."""
-    if len(fit.times) <= _COARSE_SAMPLES:
-        return fit
-    drawn = np.random.default_rng(0).choice(len(fit.times), _COARSE_SAMPLES, replace=False)
-    drawn.sort()
-    return _Fit(fit.times[drawn], fit.values[drawn], fit.highest)
 
 
 def _design(times: Array, frequency: float, harmonics: int) -> Array:
