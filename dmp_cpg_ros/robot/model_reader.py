@@ -22,7 +22,7 @@ from dmp_cpg_ros.robot import model_parts
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_parts import ModelIds, foot_position
 from dmp_cpg_ros.robot.mujoco_import import mujoco
-from dmp_cpg_ros.robot.robot_file import OWN_MODEL, RobotFile, load_robot_file
+from dmp_cpg_ros.robot.robot_file import OWN_ROBOT, RobotFile, load_robot_file
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 STANCE_LEG_SHARE = 0.7  # distance hip-foot over leg length when the model has no usable home pose
@@ -48,7 +48,7 @@ def load_description(path: Path | str | None = None) -> RobotDescription:
     MissingFileError, ParameterError
         If a file is missing, or the model is no quadruped of the kind that this package drives.
     """
-    with naming(path or OWN_MODEL):
+    with naming(path or OWN_ROBOT):
         file = load_robot_file(path)
         return read_description(load_model(file.model, file.base), file)
 

@@ -13,7 +13,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, TypeVar
 
-from dmp_cpg_ros.configuration import load_yaml, naming
+from dmp_cpg_ros.configuration import find_config, load_yaml, naming
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.parameters import check_names, shown
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
@@ -24,7 +24,7 @@ Triple = tuple[float, float, float]
 _REQUIRED = ('model', 'base', 'joints', 'feet')
 _PER_JOINT = ('kp', 'kd', 'torque_limit', 'velocity_limit')
 
-OWN_MODEL = 'mini_quadruped.xml'
+OWN_ROBOT = 'robots/mini_quadruped.yaml'
 _MODELS = Path(__file__).resolve().parents[1] / 'models'
 
 
@@ -67,12 +67,8 @@ class RobotFile:
 
 
 def own_robot_file() -> RobotFile:
-    """Return what ``config/robots/mini_quadruped.yaml`` says, without looking for that file."""
-    return RobotFile(
-        model=find_model(OWN_MODEL, None), base='base_link',
-        joints=tuple((f'{leg}_abduction', f'{leg}_hip', f'{leg}_knee') for leg in LEGS),
-        feet=tuple(f'{leg}_foot' for leg in LEGS),
-        kp=(60.0, 60.0, 60.0), kd=(1.8, 1.8, 1.8), velocity_limit=(40.0, 40.0, 25.7))
+    """Return the package's own robot, ``config/robots/mini_quadruped.yaml``."""
+    return load_robot_file(find_config(OWN_ROBOT))
 
 
 def load_robot_file(robot: RobotFile | Path | str | None) -> RobotFile:

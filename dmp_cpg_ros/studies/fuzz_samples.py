@@ -42,7 +42,7 @@ from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.core.transformation.learned_motion import MOTION_NAMES
 from dmp_cpg_ros.primitive_files import load_motion, load_primitive, save_primitive
 from dmp_cpg_ros.robot.model_reader import load_description
-from dmp_cpg_ros.robot.robot_file import OWN_MODEL, find_model
+from dmp_cpg_ros.robot.robot_file import own_robot_file
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 KINDS = ('scenario', 'suite', 'gaits', 'robot', 'mjcf', 'primitive', 'motion', 'numpy', 'csv',
@@ -143,7 +143,7 @@ def make(folder: Path) -> Path:
                         ('robot', ('robots/mini_quadruped',))):
         for name in names:
             shutil.copy(find_config(name), folder / kind)
-    shutil.copy(find_model(OWN_MODEL, None), folder / 'mjcf')
+    shutil.copy(own_robot_file().model, folder / 'mjcf')
     t = np.linspace(0.0, 2.0, 60)
     reach = Demonstration(t, np.stack([t**2 * (3.0 - t), np.sin(t)], axis=1))
     cycle = Demonstration(t, 0.2 * np.sin(np.pi * t[:, None] + np.arange(len(MOTION_NAMES))),

@@ -24,9 +24,9 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.figures import drawings, style
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
-from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.transformation.leg import body_scale
