@@ -128,6 +128,13 @@ class CanonicalSystem:
             matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += block
         return matrix
 
+    def newton_step(self, x: Array, omega: float | Array, gains: Array) -> Array:
+        """States (N, 2) one of Newton's steps nearer to an equilibrium; LinAlgError where the
+        Jacobian is singular.
+        """
+        off = self.field(x, omega, gains).ravel()
+        return x - np.linalg.solve(self.jacobian(x, omega, gains), off).reshape(x.shape)
+
     def step(self, x: Array, omega: float | Array, gains: Array, dt: float) -> Array:
         """Advance by one time step with ω and the gains held.
 

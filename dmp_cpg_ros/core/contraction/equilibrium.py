@@ -94,17 +94,15 @@ def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array,
 
 def _newton(system: CanonicalSystem, x: Array, omega: Array, gains: Array) -> Array | None:
     """Newton's iteration; None when it does not settle close to where it began."""
-    start, size = x, system.graph.size
+    start = x
     scale = float(np.abs(system.linear_part(gains)[0]).max()) + 1.0
     for _ in range(12):
-        residual = system.field(x, omega, gains)
-        if np.abs(residual).max() < _CONVERGED * scale:
+        if np.abs(system.field(x, omega, gains)).max() < _CONVERGED * scale:
             return x
         try:
-            step = np.linalg.solve(system.jacobian(x, omega, gains), residual.ravel())
+            x = system.newton_step(x, omega, gains)
         except np.linalg.LinAlgError:
             return None
-        x = x - step.reshape(size, 2)
         if np.abs(x - start).max() > 0.5 * float(system.radius.max()):
             return None
     return None

@@ -63,6 +63,15 @@ class BodyScale:
             (v_x * v_x + across * across) ** 0.5
             + LATERAL_WEIGHT * abs(gamma) * self.hip_radius)
 
+    def limited(self, velocity: Triple, highest_speed: float, largest_curve: float = inf
+                ) -> Triple:
+        """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
+        share of g, that goes with it [m/s], [rad/s], see
+        :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
+        """
+        return within_limit(velocity, self.foot_speed(*velocity), self.speed(highest_speed),
+                            largest_curve * GRAVITY)
+
 
 class Pace(NamedTuple):
     """What a gait makes of a reference.
@@ -140,19 +149,13 @@ class CycleOfLegs(ABC):
         v_x, v_y, gamma = r.tolist()
         asked = (v_x, v_y, gamma, scale.leg_length, scale.hip_radius)
         if self._paced is None or self._paced[0] != asked:
-            velocity = self.limited((v_x, v_y, gamma), scale)
+            velocity = scale.limited((v_x, v_y, gamma), self.highest_speed)
             speed = scale.foot_speed(*velocity)
             omega, duty = self.omega(speed, scale), self.duty(speed, scale)
             pace = Pace(velocity, omega, self.own_omegas(omega), duty)
             vars(self)['_paced'] = (asked, pace)
             return pace
         return self._paced[1]
-
-    def limited(self, velocity: Triple, scale: BodyScale) -> Triple:
-        """Velocity (v_x, v_y, γ) that the gait does of one that is asked for [m/s], [rad/s], see
-        :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
-        """
-        return limited(velocity, scale, self.highest_speed)
 
     def cycle_position(self, phi: Array | float) -> Array:
         """Where legs are in their cycle at phases φ (...) [rad]: 0 at mid-swing, in [−1/2, 1/2).
@@ -292,16 +295,6 @@ class Gait(CycleOfLegs):
         :mod:`~dmp_cpg_ros.core.gait.com_height`.
         """
         return planned_bounce(cycle_position, self.groups, duty, omega)
-
-
-def limited(velocity: Triple, scale: BodyScale, highest_speed: float,
-            largest_curve: float = inf) -> Triple:
-    """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
-    share of g, that goes with it [m/s], [rad/s].
-    """
-    return within_limit(
-        velocity, scale.foot_speed(*velocity), scale.speed(highest_speed),
-        largest_curve * GRAVITY)
 
 
 def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:

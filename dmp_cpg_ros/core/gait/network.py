@@ -246,8 +246,7 @@ class GaitNetwork:
         """
         omega, gains = self.omega(r), inhibition.acting_gains(x, self.target)
         for _ in range(6):
-            off = self.system.field(x, omega, gains).ravel()
-            x = x - np.linalg.solve(self.system.jacobian(x, omega, gains), off).reshape(x.shape)
+            x = self.system.newton_step(x, omega, gains)
         return x
 
     def phase_errors(self, x: Array) -> Array:

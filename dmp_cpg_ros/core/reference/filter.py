@@ -17,7 +17,7 @@ from math import inf
 import numpy as np
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.gait.gait import BodyScale, limited
+from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.parameters import Parameters, parameter
@@ -104,7 +104,8 @@ class CommandGate:
             return 0.0, 0.0, 0.0
         if self._scale is None:
             return self._command
-        return limited(self._command, self._scale, self.highest_speed, self.parameters.max_curve)
+        return self._scale.limited(
+            self._command, self.highest_speed, self.parameters.max_curve)
 
 
 class ReferenceSystem:

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.gait import BodyScale, Gait, limited
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, highest_speed
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
 from dmp_cpg_ros.core.gait.transition import GaitTransition
@@ -42,7 +42,7 @@ FAST = (4.0, 0.4, 0.5)
 def test_a_velocity_is_shortened_and_keeps_its_curve(
         velocity: tuple[float, float, float], most: float) -> None:
     scale = BodyScale(0.28, 0.2)
-    short = limited(velocity, scale, most)
+    short = scale.limited(velocity, most)
     reached, speed = scale.foot_speed(*short), scale.foot_speed(*velocity)
     assert reached <= most * (GRAVITY * 0.28) ** 0.5 * (1.0 + 1e-12)
     share = reached / speed if speed > 0.0 else 1.0
@@ -60,7 +60,7 @@ def test_a_fast_command_leaves_less_for_its_curve(
         speed = scale.foot_speed(*v) / (most * (GRAVITY * 0.28) ** 0.5)
         return speed ** 2 + (np.hypot(v[0], v[1]) * v[2] / (curve * GRAVITY)) ** 2
 
-    short = limited(velocity, scale, most, curve)
+    short = scale.limited(velocity, most, curve)
     assert np.allclose(np.cross(short, velocity), 0.0, atol=1e-12)
     assert np.dot(short, velocity) >= 0.0
     if share(velocity) > 1.0:
@@ -111,7 +111,7 @@ def test_commands_are_followed_up_to_the_gait_or_the_fastest_that_may_be_chosen(
     0.4, 1.0)])
 def test_legs_posture_and_cadence_take_the_same_velocity(gait: object) -> None:
     """What exceeds the limit is as if the limit had been asked for."""
-    short = gait.limited(FAST, SCALE)  # type: ignore[attr-defined]
+    short = SCALE.limited(FAST, gait.highest_speed)  # type: ignore[attr-defined]
     speeds = [SCALE.foot_speed(*velocity) for velocity in (FAST, short)]
     assert speeds[1] < 0.99 * speeds[0]
     assert np.allclose(*([gait.omega(u, SCALE), gait.duty(u, SCALE)] for u in speeds))  # type: ignore[attr-defined]
