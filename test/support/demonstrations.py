@@ -14,6 +14,8 @@ from dmp_cpg_ros.core.primitives.demonstration import Demonstration, minimum_jer
 
 Array = NDArray[np.float64]
 
+_JERK = np.polynomial.Polynomial((0.0, 0.0, 0.0, 10.0, -15.0, 6.0))  # of minimum_jerk
+
 # Strokes of the letters: start t0 [s], length [m], direction at the start and at the end [rad].
 # The speed of a stroke is a lognormal function of time, its direction turns with the distance.
 _LETTERS: dict[str, tuple[tuple[float, float, float, float], ...]] = {
@@ -77,8 +79,8 @@ def straight_reach(
     )
     times = _times(duration, dt)
     u, way = (times / duration)[:, None], goal - start
-    position, velocity, acceleration = (
-        way * minimum_jerk(u, order) / duration**order for order in range(3))
+    position, velocity, acceleration = way * minimum_jerk(u), *(
+        way * _JERK.deriv(order)(np.clip(u, 0.0, 1.0)) / duration**order for order in (1, 2))
     return Demonstration(times, start + position, velocity, acceleration)
 
 

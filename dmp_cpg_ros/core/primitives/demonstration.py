@@ -139,15 +139,10 @@ def derivatives(times: ArrayLike, values: ArrayLike, half_window: int = 3, degre
     return fitted[:, 1] / scale[:, None], 2.0 * fitted[:, 2] / scale[:, None] ** 2
 
 
-def minimum_jerk(share: Array, order: int = 0) -> Array:
-    """Smooth step 10 s³ − 15 s⁴ + 6 s⁵ of least jerk (Flash & Hogan 1985), s clipped to [0, 1], or
-    its first or second derivative.
-    """
+def minimum_jerk(share: Array) -> Array:
+    """Smooth step 10 s³ − 15 s⁴ + 6 s⁵ of least jerk (Flash & Hogan 1985), s clipped to [0, 1]."""
     s = np.clip(share, 0.0, 1.0)
-    if order == 0:
-        return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
-    step = np.polynomial.Polynomial((0.0, 0.0, 0.0, 10.0, -15.0, 6.0))
-    return np.asarray(step.deriv(order)(s))
+    return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
 
 
 def vector(values: ArrayLike, length: int, name: str) -> Array:
