@@ -12,7 +12,7 @@ from html import escape
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dmp_cpg_ros.analysis.figures.catalogue import CATALOGUE
+from dmp_cpg_ros.analysis.figures.catalogue import CATALOGUE, caption
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.metrics.summary import STILL_SPEED
 from dmp_cpg_ros.analysis.strict_json import to_json
@@ -189,8 +189,8 @@ def render(title: str, subtitle: str, metrics: Mapping[str, Any], manifest: Mapp
     sections = {
         'Summary': _summary(metrics, manifest) + (
             f'<div class="pictures">{shown}</div>' if shown else ''),
-        'Figures': ''.join(_figure(figures[entry.name], entry.title, entry.caption)
-                           for entry in CATALOGUE if entry.name in figures),
+        'Figures': ''.join(_figure(figures[draw.__name__], *caption(draw))
+                           for draw in CATALOGUE if draw.__name__ in figures),
         'Stops and starts': ''.join(
             f'<h3>{name}s</h3>{_records(entries)}' for name in ('Stop', 'Start')
             if (entries := metrics[name.lower()]['all'])),

@@ -74,7 +74,7 @@ def test_every_figure_is_drawn_and_nothing_global_changes(
 ) -> None:
     before = dict(matplotlib.rcParams)
     written = write_figures(walked, context, tmp_path)
-    assert list(written) == [entry.name for entry in CATALOGUE]
+    assert list(written) == [draw.__name__ for draw in CATALOGUE]
     assert all(path.read_bytes().startswith(b'\x89PNG') for path in written.values())
     assert dict(matplotlib.rcParams) == before
 
@@ -91,9 +91,9 @@ def test_a_missing_topic_costs_no_more_than_its_figures(
 ) -> None:
 
     less = dataclasses.replace(walked, **{topic: getattr(Recording(), topic)})
-    for entry in CATALOGUE:
-        entry.draw(less, context)
-        entry.draw(less, RunContext())
+    for draw in CATALOGUE:
+        draw(less, context)
+        draw(less, RunContext())
 
 
 def test_the_planned_stance_is_that_of_the_walk(walked: Recording, context: RunContext) -> None:

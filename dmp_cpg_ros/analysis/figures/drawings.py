@@ -3,8 +3,9 @@
 """The figures of the report: over time, and of a plane, which is that of the oscillators or the
 ground.
 
-Each function draws from a recording and its context, and returns None when the recording lacks
-what it needs.
+Each function of the catalogue draws from a recording and its context, and returns None when the
+recording lacks what it needs; its docstring is the title and the caption. Target kinematics and
+canonical states are figures TargetKinematics and OscillatorStates of the paper.
 """
 
 from __future__ import annotations
@@ -39,7 +40,12 @@ CYCLES, CYCLES_OF_TORQUE = 6, 3
 
 
 def target_kinematics(recording: Recording, context: RunContext) -> Figure | None:
-    """Hip and knee targets across a stop and a start (paper, fig. 5, TargetKinematics)."""
+    """Target kinematics.
+
+    Targets of the hips and the knees across a stop by sparse inhibition and the start after
+    it. One oscillator is inhibited; the targets of all legs should come to rest and resume
+    without a kick.
+    """
     joints = ('hip', 'knee')
     return _legs_across_stop(recording, recording.targets.time, {
         f'{joint} target [rad]': recording.targets.position[:, JOINTS_OF_LEG.index(joint)::3]
@@ -47,7 +53,11 @@ def target_kinematics(recording: Recording, context: RunContext) -> Figure | Non
 
 
 def canonical_states(recording: Recording, context: RunContext) -> Figure | None:
-    """Canonical states across inhibition and release (paper, fig. 7, OscillatorStates)."""
+    """Canonical states.
+
+    The four oscillators across the addition and the removal of sparse inhibition. Only the
+    inhibited leg feels it; the coupling brings the other three to rest near their places.
+    """
     x = recording.canonical.x
     return _legs_across_stop(
         recording, recording.canonical.time,
@@ -70,7 +80,12 @@ def _legs_across_stop(recording: Recording, time: Array, values: dict[str, Array
 
 
 def speed_tracking(recording: Recording, context: RunContext) -> Figure | None:
-    """Commanded, reference and measured v and γ; v_y too where it was asked for."""
+    """Speed tracking.
+
+    As commanded, as filtered by the reference system, and as measured; the pale line is every
+    sample, the bold one the mean over a gait cycle. While a stop is requested the reference
+    goes to zero whatever the command.
+    """
     odometry, commands, reference = recording.odometry, recording.commands, recording.reference
     if odometry.time.size < 3:
         return None
@@ -92,7 +107,11 @@ def speed_tracking(recording: Recording, context: RunContext) -> Figure | None:
 
 
 def attitude(recording: Recording, context: RunContext) -> Figure | None:
-    """Roll and pitch, height and yaw of the base, and what is asked for."""
+    """Body attitude.
+
+    Roll and pitch, height over the ground and yaw of the base. The dashed lines are what is
+    asked for: the standing height, and the integral of the reference turn rate.
+    """
     odometry, reference = recording.odometry, recording.reference
     if odometry.time.size < 2:
         return None
@@ -114,7 +133,12 @@ def attitude(recording: Recording, context: RunContext) -> Figure | None:
 
 
 def estimation(recording: Recording, context: RunContext) -> Figure | None:
-    """Errors of the estimated velocity, tilt and yaw."""
+    """Estimate of the body.
+
+    What the robot believes of its motion, from gyroscope, accelerometer, joints and contacts,
+    minus the simulator's truth: velocity in the base, tilt, and yaw, which nothing it has can
+    correct.
+    """
     errors = estimate_errors(recording)
     if errors is None:
         return None
@@ -128,7 +152,12 @@ def estimation(recording: Recording, context: RunContext) -> Figure | None:
 
 
 def footfall(recording: Recording, context: RunContext) -> Figure | None:
-    """Feet on the ground in steady walking and across the first stop."""
+    """Footfall.
+
+    Bars mark feet on the ground, measured (solid) over planned (pale). Top: a few cycles of
+    steady walking. Bottom: the first stop and the start after it; at rest all four bars should
+    be unbroken.
+    """
     feet = recording.feet
     if not feet.time.size:
         return None
@@ -163,7 +192,12 @@ def _steady_window(recording: Recording, cycles: int) -> tuple[float, float] | N
 
 
 def torques(recording: Recording, context: RunContext) -> Figure | None:
-    """Joint torques of a few cycles, and how near the whole run came to the limits."""
+    """Joint torques.
+
+    Left: three cycles of steady walking; grey lines are the limits where they are in view.
+    Right: the whole run as share of the limit; bars reach to the 99th percentile, ticks mark
+    the largest value.
+    """
     joints, robot = recording.joints, context.robot
     if not joints.time.size or not np.isfinite(joints.effort).any():
         return None
@@ -203,7 +237,13 @@ def _shares(axes: Axes, share: Array) -> None:
 
 
 def timing(recording: Recording, context: RunContext) -> Figure | None:
-    """Rate and latency as the robot measured them, and as the recorder saw the ticks arrive."""
+    """Timing.
+
+    Top: what the robot measured of itself, control rate and latency from a state to the last
+    of the four targets that answer it. Bottom, where the recording bears wall time: how far
+    apart the states reached the recorder, and how long after a state the last target of its
+    tick did.
+    """
     arrivals = recording.arrivals
     history = sorted((status for name, of in recording.statuses.items() if ROBOT in name
                       for status in of if status.number('rate_hz') is not None),
@@ -267,7 +307,11 @@ TARGET: Any = {'color': style.RED, 'marker': 'x', 'linestyle': ''}
 
 
 def path(recording: Recording, context: RunContext) -> Figure | None:
-    """Draw the path with its footholds; None without odometry."""
+    """Path.
+
+    The base from above. Small dots are footholds, one for each stance; squares mark where the
+    robot stood still, arrows its heading every two seconds.
+    """
     odometry = recording.odometry
     time = odometry.time
     if time.size < 2:
@@ -314,7 +358,14 @@ def _footholds(axes: Axes, recording: Recording, context: RunContext) -> bool:
 
 
 def phase_portrait(recording: Recording, context: RunContext) -> Figure | None:
-    """Draw the first stop (paper, figure "Local dynamics"); None without oscillators or a stop."""
+    """Phase portrait.
+
+    The first stop in the plane of the oscillators. Left: the inhibited oscillator runs on its
+    limit cycle until inhibition is armed and it enters the region C, where it is held near its
+    target. Middle: close-up of C; the small distance at which it rests is the pull of the
+    other oscillators over the gain. Right: all four legs; dots mark where they rest, rings
+    their places in the gait.
+    """
     stops = requested_stops(recording)
     if not recording.canonical.time.size or not stops:
         return None
