@@ -1,21 +1,58 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``report.html``, one file that opens from disk and fetches nothing, and the run in plain
-sentences, each with its number and whether it holds.
+"""``report.html``, one file that opens from disk and fetches nothing: the figures in their order,
+and the run in plain sentences, each with its number and whether it holds.
 """
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
+from inspect import getdoc
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dmp_cpg_ros.analysis.figures.catalogue import CATALOGUE, caption
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.figures import drawings, style
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.metrics.summary import STILL_SPEED
+from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import to_json
+
+CATALOGUE = (
+    drawings.target_kinematics, drawings.canonical_states, drawings.phase_portrait,
+    drawings.footfall, drawings.path, drawings.speed_tracking, drawings.attitude,
+    drawings.estimation, drawings.torques, drawings.timing)
+"""The figures, in their order."""
+
+
+def caption(draw: Callable[..., object]) -> tuple[str, str]:
+    """Title of a figure, and what there is to see: its function's docstring."""
+    title, _, text = (getdoc(draw) or draw.__name__).partition('.\n\n')
+    return title, ' '.join(text.split())
+
+
+def write_figures(recording: Recording, context: RunContext, folder: Path) -> dict[str, Path]:
+    """Draw and write ``NAME.png`` for each figure that the recording allows.
+
+    Returns
+    -------
+    dict of str to Path
+        The files by the figures' names, in order.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = {}
+    for draw in CATALOGUE:
+        with style.applied():
+            figure = draw(recording, context)
+            if figure is not None:
+                written[draw.__name__] = folder / f'{draw.__name__}.png'
+                FigureCanvasAgg(figure).print_png(written[draw.__name__])
+    return written
+
 
 SPEED_TOLERANCE = 0.10
 """Relative error of steady speed that is accepted."""

@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import MOVING, requested_stops, steady_segments
-from dmp_cpg_ros.analysis.figures.catalogue import write_figures
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
 from dmp_cpg_ros.analysis.recording import Array, Recording
-from dmp_cpg_ros.analysis.report import render
+from dmp_cpg_ros.analysis.report import render, write_figures
 from dmp_cpg_ros.analysis.strict_json import plain, write_json
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
