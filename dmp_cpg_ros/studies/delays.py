@@ -190,18 +190,21 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
     acted, bad, aside = np.zeros((3, count), dtype=bool)
     row, column = np.arange(count)[:, None, None], np.arange(size)[None, None, :]
     late, kept, seen_age = kind == 'late', pattern.startswith('kept'), most
+
+    def field(z: Complex) -> Complex:
+        """ż without any pull."""
+        return np.asarray((rho * (r * r - np.abs(z) ** 2) + 1j * omega) * z)
+
     for tick in range(steps):
         if kept:
             age = np.where(age >= most[:, None, None], 0, age + 1)
             seen_age = np.where(seen_age >= most, 0, seen_age + 1)
             if pattern == 'kept from inhibited':
                 age[:, :, ~held] = 0
-        samples = np.broadcast_to(z[:, None, :], age.shape)
-        if not late:
-            index = (now - age) % length
-            samples = past[index, row, column]
-            if kind == 'carried':
-                samples = samples + rates[index, row, column] * (age * step)
+        index = (now - (0 if late else 1) * age) % length
+        samples = past[index, row, column]
+        if kind == 'carried':
+            samples = samples + rates[index, row, column] * (age * step)
         judged = past[(now - seen_age) % length, np.arange(count)] if late else z
         acts = np.all(np.abs(judged[:, held] - r) <= r0, axis=1)
         entered = acts & ~acted
@@ -214,16 +217,12 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
         pulled = np.einsum('ij,bij->bi', k, samples) + gains * r
         faded = np.exp(-decay * step)
         feed = np.divide(1.0 - faded, decay, out=np.full_like(decay, step), where=decay > 0.0)
-
-        def field(z: Complex, pulled: Complex = pulled) -> Complex:
-            return np.asarray((rho * (r * r - np.abs(z) ** 2) + 1j * omega) * z + pulled)
-
         bad |= ~np.all(np.abs(z) < 1e3, axis=1)
         z = np.where(np.abs(z) < 1e3, z, 0.0)
-        ahead = faded * z + feed * field(z)
-        z = faded * z + 0.5 * feed * (field(z) + field(ahead))
+        ahead = faded * z + feed * (field(z) + pulled)
+        z = faded * z + 0.5 * feed * (field(z) + field(ahead) + 2.0 * pulled)
         now = (now + 1) % length
-        past[now], rates[now] = z, field(z) - decay * z
+        past[now], rates[now] = z, field(z) + pulled - decay * z
         quarter = fastest[4 * tick // steps]
         np.maximum(quarter, np.abs(rates[now]).max(axis=1), out=quarter)
     moves = (fastest[3] > 0.9 * fastest[1]) & (fastest[3] > 1e-3 * omega * r)
