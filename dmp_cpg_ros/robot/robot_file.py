@@ -169,6 +169,7 @@ def _per_joint(value: Any, where: str) -> Triple:
 
 def _entries(value: Any, where: str, read: Callable[[Any, str], T]) -> tuple[T, T, T]:
     if not isinstance(value, (list, tuple)) or len(value) != len(JOINTS_OF_LEG):
-        raise ParameterError(f'{where} must list {", ".join(JOINTS_OF_LEG)}, not {shown(value)}')
+        raise ParameterError(f'{where} must list three entries ({", ".join(JOINTS_OF_LEG)}), '
+                             f'not {shown(value)}')
     first, second, third = (read(entry, where) for entry in value)
     return first, second, third

@@ -159,7 +159,7 @@ class BlendedGait(CycleOfLegs):
         """Validate and blend; ``turning`` is 2π dw/dt, the rate of an arc of one cycle [rad/s]."""
         s = self.share
         if not (0.0 <= s <= 1.0 and 0.0 <= self.rate < float('inf')):
-            raise ParameterError(f'share {s!r} must be in [0, 1], rate {self.rate!r} >= 0')
+            raise ParameterError(f'need share in [0, 1], rate not negative: {s!r}, {self.rate!r}')
         way, weight = self.transition, s * s * (3.0 - 2.0 * s)
         turning = 2.0 * np.pi * 6.0 * s * (1.0 - s) * self.rate
         phases = way.before.phases + (2.0 * np.pi * weight) * way.offset_arcs
