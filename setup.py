@@ -24,7 +24,8 @@ EXECUTABLES = (
     'reference_filter', 'canonical_oscillators', 'inhibition', 'posture_control',
     'leg_transformation', 'mujoco_robot', 'bag_recorder',
     # The commands.
-    'walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client', 'composed_suite',
+    'walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client', 'live_view',
+    'composed_suite',
     'study_stops', 'benchmark_walking', 'study_recovery',
 )
 
@@ -78,11 +79,11 @@ def shared_files() -> list[tuple[str, list[str]]]:
 
 
 def package_data() -> list[str]:
-    """The type marker, the report's style and all below models/, relative to the package."""
+    """The type marker, the report's style and all below models/ and page/, relative to the package."""
     package = Path(NAME)
-    models = sorted((package / 'models').rglob('*'))
+    found = sorted(path for folder in ('models', 'page') for path in (package / folder).rglob('*'))
     return ['py.typed', 'analysis/report.css', *(
-        str(path.relative_to(package)) for path in models
+        str(path.relative_to(package)) for path in found
         if path.is_file() and path.suffix not in ('.py', '.pyc'))]
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 PACKAGE = 'dmp_cpg_ros'
 
 COMMANDS = ('walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client',
-            'composed_suite')
+            'live_view', 'composed_suite')
 STUDIES = ('study_stops', 'benchmark_walking', 'study_recovery')
 """Executables that are no nodes; those that are stand in :mod:`dmp_cpg_ros.suite_table`."""
 

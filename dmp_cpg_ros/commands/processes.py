@@ -34,16 +34,20 @@ class ProcessGroup:
         self._logs = logs
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, name: str, module: str, arguments: Sequence[str]) -> None:
+    def start(self, name: str, module: str, arguments: Sequence[str], *,
+              logged: bool = True) -> None:
         """Run ``python -m module arguments`` in a session of its own, so that Ctrl-C reaches
-        this process only; it ends with this process.
+        this process only; it ends with this process. What is not logged is written where this
+        process writes.
         """
         # Matrices of a few rows: threads of the algebra library would only contend for the cores.
         environment = {'OPENBLAS_NUM_THREADS': '1', **os.environ, 'PYTHONUNBUFFERED': '1'}
-        with (self._logs / f'{name}.log').open('wb') as log:
+        with open(self._logs / f'{name}.log' if logged else os.devnull, 'wb') as log:
+            output = log if logged else None
             self._processes[name] = subprocess.Popen(
                 [sys.executable, '-m', __name__, str(os.getpid()), module, *arguments],
-                stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
+                stdin=subprocess.DEVNULL, stdout=output,
+                stderr=subprocess.STDOUT if logged else None,
                 start_new_session=True, env=environment)
 
     def ended(self) -> list[str]:

@@ -123,7 +123,7 @@ def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
 
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say, *,
-              lock_step: bool, processes: str) -> str:
+              lock_step: bool, processes: str, view: bool = False) -> str:
     """Run the suite from nothing to nothing.
 
     A walk goes on without its recorder, which says at once when it cannot write any more.
@@ -144,6 +144,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         Whether the robot waits for the targets of every tick.
     processes : str
         How nodes share processes, a key of :data:`~dmp_cpg_ros.suite_table.PROCESSES`.
+    view : bool
+        Whether to serve a live view, whose end does not end the run.
 
     Returns
     -------
@@ -159,10 +161,12 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
     InterruptedRunError
         On Ctrl-C, SIGTERM, SIGHUP or SIGQUIT; everything is shut down cleanly all the same.
     """
-    group = ProcessGroup(logs)
+    group, views = ProcessGroup(logs), ProcessGroup(logs)
     with _interrupt() as interrupted:
         rclpy.init(args=['walk', *arguments], signal_handler_options=SignalHandlerOptions.NO)
         try:
+            if view:  # its address holds a token, which is for the terminal only
+                views.start('live_view', 'dmp_cpg_ros', ['live_view', *arguments], logged=False)
             kinds = {name: kind.name for kind, name, _ in instances()}
             for process, nodes in {RECORDER: (RECORDER,), **PROCESSES[processes]}.items():
                 if len(nodes) == 1:
@@ -188,7 +192,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
                 executor.remove_node(player)
                 player.destroy_node()
         finally:
-            killed = group.stop()
+            killed = views.stop() + group.stop()
             rclpy.try_shutdown()
             if killed:
                 say(math.nan, f'had to kill {", ".join(killed)}')

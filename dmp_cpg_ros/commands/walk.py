@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,9 @@ OK, FAILED, INTERRUPTED = 0, 1, 128
 """Exit statuses: a run that ended well, a fall or a dead node; plus the number of the signal that
 ended it.
 """
+
+VIEWED_S = 3600.0
+"""Longest run of a live view without a scenario [s]."""
 
 
 SHARED = {'each': 'a process per node', 'blocks': 'a process per block', 'composed': 'one process'}
@@ -84,7 +87,10 @@ def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
 
 def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _Plan:
     """Read everything; raises DmpCpgError for what cannot be run."""
-    scenario = load_scenario(options.scenario)
+    default = 'stand_by' if options.view else 'start_stop'
+    scenario = load_scenario(options.scenario or f'scenarios/{default}.yaml')
+    if options.view and options.scenario is None:
+        scenario = replace(scenario, duration_s=VIEWED_S)
     overrides = {**scenario.parameters, **motion_overrides(options.motion or ''),
                  **ros.parameters, **dict(map(ros_arguments.read_parameter, options.set))}
     ros.namespace = ros_arguments.checked_namespace(options.namespace or ros.namespace)
@@ -180,7 +186,8 @@ def _run(plan: _Plan, folder: Path) -> int:
     try:
         unrecorded = run_suite(
             plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say,
-            lock_step=options.lock_step, processes=options.processes)
+            lock_step=options.lock_step, processes=options.processes,
+            view=options.view)
         if unrecorded:
             print(f'walk: {unrecorded}; the rest of the walk was not recorded', file=sys.stderr)
         return FAILED if unrecorded else OK
@@ -236,8 +243,9 @@ def _parser() -> argparse.ArgumentParser:
         'bad input or where a suite is running already, 130 for Ctrl-C. '
         f'Scenarios: {", ".join(sorted(scenarios))}.')
     add = parser.add_argument
-    add('scenario', nargs='?', default='scenarios/start_stop.yaml',
-        help='scenario file, by its path or in config/scenarios (default: %(default)s)')
+    add('scenario', nargs='?',
+        help='scenario file, by its path or in config/scenarios (default: start_stop, and with '
+        '--view an hour for your commands)')
     add('--lock-step', action='store_true',
         help='wait for every target, so that the run does not depend on the speed of the machine')
     sharing = parser.add_mutually_exclusive_group()
@@ -258,6 +266,9 @@ def _parser() -> argparse.ArgumentParser:
     add('--video', metavar='FILE', nargs='?', const='',
         help='draw the run as FILE.gif or, with imageio-ffmpeg, FILE.mp4, after its end '
         "(default: walk.mp4 or walk.gif in the run's folder)")
+    add('--view', action='store_true',
+        help='serve a page that shows and drives the robot, on this machine only, and print its '
+        'address')
     add('--no-report', action='store_true', help='write metrics and manifest only')
     return parser
 

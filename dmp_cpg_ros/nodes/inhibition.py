@@ -210,6 +210,7 @@ class InhibitionNode(SuiteNode):
                 **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,
                 'request_stamp': state.request_ns * 1e-9, 'predicted_s': self._predicted,
                 'bound_s': self._bound, 'bound_m': self._way, 'measured_s': state.measured_s,
+                'certified': self.certified.certificate_in(self._network.gait).holds,
                 'grade': self._words()}
         if self._voting.voting.voting:
             told |= {**_by_leg('vote', state.tally.weights), 'voted': state.voted,

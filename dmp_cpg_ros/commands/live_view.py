@@ -1,0 +1,420 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``live_view``: a running suite in a browser, to look at, to drive, to push and to stop.
+
+It is a client of topics, services and parameters as any other, and reads what it shows at the rate
+at which it shows it: messages in between wake nobody.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import queue
+import secrets
+import signal
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as Late
+from typing import Any
+
+import numpy as np
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+from std_srvs.srv import SetBool, Trigger
+
+from dmp_cpg_ros.commands.suite_client import SuiteClient
+from dmp_cpg_ros.commands.view_server import Frames, ViewServer
+from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core import suite_parameters as core
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.modes.requests import REQUESTS
+from dmp_cpg_ros.core.parameters import Parameters, shown
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.robot_model.world import WorldParameters
+from dmp_cpg_ros.nodes.framework.execution import prepare_middleware, schedule
+from dmp_cpg_ros.nodes.framework.parameters import (
+    BATCH,
+    LockStepParameters,
+    ParameterTable,
+    plain,
+)
+from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, interface
+from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, JointsReader, read_odom
+from dmp_cpg_ros.nodes.messages.values import checked_numbers, header_ns
+from dmp_cpg_ros.robot.scene import Scene
+from dmp_cpg_ros.suite import load_gaits
+from dmp_cpg_ros.suite_table import ROBOT
+
+OK, FAILED = 0, 1
+"""Exit statuses: ended by Ctrl-C; nobody there."""
+
+PERIOD_S = 1.0 / 30.0
+"""Time between two frames [s]."""
+
+DEAD_MAN_S = 0.5
+"""Silence of a browser that drives after which the command is zero [s]."""
+
+ANSWER_WITHIN_S = 60.0
+"""How long the suite may take to answer [s]: to refuse a gait, it seeks one that works."""
+
+LARGEST_PUSH = 1000.0
+"""Largest component of a push [N]."""
+
+TIMED_S = 1.0
+"""Span over which the real-time factor is taken [s]."""
+
+STATE_TOPICS = ('odom', 'estimated_odom', 'joint_states', 'canonical_state', 'reference',
+                'inhibition_gains', 'foot_contacts')
+"""What is read for every frame."""
+
+
+class Polled(CallbackGroup):  # type: ignore[misc]
+    """Subscriptions that wake nobody: their newest message is taken when it is wanted."""
+
+    def can_execute(self, entity: Any) -> bool:
+        """Never, so that no executor waits for them."""
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        """Never."""
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        """Nothing was begun."""
+
+
+def parameters_of(client: SuiteClient, node: str, *sets: type[Parameters]) -> dict[type[Any], Any]:
+    """Parameter sets of a node that runs; raises ClientError when it does not answer."""
+    table = ParameterTable(sets)
+    request = GetParameters.Request(names=list(table.fields))
+    getting = client.node.create_client(GetParameters, f'{node}/get_parameters')
+    values = map(parameter_value_to_python, client.ask(getting, request).values)
+    return dict(table.build({name: plain(value) for name, value
+                             in zip(request.names, values, strict=True) if value is not None}))
+
+
+class LiveView:
+    """A running suite as frames, and commands to it.
+
+    Parameters
+    ----------
+    client : SuiteClient
+        The suite.
+
+    Raises
+    ------
+    ClientError
+        If it is not there.
+    DmpCpgError
+        If its robot cannot be drawn.
+    """
+
+    def __init__(self, client: SuiteClient) -> None:
+        """Ask the suite for what it is, and subscribe."""
+        self._client, self._node = client, client.node
+        robot = parameters_of(client, ROBOT, core.RobotFileParameters, core.RobotParameters,
+                              WorldParameters, core.TickParameters, LockStepParameters)
+        canonical = parameters_of(client, core.CANONICAL, CanonicalParameters, core.GaitParameters)
+        limits, inhibition = (
+            parameters_of(client, node, *sets) for node, *sets in (
+                (core.REFERENCE, ReferenceParameters, core.CommandParameters),
+                (core.INHIBITION, InhibitionParameters)))
+        self._radius = canonical[CanonicalParameters].radius
+        gaits = KnownGaits(load_gaits(canonical[core.GaitParameters].gaits_file))
+        file = find_config(robot[core.RobotFileParameters].robot)
+        self._scene = Scene(file, core.chosen_world(
+            robot[WorldParameters], robot[core.RobotParameters]))
+        reference, self._gaits = limits[ReferenceParameters], tuple(gaits.gaits)
+        self.drives = not robot[LockStepParameters].lock_step
+        self.scene = json.dumps({
+            **self._scene.shapes(), 'robot': file.stem, 'gaits': self._gaits,
+            'drives': self.drives, 'rate': robot[core.TickParameters].control_rate,
+            'inhibited': inhibition[InhibitionParameters].inhibited_legs,
+            'limits': [reference.max_speed, reference.max_lateral_speed, reference.max_turn_rate],
+        }).encode()
+        self._tasks: queue.Queue[tuple[str, Any, Future[Any]]] = queue.Queue()
+        self._heard, self._driving = 0.0, False
+        self._walls: deque[tuple[float, int]] = deque()
+        self._stop: dict[str, str] = {}
+        self._mode = ''
+        self._values: dict[str, Any] = {}
+        self._subscribe(gaits)
+        self._make_ends(STAMPED_CMD_VEL if limits[core.CommandParameters].stamped_cmd_vel
+                        else interface('cmd_vel'))
+
+    def _subscribe(self, gaits: KnownGaits) -> None:
+        newest = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=1,
+                            reliability=ReliabilityPolicy.BEST_EFFORT)
+        joints = JointsReader()
+        readers: dict[str, Callable[[Any], Any]] = {
+            'joint_states': lambda message: (header_ns(message), joints.read(message)[0]),
+            'canonical_state': conversions.CanonicalStateReader(gaits).read,
+            'reference': conversions.read_reference,
+            'inhibition_gains': conversions.InhibitionGainsReader().read,
+            'foot_contacts': FootContactsReader().read}
+        group, self._polled = Polled(), []
+        for name in STATE_TOPICS:
+            topic = interface(name)
+            subscription = self._node.create_subscription(
+                topic.type, name, lambda _: None, topic.reader_qos if topic.latched else newest,
+                callback_group=group)
+            self._polled.append((name, subscription, readers.get(name, read_odom)))
+        for name, hear in (('inhibition_state', self._hear_stop), ('body_mode', self._hear_mode)):
+            topic = interface(name)
+            self._node.create_subscription(topic.type, name, hear, topic.reader_qos)
+
+    def _make_ends(self, velocity: Any) -> None:
+        """Create the ends of commands; those of services first: see SuiteClient."""
+        node = self._node
+        self._services = {name: node.create_client(interface(name).type, name)
+                          for name in ('inhibit', *REQUESTS)}
+        self._setter = node.create_client(SetParameters, f'{core.CANONICAL}/set_parameters')
+        self._client.meet((core.INHIBITION, core.CANONICAL), *self._services.values(),
+                          self._setter)
+        self._velocity_type = velocity.type
+        self._velocity, self._pushes = map(self._client.publisher, (velocity, interface('push')))
+
+    # Commands ------------------------------------------------------------------------------------
+
+    def take(self, command: Any) -> dict[str, Any]:
+        """Take a command from another thread, and wait for the answer.
+
+        Parameters
+        ----------
+        command : value of JSON
+            An object of one entry: ``velocity`` (v_x, v_y [m/s], γ [rad/s]), ``push`` (force in
+            the world [N]), ``inhibit`` (whether to stop), ``request`` (one of ``REQUESTS``) or
+            ``gait``.
+
+        Returns
+        -------
+        dict
+            Whether it was taken (``taken``), and what the suite says (``text``).
+
+        Raises
+        ------
+        DataError
+            If it is none of these; nothing has been sent then.
+        """
+        name, value = self._checked(command)
+        answer: Future[tuple[bool, str]] = Future()
+        self._tasks.put((name, value, answer))
+        try:
+            taken, text = answer.result(ANSWER_WITHIN_S)
+        except Late:
+            taken, text = False, 'the suite did not answer'
+        return {'taken': taken, 'text': text}
+
+    def _checked(self, command: Any) -> tuple[str, Any]:
+        if not self.drives:
+            raise DataError('in lock-step nobody commands from outside: this view looks on')
+        if not isinstance(command, dict) or len(command) != 1:
+            raise DataError(f'a command is an object of one entry, not {shown(command)}')
+        ((name, value),) = command.items()
+        words = {'request': REQUESTS, 'gait': self._gaits, 'inhibit': (True, False)}
+        if name in words:
+            if not any(value is word or (isinstance(value, str) and value == word)
+                       for word in words[name]):
+                raise DataError(f'{name} must be one of {words[name]}, not {shown(value)}')
+            return name, value
+        if name not in ('velocity', 'push'):
+            raise DataError(f'{shown(name)} is no command; valid are velocity, push, '
+                            f'{", ".join(words)}')
+        if not isinstance(value, list) or len(value) != 3 or not all(
+                type(entry) in (int, float) for entry in value):
+            raise DataError(f'{name} must be three numbers, not {shown(value)}')
+        numbers = checked_numbers(tuple(map(float, value)), name)
+        if name == 'push' and max(map(abs, numbers)) > LARGEST_PUSH:
+            raise DataError(f'a push has at most {LARGEST_PUSH:g} N on each axis')
+        return name, numbers
+
+    def _execute(self, name: str, value: Any, answer: Future[Any]) -> None:
+        if name == 'velocity':
+            self._heard, self._driving = time.monotonic(), any(value)
+            self._drive(value)
+            answer.set_result((True, ''))
+        elif name == 'push':
+            message = WrenchStamped()
+            message.header.frame_id, force = 'odom', message.wrench.force
+            force.x, force.y, force.z = value
+            self._pushes.publish(message)
+            answer.set_result((True, ''))
+        elif name == 'gait':
+            change = Parameter('gait', value=value).to_parameter_msg()
+            self._ask(self._setter, SetParameters.Request(parameters=[change]), answer,
+                      lambda response: (response.results[0].successful,
+                                        response.results[0].reason or f'changes to {value}'))
+        else:
+            service, request = ('inhibit', SetBool.Request(data=value)) if name == 'inhibit' else (
+                value, Trigger.Request())
+            self._ask(self._services[service], request, answer,
+                      lambda response: (response.success, response.message))
+
+    def _ask(self, client: Any, request: Any, answer: Future[Any],
+             read: Callable[[Any], tuple[bool, str]]) -> None:
+        def answered(future: Any) -> None:
+            if not answer.cancelled():
+                answer.set_result(read(future.result()))
+
+        client.call_async(request).add_done_callback(answered)
+
+    def _drive(self, velocity: Sequence[float]) -> None:
+        message = self._velocity_type()
+        if hasattr(message, 'header'):
+            message.header.stamp = self._node.get_clock().now().to_msg()
+        twist = getattr(message, 'twist', message)
+        twist.linear.x, twist.linear.y, twist.angular.z = velocity
+        self._velocity.publish(message)
+
+    # Frames --------------------------------------------------------------------------------------
+
+    def run(self, frames: Frames) -> None:
+        """Show frames and take commands until Ctrl-C."""
+        due = time.monotonic()
+        try:
+            while True:
+                self._client.spin_until(lambda: not self._tasks.empty(), due - time.monotonic())
+                while not self._tasks.empty():
+                    self._execute(*self._tasks.get())
+                now = time.monotonic()
+                if self._driving and now - self._heard > DEAD_MAN_S:
+                    self._let_go()
+                if now >= due:
+                    due = max(due + PERIOD_S, now)
+                    if frames.viewers and (frame := self._frame(now)):
+                        frames.put(json.dumps(frame).encode())
+        finally:
+            if self._driving:
+                self._let_go()
+
+    def _let_go(self) -> None:
+        self._driving = False
+        self._drive((0.0, 0.0, 0.0))
+
+    def _frame(self, now: float) -> dict[str, Any]:
+        """What is shown of this moment; empty as long as there is nothing."""
+        for name, subscription, read in self._polled:
+            with subscription.handle:
+                taken = subscription.handle.take_message(subscription.msg_type, False)
+            if taken is not None:
+                try:
+                    self._values[name] = read(taken[0])
+                except DataError as error:
+                    self._node.get_logger().warning(f'{name}: {error}', throttle_duration_sec=5.0)
+        values = self._values
+        motion = values.get('odom') or values.get('estimated_odom')
+        if motion is None or 'joint_states' not in values:
+            return {}
+        stamp, angles = values['joint_states']
+        bodies, feet = self._scene.poses(
+            motion.position_in_world, motion.quaternion, angles)
+        frame = {
+            'time': stamp * 1e-9, 'pace': self._pace(now, stamp), 'mode': self._mode,
+            'bodies': _rounded(bodies), 'feet': _rounded(feet), 'stop': self._stop,
+            'speed': _rounded(np.append(motion.velocity_in_base[:2], motion.rate_in_base[2]))}
+        if 'canonical_state' in values:
+            x, _, gait = values['canonical_state']
+            frame |= {'x': _rounded(x), 'gait': gait.name,
+                      'places': _rounded(state_at(gait.phases, self._radius))}
+        if 'inhibition_gains' in values:
+            acting = values['inhibition_gains']
+            frame |= {'gains': acting.gains.tolist(), 'region': acting.region_radius,
+                      'requested': acting.requested, 'at_rest': acting.at_rest}
+        for name, what in (('reference', 'reference'), ('foot_contacts', 'load')):
+            if name in values:
+                frame[what] = _rounded(np.nan_to_num(values[name]))
+        return frame
+
+    def _pace(self, now: float, stamp_ns: int) -> float:
+        """Real-time factor of the last second."""
+        self._walls.append((now, stamp_ns))
+        while len(self._walls) > 2 and now - self._walls[1][0] > TIMED_S:
+            self._walls.popleft()
+        begin, first_ns = self._walls[0]
+        return round((stamp_ns - first_ns) * 1e-9 / (now - begin), 3) if now > begin else 0.0
+
+    def _hear_stop(self, message: Any) -> None:
+        (status,) = message.status
+        self._stop = {entry.key: entry.value for entry in status.values} | {
+            'state': conversions.read_state_word(message)}
+
+    def _hear_mode(self, message: Any) -> None:
+        self._mode = conversions.read_body_mode(message)
+
+
+def _rounded(values: Any) -> Any:
+    """Numbers as lists, to a tenth of a millimetre."""
+    return np.round(values, 4).tolist()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(remove_ros_args(arguments))
+    if options.namespace is not None:
+        arguments += ['--ros-args', '-r', f'__ns:=/{options.namespace.strip("/")}']
+    prepare_middleware()
+    schedule(BATCH)  # the robot's ticks come first
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    scene, frames = [b''], Frames()
+    views: list[LiveView] = []
+
+    def take(command: Any) -> dict[str, Any]:
+        if not views:
+            raise DataError('the suite is not there yet')
+        return views[0].take(command)
+
+    try:
+        server = ViewServer(secrets.token_urlsafe(24), frames, lambda: scene[0], take,
+                            options.port)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        print(f'live view: {server.address}', flush=True)
+        rclpy.init(args=['live_view', *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        node = Node('live_view', enable_rosout=False, start_parameter_services=False)
+        views.append(LiveView(SuiteClient(node, options.wait)))
+        scene[0] = views[0].scene
+        views[0].run(frames)
+    except (DmpCpgError, OSError, RuntimeError) as error:
+        print(f'live_view: {error}', file=sys.stderr)
+        return FAILED
+    except KeyboardInterrupt:
+        return OK
+    finally:
+        rclpy.try_shutdown()
+    return OK
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog='live_view',
+        description='Show a running suite (start one with walk) in a browser, with a stick and '
+        'buttons. The address that is printed holds a token: who knows it can drive the robot. It '
+        'works on this machine only; from another one: ssh -L 8642:127.0.0.1:8642 MACHINE.',
+        epilog='Exit status: 0 after Ctrl-C, 1 when no suite is found, 2 for bad input.')
+    parser.add_argument('--namespace', metavar='NAME', help="the suite's namespace")
+    parser.add_argument('--port', metavar='N', type=int, default=0,
+                        help='port of the page (default: the first that is free from 8642 on)')
+    parser.add_argument('--wait', metavar='SECONDS', type=float, default=60.0,
+                        help='how long to look for the suite (default: 60)')
+    return parser
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,205 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A headless Chromium, driven through its debugging pipe: nothing but the browser is needed.
+
+``python test/support/browser.py ADDRESS FILE.png [--size 1400x900] [--do JAVASCRIPT] [--wait S]``
+draws a page that is served, such as the live view.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import contextlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
+"""Executables that are looked for; the environment variable ``BROWSER`` names another."""
+
+FLAGS = ('--headless=new', '--no-sandbox', '--remote-debugging-pipe', '--no-first-run',
+         '--enable-unsafe-swiftshader', '--disable-background-networking', '--disable-sync',
+         '--disable-component-update', '--no-proxy-server')
+
+DEADLINE_S = 60.0
+"""How long a page may take [s]; a loaded machine is no failure."""
+
+
+def find_browser() -> str | None:
+    """Path of a Chromium, or None."""
+    return next(filter(None, map(shutil.which, (os.environ.get('BROWSER', ''), *NAMES))), None)
+
+
+class BrowserError(Exception):
+    """The browser, or the page in it, did something wrong."""
+
+
+class Page:
+    """One page.
+
+    Parameters
+    ----------
+    to_browser, from_browser : int
+        File descriptors of the debugging pipe.
+
+    Attributes
+    ----------
+    problems : list of str
+        Exceptions and errors that the page has written to its console.
+    """
+
+    def __init__(self, to_browser: int, from_browser: int) -> None:
+        self._to, self._from, self._number, self._rest = to_browser, from_browser, 0, b''
+        self._session = ''
+        self.problems: list[str] = []
+        target = self.call('Target.createTarget', url='about:blank')['targetId']
+        self._session = self.call(
+            'Target.attachToTarget', targetId=target, flatten=True)['sessionId']
+        for domain in ('Page', 'Runtime', 'Log'):
+            self.call(f'{domain}.enable')
+
+    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
+        """Call a method of the debugging protocol."""
+        self._number += 1
+        request = {'id': self._number, 'method': method, 'params': parameters}
+        if self._session:
+            request['sessionId'] = self._session
+        os.write(self._to, json.dumps(request).encode() + b'\0')
+        while True:
+            message = self._read()
+            if message.get('id') == self._number:
+                if 'error' in message:
+                    raise BrowserError(f'{method}: {message["error"]}')
+                return dict(message['result'])
+            self._note(message.get('method', ''), message.get('params', {}))
+
+    def open(self, address: str, width: int = 1400, height: int = 900, *,
+             touch: bool = False) -> None:
+        """Go to an address, in a window of a size [pixels], of a telephone perhaps."""
+        self.call('Emulation.setDeviceMetricsOverride', width=width, height=height,
+                  deviceScaleFactor=2 if touch else 1, mobile=touch)
+        self.call('Page.navigate', url=address)
+        self.until(f"location.href === {address!r} && document.readyState === 'complete'")
+
+    def evaluate(self, expression: str) -> Any:
+        """Value of an expression of JavaScript; promises are awaited."""
+        answer = self.call('Runtime.evaluate', expression=expression, awaitPromise=True,
+                           returnByValue=True)
+        if 'exceptionDetails' in answer:
+            raise BrowserError(f'{expression}: {answer["exceptionDetails"]}')
+        return answer['result'].get('value')
+
+    def until(self, expression: str, deadline_s: float = DEADLINE_S) -> Any:
+        """Wait until an expression is true; returns its value."""
+        end = time.monotonic() + deadline_s
+        while not (value := self.evaluate(expression)):
+            if time.monotonic() > end:
+                raise BrowserError(
+                    f'waited {deadline_s} s in vain for {expression}; problems: {self.problems}; '
+                    f'the page says: {self.evaluate("document.body.innerText")}')
+        return value
+
+    def mouse(self, kind: str, x: float, y: float) -> None:
+        """Move, press or release the left button (``Moved``, ``Pressed``, ``Released``)."""
+        self.call('Input.dispatchMouseEvent', type=f'mouse{kind}', x=x, y=y, button='left',
+                  buttons=0 if kind == 'Released' else 1, clickCount=0 if kind == 'Moved' else 1)
+
+    def key(self, kind: str, key: str) -> None:
+        """Press or release a key (``keyDown``, ``keyUp``)."""
+        self.call('Input.dispatchKeyEvent', type=kind, key=key)
+
+    def centre(self, selector: str) -> tuple[float, float]:
+        """Centre of an element [pixels], scrolled into the window."""
+        x, y = self.evaluate(
+            f'(() => {{ const e = document.querySelector({selector!r}); '
+            'e.scrollIntoView({ block: "nearest" }); const b = e.getBoundingClientRect(); '
+            'return [b.x + b.width / 2, b.y + b.height / 2]; })()')
+        return x, y
+
+    def click(self, selector: str) -> None:
+        """Click on an element."""
+        x, y = self.centre(selector)
+        self.mouse('Pressed', x, y)
+        self.mouse('Released', x, y)
+
+    def picture(self, path: Path) -> None:
+        """Save what is seen as PNG."""
+        data = self.call('Page.captureScreenshot', format='png')['data']
+        path.write_bytes(base64.b64decode(data))
+
+    def _read(self) -> dict[str, Any]:
+        while b'\0' not in self._rest:
+            read = os.read(self._from, 1 << 16)
+            if not read:
+                raise BrowserError('the browser has ended')
+            self._rest += read
+        line, _, self._rest = self._rest.partition(b'\0')
+        return dict(json.loads(line))
+
+    def _note(self, method: str, parameters: dict[str, Any]) -> None:
+        if method == 'Runtime.exceptionThrown':
+            self.problems.append(str(parameters['exceptionDetails']))
+        elif method == 'Log.entryAdded' and parameters['entry']['level'] == 'error':
+            self.problems.append(f'{parameters["entry"]["text"]} {parameters["entry"].get("url")}')
+
+
+@contextlib.contextmanager
+def browser(executable: str) -> Iterator[Page]:
+    """A page in a browser of its own."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        (page_in, to_browser), (from_browser, page_out) = os.pipe(), os.pipe()
+
+        def as_expected() -> None:
+            # The browser reads from 3 and writes to 4, whatever numbers the pipes have here.
+            read, written = os.dup(page_in), os.dup(page_out)
+            os.dup2(read, 3)
+            os.dup2(written, 4)
+
+        process = subprocess.Popen(
+            [executable, *FLAGS, f'--user-data-dir={profile}'], preexec_fn=as_expected,
+            close_fds=False, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL, start_new_session=True)
+        for end in (page_in, page_out):
+            os.close(end)
+        try:
+            yield Page(to_browser, from_browser)
+        finally:
+            os.close(to_browser)
+            process.terminate()
+            process.wait(DEADLINE_S)
+            os.close(from_browser)
+
+
+def main() -> int:
+    """Draw a page; returns the exit status."""
+    parser = argparse.ArgumentParser(description='Draw a page that is served.')
+    parser.add_argument('address')
+    parser.add_argument('picture', type=Path)
+    parser.add_argument('--size', default='1400x900')
+    parser.add_argument('--touch', action='store_true', help='as on a telephone')
+    parser.add_argument('--do', action='append', default=[], metavar='JAVASCRIPT')
+    parser.add_argument('--wait', type=float, default=2.0)
+    options = parser.parse_args()
+    executable = find_browser()
+    if executable is None:
+        sys.exit(f'there is no browser; looked for {", ".join(NAMES)}')
+    with browser(executable) as page:
+        page.open(options.address, *map(int, options.size.split('x')), touch=options.touch)
+        for expression in options.do:
+            page.evaluate(expression)
+        page.evaluate(f'new Promise((done) => setTimeout(done, {1000 * options.wait}))')
+        page.picture(options.picture)
+        print('\n'.join(page.problems))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
