@@ -124,11 +124,9 @@ function show() {
   find('pace').textContent = `${frame.pace.toFixed(2)} × real time · ${Math.round(frame.pace * scene.rate)} Hz`;
   find('pace').classList.toggle('slow', frame.pace < 0.95);
   find('state').textContent = state;
-  find('why').textContent = !frame.requested ? 'press to stop the gait' :
-    stop.automatic === 'true' ? 'or drive: it stopped by itself at zero velocity' : 'press to walk again';
-  const button = find('inhibit'), resumes = frame.requested;
-  find('what').textContent = resumes ? 'Resume' : 'Inhibit';
-  button.classList.toggle('resume', resumes);
+  find('why').textContent = frame.requested && stop.automatic === 'true' ? 'or drive' : 'start it again';
+  find('inhibit').classList.toggle('idle', Boolean(frame.requested && stop.automatic !== 'true'));
+  find('resume').classList.toggle('idle', !frame.requested);
   const lamp = find('certificate');
   lamp.textContent = stop.grade || 'no certificate yet';
   lamp.className = `lamp ${{ true: 'holds', false: 'fails' }[stop.certified] || ''}`;
@@ -223,7 +221,8 @@ document.addEventListener('visibilitychange', () => { if (document.hidden) let_g
 
 // --- buttons -----------------------------------------------------------------------------------------
 
-find('inhibit').addEventListener('click', () => { if (frame) request({ inhibit: !frame.requested }); });
+find('inhibit').addEventListener('click', () => request({ inhibit: true }));
+find('resume').addEventListener('click', () => request({ inhibit: false }));
 for (const button of document.querySelectorAll('[data-request]'))
   button.addEventListener('click', () => request({ request: button.dataset.request }));
 
