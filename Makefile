@@ -65,7 +65,7 @@ STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
 FIGURE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-adversary study-files benchmark-walking doc-images paper-figures bench lint install clean
+.PHONY: help demo test study-stops study-recovery study-adversary study-files benchmark-walking doc-images view-image paper-figures bench lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -101,6 +101,9 @@ doc-images: $(INSTALLED) ## make the pictures of the documents
 	cp $(addprefix build/doc_images/figures/,walking.png canonical_states.png footfall.png phase_portrait.png) doc/images/
 	$(ACTIVATED) python -m dmp_cpg_ros.commands.film build/doc_images doc/images/stop_and_start.gif \
 	  --start 12.5 --end 20.5 --fps 12.5 --width 480
+
+view-image: $(INSTALLED) ## draw the picture of the live view; needs Chromium
+	$(ACTIVATED) cd test && python support/view_picture.py $(CURDIR)/doc/images/live_view.png
 
 paper-figures: $(INSTALLED) ## draw the figures of the paper into build/paper_figures/ (FIGURE_ARGS=...)
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.paper_figures --out build/paper_figures $(FIGURE_ARGS)

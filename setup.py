@@ -25,8 +25,7 @@ EXECUTABLES = (
     'leg_transformation', 'mujoco_robot', 'bag_recorder',
     # The commands.
     'walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client', 'live_view',
-    'composed_suite',
-    'study_stops', 'benchmark_walking', 'study_recovery',
+    'composed_suite', 'study_stops', 'benchmark_walking', 'study_recovery',
 )
 
 WRAPPER = """\
@@ -79,7 +78,7 @@ def shared_files() -> list[tuple[str, list[str]]]:
 
 
 def package_data() -> list[str]:
-    """The type marker, the report's style and all below models/ and page/, relative to the package."""
+    """The type marker, the report's style, all below models/ and page/, relative to the package."""
     package = Path(NAME)
     found = sorted(path for folder in ('models', 'page') for path in (package / folder).rglob('*'))
     return ['py.typed', 'analysis/report.css', *(

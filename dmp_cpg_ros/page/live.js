@@ -120,6 +120,7 @@ function show() {
   const { stop } = frame, state = (stop.state || '').replaceAll('_', ' ');
   find('gait').textContent = frame.gait || '';
   find('mode').textContent = frame.mode;
+  find('force').textContent = view && view.push ? `push ${Math.hypot(...view.push).toFixed(0)} N` : '';
   find('clock').textContent = `${frame.time.toFixed(1)} s`;
   find('pace').textContent = `${frame.pace.toFixed(2)} × real time · ${Math.round(frame.pace * scene.rate)} Hz`;
   find('pace').classList.toggle('slow', frame.pace < 0.95);

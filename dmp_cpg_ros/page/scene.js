@@ -406,8 +406,10 @@ export class View {
     });
     if (this.push) {
       const length = Math.hypot(...this.push);
+      gl.disable(gl.DEPTH_TEST);  // it begins inside the robot
       if (length > 0) this._arrow(mark, this.base.slice(0, 3), normal(this.push),
-        1.6 * size * length / weight + 0.3 * size, [1, 0.22, 0.25], 0.95, 1.8);
+        1.6 * size * length / weight + 0.4 * size, [1, 0.22, 0.25], 0.9, 1.6);
+      gl.enable(gl.DEPTH_TEST);
     }
     gl.uniform4f(solid.over, 0, 0, 0, 0);
     gl.disable(gl.BLEND);

@@ -1,25 +1,18 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A headless Chromium, driven through its debugging pipe: nothing but the browser is needed.
-
-``python test/support/browser.py ADDRESS FILE.png [--size 1400x900] [--do JAVASCRIPT] [--wait S]``
-draws a page that is served, such as the live view.
-"""
+"""A headless Chromium, driven through its debugging pipe: nothing but the browser is needed."""
 
 from __future__ import annotations
 
-import argparse
 import base64
 import contextlib
 import json
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 NAMES = ('chromium', 'chromium-browser', 'google-chrome', 'google-chrome-stable')
@@ -81,11 +74,11 @@ class Page:
                 return dict(message['result'])
             self._note(message.get('method', ''), message.get('params', {}))
 
-    def open(self, address: str, width: int = 1400, height: int = 900, *,
+    def open(self, address: str, width: int = 1400, height: int = 900, *, scale: int = 1,
              touch: bool = False) -> None:
         """Go to an address, in a window of a size [pixels], of a telephone perhaps."""
         self.call('Emulation.setDeviceMetricsOverride', width=width, height=height,
-                  deviceScaleFactor=2 if touch else 1, mobile=touch)
+                  deviceScaleFactor=scale, mobile=touch)
         self.call('Page.navigate', url=address)
         self.until(f"location.href === {address!r} && document.readyState === 'complete'")
 
@@ -130,10 +123,9 @@ class Page:
         self.mouse('Pressed', x, y)
         self.mouse('Released', x, y)
 
-    def picture(self, path: Path) -> None:
-        """Save what is seen as PNG."""
-        data = self.call('Page.captureScreenshot', format='png')['data']
-        path.write_bytes(base64.b64decode(data))
+    def picture(self) -> bytes:
+        """What is seen, as PNG."""
+        return base64.b64decode(self.call('Page.captureScreenshot', format='png')['data'])
 
     def _read(self) -> dict[str, Any]:
         while b'\0' not in self._rest:
@@ -176,30 +168,3 @@ def browser(executable: str) -> Iterator[Page]:
             process.terminate()
             process.wait(DEADLINE_S)
             os.close(from_browser)
-
-
-def main() -> int:
-    """Draw a page; returns the exit status."""
-    parser = argparse.ArgumentParser(description='Draw a page that is served.')
-    parser.add_argument('address')
-    parser.add_argument('picture', type=Path)
-    parser.add_argument('--size', default='1400x900')
-    parser.add_argument('--touch', action='store_true', help='as on a telephone')
-    parser.add_argument('--do', action='append', default=[], metavar='JAVASCRIPT')
-    parser.add_argument('--wait', type=float, default=2.0)
-    options = parser.parse_args()
-    executable = find_browser()
-    if executable is None:
-        sys.exit(f'there is no browser; looked for {", ".join(NAMES)}')
-    with browser(executable) as page:
-        page.open(options.address, *map(int, options.size.split('x')), touch=options.touch)
-        for expression in options.do:
-            page.evaluate(expression)
-        page.evaluate(f'new Promise((done) => setTimeout(done, {1000 * options.wait}))')
-        page.picture(options.picture)
-        print('\n'.join(page.problems))
-    return 0
-
-
-if __name__ == '__main__':
-    sys.exit(main())
