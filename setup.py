@@ -78,7 +78,7 @@ def shared_files() -> list[tuple[str, list[str]]]:
 
 
 def package_data() -> list[str]:
-    """The type marker, the report's style, all below models/ and page/, relative to the package."""
+    """The type marker, the report's style, all of models/ and page/, relative to the package."""
     package = Path(NAME)
     found = sorted(path for folder in ('models', 'page') for path in (package / folder).rglob('*'))
     return ['py.typed', 'analysis/report.css', *(

@@ -321,6 +321,7 @@ export class View {
 
   /** Draw fewer points where pictures take long: without a graphics processor, for instance. */
   _spare(dt) {
+    if (this.width !== this.canvas.clientWidth) [this.quality, this.late, this.width] = [1, 0, this.canvas.clientWidth];
     this.late = dt > SLOW ? this.late + 1 : 0;
     if (this.late > 8 && this.quality > 0.4) [this.quality, this.late] = [this.quality * 0.7, 0];
   }

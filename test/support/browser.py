@@ -77,10 +77,14 @@ class Page:
     def open(self, address: str, width: int = 1400, height: int = 900, *, scale: int = 1,
              touch: bool = False) -> None:
         """Go to an address, in a window of a size [pixels], of a telephone perhaps."""
-        self.call('Emulation.setDeviceMetricsOverride', width=width, height=height,
-                  deviceScaleFactor=scale, mobile=touch)
+        self.resize(width, height, scale=scale, touch=touch)
         self.call('Page.navigate', url=address)
         self.until(f"location.href === {address!r} && document.readyState === 'complete'")
+
+    def resize(self, width: int, height: int, *, scale: int = 1, touch: bool = False) -> None:
+        """Give the window another size."""
+        self.call('Emulation.setDeviceMetricsOverride', width=width, height=height,
+                  deviceScaleFactor=scale, mobile=touch)
 
     def evaluate(self, expression: str) -> Any:
         """Value of an expression of JavaScript; promises are awaited."""

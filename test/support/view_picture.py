@@ -7,36 +7,56 @@ Walks in real time; needs a Chromium.
 
 from __future__ import annotations
 
+import contextlib
 import io
 import re
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
+from http.client import HTTPConnection
 from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
 from browser import BrowserError, Page, browser, find_browser
 from PIL import Image
 
 WIDTH, HEIGHT = 1400, 880
 
+PATIENCE_S = 200.0
+
 STATE = "document.querySelector('#state').textContent"
+
+
+def drive(address: str, over: threading.Event) -> None:
+    """Command a velocity until it is over, from outside of a browser that is busy drawing."""
+    url = urlsplit(address)
+    headers = {'Authorization': f'Bearer {parse_qs(url.query)["token"][0]}'}
+    while not over.wait(0.1):
+        with contextlib.suppress(OSError):
+            connection = HTTPConnection('127.0.0.1', url.port or 0, timeout=30)
+            connection.request('POST', '/command', '{"velocity": [0.5, 0, 0.1]}', headers)
+            connection.getresponse().read()
 
 
 def draw(page: Page, address: str) -> bytes:
     """Walk for some seconds, stop, and draw the stop; PNG."""
-    page.open(address, WIDTH, HEIGHT, scale=2)
-    page.until(f"{STATE} === 'at rest'")
-    page.click('#hold')
-    x, y = page.centre('#stick')
-    for kind, up in (('Pressed', 0.0), ('Moved', 45.0), ('Released', 45.0)):
-        page.mouse(kind, x, y - up)
-    page.until(f"{STATE} === 'walking'")
-    begin = page.evaluate("parseFloat(document.querySelector('#clock').textContent)")
-    page.until(f"parseFloat(document.querySelector('#clock').textContent) > {begin + 7.0}")
-    page.click('#inhibit')
-    page.until(f"['waiting', 'captured'].includes({STATE})")
-    return page.picture()
+    page.open(address, WIDTH // 2, HEIGHT // 2)
+    page.until(f"{STATE} === 'at rest'", PATIENCE_S)
+    over = threading.Event()
+    threading.Thread(target=drive, args=(address, over)).start()
+    try:
+        page.until(f"{STATE} === 'walking'", PATIENCE_S)
+        begin = page.evaluate("parseFloat(document.querySelector('#clock').textContent)")
+        page.until(f"parseFloat(document.querySelector('#clock').textContent) > {begin + 6.0}",
+                   PATIENCE_S)
+        page.resize(WIDTH, HEIGHT)
+        page.evaluate("document.querySelector('#inhibit').click()")
+        page.until(f"['waiting', 'captured'].includes({STATE})", PATIENCE_S)
+        return page.picture()
+    finally:
+        over.set()
 
 
 def main() -> int:
