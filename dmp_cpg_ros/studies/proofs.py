@@ -56,11 +56,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help='spoiled proofs that have to be refused, half of them forged (default: 10000)')
     add('--random', type=int, default=500, metavar='N',
         help='random certified settings beside the grid (default: 500)')
-    add('--every', type=at_least_one, default=1, metavar='N', help='of the grid, every N-th only')
+    add('--every', type=int, default=1, metavar='N', help='of the grid, every N-th only; 0: none')
     add('--seed', type=int, default=1, help='of the random settings and of what is spoiled')
     options = parser.parse_args(arguments)
     with Pool(options.workers) as pool:
-        cases = [case.arguments for case in grid()[::options.every]]
+        cases = [case.arguments for case in grid()[::options.every]] if options.every else []
         found, drawn = pool.map(attempt, cases, 8), list[tuple[bool, str]]()
         wrong = _told('grid', found)
         while sum(certified for certified, _ in drawn) < options.random:

@@ -236,6 +236,8 @@ def _shrinking(p: Values, inner: list[Fraction], slower: float
     M = _float(exact.laplacian(p, 1)) - np.diag(float(p['rho']) * (
         float(p['radius'])**2 - _float(inner)**2))
     slowest = (1.0 - slower) * slowest_rate(M)
+    if not slowest > 0.0:
+        raise ValueError('it does not contract')
     weights = np.linalg.solve(M - slowest * np.eye(len(M)), np.ones(len(M)))
     return [on_grid(x) for x in (weights / weights.max()).tolist()], on_grid(slowest)
 
