@@ -78,11 +78,12 @@ class CanonicalOscillators(SuiteNode):
         dt, r = self.elapsed, values['reference']
         force = told_at(stamp_ns, values.get('foot_contacts'), np.full(len(LEGS), np.nan))
         self._inhibition = values['inhibition_gains'] or self._inhibition
-        self._state = state = self._canonical.step(
+        state = self._canonical.step(
             self._state, r, self._inhibition, dt, force, self.certified.certificate.contact)
-        self._publisher.publish(
-            self._writer.fill(stamp_ns, state.x, state.x_dot, state.gait,
-                              self._canonical.cadence_rate(state)))
+        message = self._writer.fill(  # refuses what is not finite
+            stamp_ns, state.x, state.x_dot, state.gait, self._canonical.cadence_rate(state))
+        self._state = state
+        self._publisher.publish(message)
         self._watch_phases(self._canonical.network(state.gait), r, dt)
 
     def _acting(self) -> Acting:

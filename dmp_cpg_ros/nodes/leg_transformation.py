@@ -62,10 +62,12 @@ class LegTransformation(SuiteNode):
         x, x_dot, gait = values['canonical_state']
         follow_gait(self, gait)
         position, velocity, _ = values.get('joint_states', NO_JOINTS)
-        self._state, targets = self._leg.step(
+        state, targets = self._leg.step(
             self._state, gait, x, x_dot, values['reference'], values['posture_feedback'], position,
             velocity, self.elapsed)
-        self._publisher.publish(self._writer.fill(stamp_ns, targets))
+        message = self._writer.fill(stamp_ns, targets)  # refuses what is not finite
+        self._state = state
+        self._publisher.publish(message)
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Which leg, and how much it swings."""

@@ -199,9 +199,11 @@ class PostureControl(SuiteNode):
         state = self._body.state(stamp_ns, values)
         x, x_dot, gait = values['canonical_state']
         follow_gait(self, gait)
-        self._state, feedback = self._control.step(
+        control, feedback = self._control.step(
             self._state, state, gait, x, x_dot, values['reference'], self.elapsed)
-        self._publisher.publish(self._writer.fill(stamp_ns, feedback))
+        message = self._writer.fill(stamp_ns, feedback)  # refuses what is not finite
+        self._state = control
+        self._publisher.publish(message)
         self._tell()
 
     def diagnostic_values(self) -> Mapping[str, Any]:

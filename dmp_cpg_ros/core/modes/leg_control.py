@@ -29,6 +29,7 @@ from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitiv
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, JointTargets
+from dmp_cpg_ros.core.robot_model.target_limits import TargetLimits
 from dmp_cpg_ros.core.transformation.foot_path import Motion
 from dmp_cpg_ros.core.transformation.leg import LegParameters, LegPrimitive, LegState
 
@@ -158,11 +159,14 @@ class LegControlState(NamedTuple):
         Movement under way.
     command : BodyCommand
         What the body did at the last tick.
+    targets : JointTargets or None
+        What was sent at the last tick.
     """
 
     leg: LegState
     motion: MotionState | None = None
     command: BodyCommand = STANDING
+    targets: JointTargets | None = None
 
 
 class LegControl:
@@ -188,6 +192,7 @@ class LegControl:
         self.primitive = LegPrimitive(leg, description, parameters, motion)
         count = len(JOINTS_OF_LEG)
         self.joints = slice(count * self.primitive.place, count * (self.primitive.place + 1))
+        self._limits = TargetLimits(description.legs[self.primitive.place], parameters.target_rate)
         self._motion = LegMotion(self.joints, movements, self.primitive.transformation)
 
     def initial_state(self) -> LegControlState:
@@ -236,4 +241,7 @@ class LegControl:
             measured = SpringState(position[joints], velocity[joints])
         targets = self.primitive.targets(
             leg, goal, goal_velocity, feedback.torque[joints], measured)
-        return LegControlState(leg, motion, command), targets
+        # Targets that are what was measured follow the joints wherever those are.
+        last = state.targets if measured is None and command.mode != 'damped' else None
+        targets = self._limits.limited(targets, last, dt)
+        return LegControlState(leg, motion, command, targets), targets

@@ -68,6 +68,9 @@ class LegParameters(Parameters):
     stumble_lag: float = parameter(
         0.035, 'distance from its target at which a swinging foot at rest has met an obstacle, as '
         'a fraction of the standing height', 0.005, 1.0)
+    target_rate: float = parameter(
+        2.0, 'largest speed at which the target of a joint changes, over the speed limit of the '
+        'joint', 0.1, 100.0)
 
 
 class LegState(NamedTuple):

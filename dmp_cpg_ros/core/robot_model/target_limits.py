@@ -1,0 +1,61 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What a joint is asked for at most: its limits of angle, speed and torque, and no jumps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dmp_cpg_ros.core.robot_model.description import LegGeometry
+from dmp_cpg_ros.core.robot_model.state import JointTargets
+
+
+class TargetLimits:
+    """Keeps the targets of one leg within the limits of its joints, whatever they come from.
+
+    Parameters
+    ----------
+    leg : LegGeometry
+        The leg.
+    rate : float
+        Largest speed of a target angle from tick to tick over the joint's own limit.
+    """
+
+    def __init__(self, leg: LegGeometry, rate: float) -> None:
+        """Keep the limits as numbers: nearly always none is reached."""
+        self._leg, self._rate = leg, rate
+        self._each = list(zip(*(limit.tolist() for limit in (
+            leg.position_lower, leg.position_upper, leg.velocity_limit, leg.torque_limit)),
+            strict=True))
+
+    def limited(self, targets: JointTargets, last: JointTargets | None, dt: float) -> JointTargets:
+        """The targets, or the nearest that the joints can have; the same object where they can.
+
+        Parameters
+        ----------
+        targets : JointTargets
+            Arrays (3,); a number that is not finite stays so.
+        last : JointTargets or None
+            What was sent one tick before; after None there is no jump.
+        dt : float
+            Time since then [s].
+        """
+        here = targets.position.tolist()
+        before, step = (last.position.tolist(), self._rate * dt) if last is not None else (here, 0)
+        for (low, high, speed, torque), at, was, velocity, effort in zip(
+                self._each, here, before, targets.velocity.tolist(), targets.effort.tolist(),
+                strict=True):
+            if not (low <= at <= high and -speed <= velocity <= speed
+                    and -torque <= effort <= torque
+                    and -step * speed <= at - was <= step * speed):
+                break
+        else:
+            return targets
+        leg = self._leg
+        position, way = targets.position, step * leg.velocity_limit
+        if last is not None:
+            position = np.clip(position, last.position - way, last.position + way)
+        return JointTargets(
+            np.clip(position, leg.position_lower, leg.position_upper),
+            np.clip(targets.velocity, -leg.velocity_limit, leg.velocity_limit),
+            np.clip(targets.effort, -leg.torque_limit, leg.torque_limit))
