@@ -32,6 +32,9 @@ CHANGES_S, CHANGES_SHARE = 0.5, 0.1
 to judge one takes longer than a tick.
 """
 
+LEAST_CHANGE_S = 0.02
+"""What a request counts for at least [s]: so many cheap ones a second are enough, too."""
+
 MOST_CHANGES = 200
 """Parameters that one request may change."""
 
@@ -231,7 +234,8 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
                 try:
                     return callback(request, response)
                 finally:
-                    self._changes = left_s - (time.thread_time() - begin), now
+                    cost_s = max(LEAST_CHANGE_S, time.thread_time() - begin)
+                    self._changes = left_s - cost_s, now
             self._changes = left_s, now
             refusal = SetParametersResult(successful=False, reason=(
                 'too many changes of parameters; ask again in a few seconds'))
