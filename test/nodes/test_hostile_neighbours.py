@@ -9,6 +9,7 @@ import math
 import random
 import signal
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -260,20 +261,23 @@ def test_news_that_the_owner_has_not_told_change_nothing(ros: Ros, follower: Any
 
 
 def test_parameter_requests_without_end_are_not_all_looked_at(ros: Ros, follower: Any) -> None:
-    looked_at = []
+    looked_at: list[Any] = []
     follower.check_parameters = looked_at.append
-    client = ros.node.create_client(SetParameters, 'follower/set_parameters')
+    name = 'follower/set_parameters'
+    client = ros.node.create_client(SetParameters, name)
     ros.spin_until(client.service_is_ready)
-    answers = [client.call_async(SetParameters.Request(parameters=[
-        Parameter('rho', value=0.5 + 0.001 * k).to_parameter_msg()])) for k in range(5)]
-    ros.spin_until(lambda: all(answer.done() for answer in answers))
+    reasons: list[str] = []
+    for k in range(100):
+        answer = ros.call(SetParameters, name, SetParameters.Request(parameters=[
+            Parameter('allow_uncertified', value=bool(k % 2)).to_parameter_msg()]))
+        reasons += [result.reason for result in answer.results if not result.successful]
+    assert len(looked_at) + len(reasons) >= 100
+    assert 'too many' in reasons[-1] and len(looked_at) >= 20
     many = SetParameters.Request(parameters=[
         Parameter('max_speed', value=1.0).to_parameter_msg()] * 1000)
-    answer = ros.call(SetParameters, 'follower/set_parameters', many)
-    assert not answer.results[0].successful and 'too many' in answer.results[0].reason
-    assert len(answer.results) < 1000
-    assert len(looked_at) <= 5
-    assert follower.health.rejected['set_parameters'] >= 1
+    answer = ros.call(SetParameters, name, many)
+    assert 'too many' in answer.results[0].reason and len(answer.results) < 1000
+    assert follower.health.rejected['set_parameters'] > len(reasons)
 
 
 def test_a_topic_has_one_writer(ros: Ros, follower: Any) -> None:
@@ -334,6 +338,42 @@ def test_a_topic_has_one_writer(ros: Ros, follower: Any) -> None:
     ros.spin_until(taken_over)
     assert ticks[-1] == tick
     robot.destroy_node()
+
+
+def test_several_who_command_are_told(ros: Ros, follower: Any) -> None:
+    topic = interface('cmd_vel')
+    nodes = [Node(name, context=ros.context) for name in ('teleop', 'joystick')]
+    writers = [node.create_publisher(topic.type, topic.name, topic.publisher_qos)
+               for node in nodes]
+    ros.spin_until(lambda: all(writer.get_subscription_count() for writer in writers))
+
+    def told(by: Sequence[Any]) -> bool:
+        for writer in by:
+            writer.publish(Twist())
+        return bool(follower.health.has_problem('writers of cmd_vel'))
+
+    for _ in range(50):
+        assert not told(writers[:1])
+    ros.spin_until(lambda: told(writers))
+    problem = follower.health.status('', {}, periodic=False).status[0].message
+    assert 'several publish cmd_vel (joystick, teleop): the newest acts' in problem
+    ros.spin_until(lambda: not told(writers[:1]))
+    for node in nodes:
+        node.destroy_node()
+
+
+def test_a_stranger_on_a_topic_that_nobody_reads_is_told(ros: Ros, follower: Any) -> None:
+    """Its writer tells, as in a process whose nodes do not listen to the world outside."""
+    topic, node = interface('reference'), Node('intruder', context=ros.context)
+    node.create_publisher(topic.type, topic.name, topic.publisher_qos)
+    own = Node('reference_filter', context=ros.context)
+    own.create_publisher(topic.type, topic.name, topic.publisher_qos)
+    ros.spin_until(lambda: follower.health.has_problem('writer of reference'))
+    problem = follower.health.status('', {}, periodic=False).status[0].message
+    assert 'reference is published by /' in problem and '/intruder' in problem
+    node.destroy_node()
+    own.destroy_node()
+    ros.spin_until(lambda: not follower.health.has_problem('writer of reference'))
 
 
 def test_a_false_answer_about_parameters_is_refused(

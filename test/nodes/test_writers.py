@@ -11,7 +11,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from dmp_cpg_ros.nodes.framework.writers import LOST, REMEMBERED_NS, SILENT_NS, WriterWatch
+from dmp_cpg_ros.nodes.framework.writers import (
+    LOST,
+    PROVEN,
+    REMEMBERED_NS,
+    SILENT_NS,
+    WriterWatch,
+)
 
 TICK_NS = 4_000_000
 KNOWN = 600
@@ -35,6 +41,14 @@ def test_a_lone_writer_may_lose_messages_and_ticks_and_stall(
         stamp += (messages + ticks) * TICK_NS
         now += round(max(pace * (messages + ticks), 0.25 * (messages + ticks - 50)) * TICK_NS)
         assert watch.admits(number, stamp, now)
+
+
+def test_messages_that_were_sent_again_may_be_received_late() -> None:
+    """A lost one is received after those that wait for it, and is taken before them."""
+    watch = watched()
+    for k in range(KNOWN + 1, KNOWN + 100):
+        late = 100 * TICK_NS if k == KNOWN + 1 else 0
+        assert watch.admits(k, k * TICK_NS, k * TICK_NS + late)
 
 
 @pytest.mark.parametrize('stall', [1, 5, LOST])
@@ -87,6 +101,30 @@ def test_a_stranger_does_not_take_over_while_it_is_in_the_graph() -> None:
     watch = watched(alone=False)
     for k in range(1, KNOWN):
         assert not watch.admits(k, (KNOWN + k) * TICK_NS, (KNOWN + k) * TICK_NS)
+
+
+@pytest.mark.parametrize('known', [0, KNOWN])
+def test_among_silent_strangers_the_writer_proves_itself(known: int) -> None:
+    """At the start, and after it was started again."""
+    watch = watched(known=known)
+    watch._may_take_over = lambda: None
+    begin = KNOWN * TICK_NS + SILENT_NS
+    taken = [watch.admits(k, k * TICK_NS, begin + k * TICK_NS) for k in range(1, 50)]
+    assert taken == [False] * (PROVEN - 1) + [True] * (50 - PROVEN)
+
+
+def test_of_two_who_send_none_proves_itself() -> None:
+    watch = WriterWatch(lambda: None)
+    for k in range(1, 500):
+        assert not watch.admits(k, k * TICK_NS, KNOWN * TICK_NS + SILENT_NS + k * TICK_NS)
+        assert not watch.admits(77 + k, k * TICK_NS, KNOWN * TICK_NS + SILENT_NS + k * TICK_NS)
+
+
+def test_a_known_stranger_does_not_prove_itself() -> None:
+    watch = watched()
+    watch._may_take_over = lambda: None
+    for k in range(1, 3 * KNOWN):
+        assert not watch.admits(k, k * TICK_NS, KNOWN * TICK_NS + k * TICK_NS)
 
 
 @pytest.mark.parametrize('first', [1, 2, 3])

@@ -48,6 +48,12 @@ from dmp_cpg_ros.suite_table import KINDS
 LOOK_EVERY_S = 0.2
 """How often the graph is asked for the publishers of a topic at most [s]."""
 
+WATCH_EVERY_S = 0.5
+"""How often strangers are looked for [s]."""
+
+SEVERAL_S = 2.0
+"""Time within which commands of several publishers take turns [s]."""
+
 STALE_NS = 250_000_000
 """In real time: age from which messages of ticks are not worth being worked through [ns]."""
 
@@ -110,12 +116,14 @@ class SuiteNode(GuardedLifecycleNode):
         self._commands_taken: dict[str, int] = {}
         self._inputs: list[tuple[Interface, Subscription]] = []
         self._writers: dict[str, list[WriterWatch]] = {}
-        self._looked: dict[str, tuple[float, bool]] = {}
+        self._looked: dict[str, tuple[float, bool | None]] = {}
         self._own_writers: set[str] = set()
+        self._several: dict[str, float] = {}
         topic, ready = interface('/diagnostics'), interface('~/ready')
         self._diagnostics = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._outputs: list[tuple[Interface, Publisher]] = [(topic, self._diagnostics)]
         self.create_service(ready.type, ready.name, self._answer_ready)
+        self.create_steady_timer(WATCH_EVERY_S, self._watch_writers)
 
     # Hooks -------------------------------------------------------------------------------------
 
@@ -294,6 +302,7 @@ class SuiteNode(GuardedLifecycleNode):
 
         receive: Callable[..., None] = take
         watched = not (command or raw) and expected_count(topic.publishers) > 0
+        informed = watched or command
         if self.local is not None and inside:
             receive = self.guarded(topic.name, take)
             self.local.attach(topic.name, receive)
@@ -305,7 +314,7 @@ class SuiteNode(GuardedLifecycleNode):
             receive = self._from_writers(topic, callback, read)
         subscription = self.create_subscription(
             topic.type, topic.name, receive, qos or topic.reader_qos, raw=True)
-        if watched:
+        if informed:
             subscription._callback_type = type(subscription).CallbackType.WithMessageInfo
         self._undo.append(partial(self.destroy_subscription, subscription))
         self._inputs.append((topic, subscription))
@@ -321,7 +330,7 @@ class SuiteNode(GuardedLifecycleNode):
         """
         several = expected_count(topic.publishers) > 1
         ticked, latched = hasattr(topic.type(), 'header') and not topic.latched, topic.latched
-        lock_step, may_take_over = self.lock_step, partial(self._none_but_writers, topic)
+        lock_step, may_take_over = self.lock_step, partial(self._may_take_over, topic)
         by_leg = {leg: WriterWatch(may_take_over, ticked=ticked, lock_step=lock_step)
                   for leg in (LEGS if several else ('',))}
         only, watches = by_leg.get(''), list(by_leg.values())
@@ -349,26 +358,30 @@ class SuiteNode(GuardedLifecycleNode):
 
         return receive
 
-    def _strangers(self, topic: Interface) -> list[str]:
-        """Names of nodes that publish a topic and should not.
+    def _publishers_of(self, topic: Interface) -> tuple[bool, list[str]]:
+        """Whether the suite's own node publishes a topic, and names of those that should not.
 
         A driver of another name may stand for the suite's node where that has not been there.
         """
         ends = self.get_publishers_info_by_topic(self.resolve_topic_name(topic.name))
-        space, own = self.get_namespace(), {
+        space, names = self.get_namespace(), {
             name for kind in topic.publishers if kind in KINDS for name in KINDS[kind].instances}
+        own = {end.node_name for end in ends
+               if end.node_name in names and end.node_namespace == space}
         others = {f'{end.node_namespace.rstrip("/")}/{end.node_name}' for end in ends
                   if end.node_name not in own or end.node_namespace != space}
-        if ends and not others:
+        if own and not others:
             self._own_writers.add(topic.name)
         few = len(ends) <= expected_count(topic.publishers)
-        return [] if few and topic.name not in self._own_writers else sorted(others)
+        return bool(own), [] if few and topic.name not in self._own_writers else sorted(others)
 
-    def _none_but_writers(self, topic: Interface) -> bool:
-        """Whether the graph knows no strangers; it is not asked at every message."""
+    def _may_take_over(self, topic: Interface) -> bool | None:
+        """For a :class:`WriterWatch`; the graph is not asked at every message."""
         now_s, (then_s, known) = time.monotonic(), self._looked.get(topic.name, (-inf, False))
         if now_s > then_s + LOOK_EVERY_S:
-            then_s, known = self._looked[topic.name] = now_s, not self._strangers(topic)
+            own, strangers = self._publishers_of(topic)
+            known = None if own and strangers else not strangers
+            self._looked[topic.name] = now_s, known
         return known
 
     def _refuse_writer(self, topic: Interface) -> None:
@@ -379,23 +392,32 @@ class SuiteNode(GuardedLifecycleNode):
             self._name_writers(topic)
 
     def _name_writers(self, topic: Interface) -> None:
-        who = ', '.join(self._strangers(topic)) or 'another node of the same name'
+        who = ', '.join(self._publishers_of(topic)[1]) or 'another node of the same name'
         self.warn(f'writer of {topic.name}', f'{topic.name} is published by {who} too; only the '
                   f'messages of {" and ".join(topic.publishers)} are taken')
 
     def _watch_writers(self) -> None:
-        """Name strangers among the publishers of topics that have their own writers."""
-        now_ns = time.time_ns()
-        for topic, subscription in self._inputs:
-            watches = self._writers.get(topic.name)
-            if watches is None:
+        """Name strangers among the publishers of topics that have their own writers, and tell
+        where several command.
+        """
+        now_ns, now_s = time.time_ns(), time.monotonic()
+        for topic in dict.fromkeys(topic for topic, _ in (*self._inputs, *self._outputs)):
+            count = expected_count(topic.publishers)
+            if not count or topic.name.startswith('~') or topic.name == '/diagnostics':
                 continue
-            too_many = subscription.get_publisher_count() > expected_count(topic.publishers)
-            if (too_many and self._strangers(topic)) or any(
-                    watch.has_strangers(now_ns) for watch in watches):
+            too_many = self.count_publishers(self.resolve_topic_name(topic.name)) > count
+            if (too_many and self._publishers_of(topic)[1]) or any(
+                    watch.has_strangers(now_ns) for watch in self._writers.get(topic.name, ())):
                 self._name_writers(topic)
             else:
                 self.clear(f'writer of {topic.name}')
+        for name, then_s in self._several.items():
+            if now_s < then_s + SEVERAL_S:
+                ends = self.get_publishers_info_by_topic(self.resolve_topic_name(name))
+                who = ', '.join(sorted({end.node_name for end in ends}))
+                self.warn(f'writers of {name}', f'several publish {name} ({who}): the newest acts')
+            else:
+                self.clear(f'writers of {name}')
 
     def serve(self, name: str, take: Callable[[Any], tuple[bool, str]]) -> None:
         """Create a service of the table; while the node is active, what takes its requests tells
@@ -433,7 +455,19 @@ class SuiteNode(GuardedLifecycleNode):
         if not self._commands:
             self._taken = self.publisher('~/commands_taken')
 
-        def receive(message: Any) -> None:
+        former, changed_s = 0, -inf
+
+        def receive(message: Any, information: Any = None) -> None:
+            nonlocal former, changed_s
+            if information is None:  # as in _from_writers
+                message, information = message
+            number = information['publication_sequence_number'] or 0
+            if number != former + 1 and former:
+                now_s, then_s = time.monotonic(), changed_s
+                changed_s = now_s
+                if now_s < then_s + SEVERAL_S:
+                    self._several[topic] = now_s
+            former = number
             try:
                 callback(message)
             finally:
@@ -491,7 +525,6 @@ class SuiteNode(GuardedLifecycleNode):
         """
         if self.health.due():
             self._watch_command_types()
-            self._watch_writers()
             self.report(periodic=True)
 
     def let_ticks_pass(self) -> None:

@@ -34,6 +34,9 @@ MADE_UP_NS, FASTEST = 200_000_000, 4
 faster than the clock a robot's time may go.
 """
 
+PROVEN = 5
+"""Messages in a row, of nobody else, from which one of several publishers is the writer."""
+
 LOST = 20
 """Messages in a row that may be lost of a writer that sends on change, or is not known yet."""
 
@@ -43,8 +46,9 @@ class WriterWatch:
 
     Parameters
     ----------
-    may_take_over : callable () → bool
-        Whether the graph knows nobody who should not write this topic.
+    may_take_over : callable () → bool or None
+        Whether the graph knows nobody who should not write this topic; None when it knows the
+        writer too. Whoever sends some messages while all others are silent is the writer then.
     ticked : bool
         Whether the topic has one stamped message for every tick; else one for every change.
     lock_step : bool
@@ -52,9 +56,9 @@ class WriterWatch:
     """
 
     __slots__ = ('_heard_ns', '_last', '_learned', '_lock_step', '_may_take_over', '_stamp_ns',
-                 '_stranger', '_stranger_ns', '_tick_ns', '_ticked')
+                 '_stranger', '_stranger_ns', '_tick_ns', '_ticked', '_tried')
 
-    def __init__(self, may_take_over: Callable[[], bool], *, ticked: bool = True,
+    def __init__(self, may_take_over: Callable[[], bool | None], *, ticked: bool = True,
                  lock_step: bool = False) -> None:
         """Know no writer yet."""
         self._may_take_over, self._ticked, self._lock_step = may_take_over, ticked, lock_step
@@ -63,7 +67,7 @@ class WriterWatch:
 
     def _begin(self, number: int, stamp_ns: int, now_ns: int) -> None:
         self._last, self._stamp_ns, self._heard_ns = number, stamp_ns, now_ns
-        self._tick_ns, self._learned = 0, 0
+        self._tick_ns, self._learned, self._tried = 0, 0, (0, 0, 0)
 
     def admits(self, number: int | None, stamp_ns: int, now_ns: int) -> bool:
         """Whether a message is the writer's; True where the middleware does not number.
@@ -78,17 +82,31 @@ class WriterWatch:
             Time of its reception [ns].
         """
         ahead, passed_ns = (number or 0) - self._last, stamp_ns - self._stamp_ns
-        if number is None or self._continues(ahead, passed_ns, now_ns):
+        silent = now_ns - self._heard_ns > SILENT_NS
+        stranger = number is not None and number == self._stranger + 1
+        if number is None or (self._continues(ahead, passed_ns, now_ns)
+                              and not (silent and stranger)):
             if self._learned < LEARNING and ahead > 0:
                 self._learned += 1
                 self._tick_ns = min(self._tick_ns or passed_ns, passed_ns // ahead)
-            self._last, self._stamp_ns, self._heard_ns = number or 0, stamp_ns, now_ns
+            self._last, self._stamp_ns = number or 0, stamp_ns
+            # What is sent again after a loss is received later than what waited behind it.
+            self._heard_ns = max(self._heard_ns, now_ns)
             return True
-        silent = now_ns - self._heard_ns > SILENT_NS
-        if silent and self._may_take_over():
-            self._begin(number, stamp_ns, now_ns)
-            return True
-        self._stranger, self._stranger_ns = number, now_ns
+        if silent:
+            alone = self._may_take_over()
+            if alone is None and not self._ticked and self._stranger < 0:
+                return True  # nothing tells the writer from others before its topic has one
+            if alone or (alone is None and self._ticked and not stranger):
+                goes_on = number == self._tried[0] + 1 and stamp_ns > self._tried[1]
+                self._tried = number, stamp_ns, 1 + (self._tried[2] if goes_on else 0)
+                if alone or self._lock_step or self._tried[2] >= PROVEN:
+                    self._begin(number, stamp_ns, now_ns)
+                    return True
+                return False
+        self._tried, self._stranger_ns = (0, 0, 0), now_ns
+        if stranger or not (silent and self._ticked):
+            self._stranger = number
         return False
 
     @property
@@ -111,7 +129,7 @@ class WriterWatch:
             return False
         if not self._ticked:
             return self._last + ahead != self._stranger + 1 and (
-                ahead == 1 or (ahead <= LOST and self._may_take_over()))
+                ahead == 1 or (ahead <= LOST and self._stranger < 0))
         if self._learned < LEARNING:
             return ahead <= LOST and passed_ns >= ahead * SHORTEST_TICK_NS
         if self._lock_step:
