@@ -15,6 +15,7 @@ requests that are valid, such as deactivating a node, which only DDS Security ca
 from __future__ import annotations
 
 import argparse
+import os
 import random
 import signal
 import subprocess
@@ -62,6 +63,9 @@ NAME = 'intruder'
 SPEED = 0.5
 """Commanded speed of the walk [m/s]."""
 
+STEADY_S = 4.0
+"""Time of the robot from which it walks steadily [s]."""
+
 RECOVERY_S = 3.0
 """Time of the robot after an attack after which it must walk as before [s]."""
 
@@ -87,6 +91,10 @@ class Intruder(Node):  # type: ignore[misc]
     ----------
     named : float
         When a report of the suite first named it during the attack [s]; NaN before.
+    fell : bool
+        Whether the robot has told a fall.
+    sent : int
+        Messages and requests so far.
     """
 
     def __init__(self, seed: int) -> None:
@@ -97,7 +105,7 @@ class Intruder(Node):  # type: ignore[misc]
         self.draw = random.Random(seed)
         self.last: dict[str, bytes] = {}
         self.poses: list[tuple[float, float, float]] = []
-        self.named, self.fell = nan, False
+        self.named, self.fell, self.sent = nan, False, 0
         self._writers: dict[str, Any] = {}
         for topic in OWN:
             self.create_subscription(
@@ -106,9 +114,14 @@ class Intruder(Node):  # type: ignore[misc]
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_report, 100)
 
     def _hear(self, topic: Interface, data: bytes) -> None:
-        self.last[topic.name] = data
-        if topic.name == 'odom':
+        if topic.name != 'odom':
+            self.last[topic.name] = data
+            return
+        with suppress(rclpy_implementation.RMWError):  # its own garbage comes back
             odom = deserialize_message(data, Odometry)
+            if odom.pose.pose.position.x == 0.0 == odom.pose.pose.position.z:
+                return
+            self.last[topic.name] = data
             place, stamp = odom.pose.pose.position, odom.header.stamp
             self.poses.append((stamp.sec + 1e-9 * stamp.nanosec, place.x, place.z))
             if len(self.poses) > 1000:
@@ -144,6 +157,7 @@ class Intruder(Node):  # type: ignore[misc]
             self.spin(0.3)
         with suppress(rclpy_implementation.RCLError):  # bytes that this middleware does not send
             self._writers[name].publish(message)
+            self.sent += 1
 
     def leave(self) -> None:
         """Destroy all publishers."""
@@ -170,14 +184,14 @@ class Intruder(Node):  # type: ignore[misc]
     def changed(self, name: str, change: Callable[[Any], None]) -> None:
         """Publish the last message of a topic, changed."""
         if name in self.last:
-            message = self.message(name)
-            change(message)
-            self.publish(name, message)
+            with suppress(rclpy_implementation.RMWError):  # what it has heard last is its own
+                message = self.message(name)
+                change(message)
+                self.publish(name, message)
 
     def stamp_ns(self) -> int:
-        """Stamp of the last canonical state [ns]."""
-        stamp = self.message('canonical_state').header.stamp
-        return int(stamp.sec * 10**9 + stamp.nanosec)
+        """Stamp of the last pose [ns]."""
+        return round(self.poses[-1][0] * 1e9) if self.poses else 0
 
     def stamped(self, name: str, stamp_ns: int) -> None:
         """Publish the last message of a topic with another stamp."""
@@ -188,6 +202,7 @@ class Intruder(Node):  # type: ignore[misc]
         client = self.create_client(kind, name)
         client.wait_for_service(timeout_sec=2.0)
         left = list(requests)
+        self.sent += len(left)
         self.repeat(len(left) / rate, rate, lambda: left and client.call_async(left.pop()))
         self.spin(0.2)
         self.destroy_client(client)
@@ -308,6 +323,7 @@ def _events(node: Intruder) -> None:
             ('region_radius', ParameterValue(type=3, double_value=1.9))]
     for owner in ('canonical_oscillators', 'reference_filter', 'inhibition'):
         for name, value in lies:
+            node.sent += 1
             publisher.publish(ParameterEvent(node=f'/{owner}', changed_parameters=[
                 ParameterMessage(name=name, value=value)]))
             node.spin(0.02)
@@ -377,6 +393,7 @@ class Outcome:
     """What came of an attack; it failed when the robot walked on."""
 
     attack: str
+    messages: int
     fell: bool
     speed: float
     named_s: float
@@ -394,6 +411,7 @@ class Suite:
         """Write the scenario."""
         self._folder, self._composed, self._runs = folder, composed, 0
         self._process: subprocess.Popen[bytes] | None = None
+        self.begin_mb = 0.0
         (folder / 'walk.yaml').write_text(yaml.safe_dump({
             'name': 'intruder', 'duration': 36000.0,
             'events': [{'at': 0.5, 'inhibit': False}, {'at': 1.0, 'command': {'v_x': SPEED}}]}),
@@ -405,17 +423,28 @@ class Suite:
         self._runs, begun = self._runs + 1, False
         out = self._folder / f'run{self._runs}'
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'dmp_cpg_ros.commands.walk', str(self._folder / 'walk.yaml'),
+            [sys.executable, '-m', 'dmp_cpg_ros', 'walk', str(self._folder / 'walk.yaml'),
              '--no-report', '--out', str(out), *(['--composed'] if self._composed else [])],
             stdout=(self._folder / f'walk{self._runs}.log').open('wb'), stderr=subprocess.STDOUT)
         end = time.monotonic() + 120.0
-        while not (begun and node.poses[-1][0] > 6.0):
+        while not (begun and node.poses[-1][0] > STEADY_S):
             node.spin(0.2)
-            if not begun and node.poses and node.poses[-1][0] < 5.0:  # nothing of the last run
+            if not begun and node.poses and node.poses[-1][0] < STEADY_S:  # the new run
                 begun, node.fell, node.poses = True, False, node.poses[-1:]
             if time.monotonic() > end or self._process.poll() is not None:
                 said = (self._folder / f'walk{self._runs}.log').read_text(encoding='utf-8')
                 raise DmpCpgError(f'the suite does not walk: {said}')
+
+        self.begin_mb = self.memory_mb()
+
+    def memory_mb(self) -> float:
+        """Resident memory of its processes [MB]; 0 where it does not run."""
+        if self._process is None or self._process.poll() is not None:
+            return 0.0
+        tasks = Path(f'/proc/{self._process.pid}/task')
+        children = (tasks / str(self._process.pid) / 'children').read_text().split()
+        pages = [int(Path(f'/proc/{child}/statm').read_text().split()[1]) for child in children]
+        return sum(pages) * os.sysconf('SC_PAGE_SIZE') / 1e6
 
     def running(self) -> bool:
         """Whether no node has died."""
@@ -433,7 +462,7 @@ class Suite:
 
 def attacked(node: Intruder, suite: Suite, name: str) -> Outcome:
     """Attack and look what comes of it."""
-    node.named, begin = nan, time.monotonic()
+    node.named, begin, sent = nan, time.monotonic(), node.sent
     ATTACKS[name](node)
     named = node.named
     node.leave()
@@ -441,7 +470,7 @@ def attacked(node: Intruder, suite: Suite, name: str) -> Outcome:
     while suite.running() and node.poses[-1][0] < end_s and time.monotonic() < deadline:
         node.spin(0.1)
     fell = node.fell or not suite.running() or node.poses[-1][2] < LOWEST
-    return Outcome(name, fell, node.speed(), named - begin)
+    return Outcome(name, node.sent - sent, fell, node.speed(), named - begin)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -473,9 +502,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 if not outcomes[-1].walked_on:
                     suite.start(node)
         finally:
+            memory = suite.memory_mb()
             suite.end()
             rclpy.try_shutdown()
     print(table(outcomes))
+    print(f'{node.sent:,} messages and requests, seed {options.seed}; memory of the suite at the '
+          f'begin {suite.begin_mb:.0f} MB, at the end {memory:.0f} MB')
     return int(not all(outcome.walked_on for outcome in outcomes))
 
 
@@ -486,10 +518,12 @@ def table(outcomes: Sequence[Outcome]) -> str:
         of = [outcome for outcome in outcomes if outcome.attack == name]
         if of:
             late = max(outcome.named_s for outcome in of)
-            rows.append((name, str(len(of)), str(sum(outcome.fell for outcome in of)),
+            rows.append((name, str(len(of)), f'{sum(outcome.messages for outcome in of):,}',
+                         str(sum(outcome.fell for outcome in of)),
                          str(sum(not outcome.walked_on for outcome in of)),
                          '-' if late != late else f'{late:.1f} s'))
-    return markdown_table(('attack', 'times', 'falls', 'did not walk on', 'named within'), rows)
+    return markdown_table(
+        ('attack', 'times', 'messages', 'falls', 'did not walk on', 'named within'), rows)
 
 
 if __name__ == '__main__':

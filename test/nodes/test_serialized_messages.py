@@ -20,6 +20,7 @@ from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.conversions import read_reference
 from dmp_cpg_ros.nodes.messages.robot_state import read_imu
 from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.studies.fuzz_bytes import KINDS, fuzz
 
 TEXTS = st.text(st.characters(exclude_characters='\x00', exclude_categories=['Cs']), max_size=12)
 NUMBERS = st.lists(st.floats(width=64), max_size=9)
@@ -77,8 +78,7 @@ def test_bytes_that_are_cut_short_are_refused(kind):
         kind is JointState) else kind()
     data, read = bytes(serialize_message(message)), serialized_reader(kind)
     read(data)
-    used = len(data) if kind is not Imu else len(data) - 72  # of the last covariance nothing
-    for length in range(2, used - 8):
+    for length in range(2, len(data) - 8):
         with pytest.raises(DataError):
             read(data[:length])
 
@@ -131,3 +131,27 @@ def test_a_message_that_is_too_long_is_not_kept():
     message = joint_state('', [f'{k:09}' for k in range(20_000)], [], [], [])
     with pytest.raises(DataError, match='at most'):
         serialized_reader(JointState)(serialize_message(message))
+
+
+def test_mutated_bytes_are_read_as_rclpy_reads_them(capfd):
+    """Both refuse a buffer, or both read the same; ``studies.fuzz_bytes`` tries a million."""
+    counts, failures, _ = fuzz(0, seed=20261122, count=3000)
+    capfd.readouterr()  # the middleware says something of each
+    assert not failures
+    assert sum(counts.values()) == 3000
+    assert min(counts[f'both {what} {kind.__name__}'] for what in ('read', 'refuse')
+               for kind in KINDS) > 200
+
+
+@pytest.mark.parametrize(('kind', 'data', 'expected'), [
+    # names that are no UTF-8, that hold a zero, that do not end with one, and of no length
+    (JointState, b'\x01\x00\x00\x00\x03\x00\x00\x00\xff\xfe\x00', ['\ufffd\ufffd']),
+    (JointState, b'\x01\x00\x00\x00\x04\x00\x00\x00a\x00b\x00', ['a']),
+    (JointState, b'\x01\x00\x00\x00\x02\x00\x00\x00ab', ['ab']),
+    (JointState, b'\x01\x00\x00\x00\x00\x00\x00\x00', ['']),
+])
+def test_odd_names_are_those_that_rclpy_reads(kind, data, expected):
+    header = b'\x00\x01\x00\x00' + 8 * b'\x00' + b'\x01\x00\x00\x00\x00\x00\x00\x00'
+    data = header + data + bytes(-len(data) % 4) + 12 * b'\x00'
+    assert serialized_reader(kind)(data).name == expected
+    assert list(deserialize_message(data, kind).name) == expected

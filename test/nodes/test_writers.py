@@ -39,7 +39,7 @@ def test_a_lone_writer_may_lose_messages_and_ticks_and_stall(
     for messages, ticks, pace in steps:
         number += messages
         stamp += (messages + ticks) * TICK_NS
-        now += round(max(pace * (messages + ticks), 0.25 * (messages + ticks - 50)) * TICK_NS)
+        now += round(max(pace * (messages + ticks), 0.25 * (messages + ticks - 125)) * TICK_NS)
         assert watch.admits(number, stamp, now)
 
 
@@ -49,6 +49,13 @@ def test_messages_that_were_sent_again_may_be_received_late() -> None:
     for k in range(KNOWN + 1, KNOWN + 100):
         late = 100 * TICK_NS if k == KNOWN + 1 else 0
         assert watch.admits(k, k * TICK_NS, k * TICK_NS + late)
+
+
+def test_ticks_may_be_lost_while_their_length_is_learned() -> None:
+    watch = WriterWatch(lambda: not watch.known)
+    ticks = [*range(0, 200, 2), *range(200, 400)]
+    for number, tick in enumerate(ticks, 1):
+        assert watch.admits(number, tick * TICK_NS, tick * TICK_NS)
 
 
 @pytest.mark.parametrize('stall', [1, 5, LOST])

@@ -29,7 +29,7 @@ LEARNING = 50
 SHORTEST_TICK_NS = 500_000
 """Stamps of two ticks differ by so much at least [ns]."""
 
-MADE_UP_NS, FASTEST = 200_000_000, 4
+MADE_UP_NS, FASTEST = 500_000_000, 4
 """In real time: robot's time between two messages beyond that of the clock [ns], and how much
 faster than the clock a robot's time may go.
 """
@@ -86,7 +86,7 @@ class WriterWatch:
         stranger = number is not None and number == self._stranger + 1
         if number is None or (self._continues(ahead, passed_ns, now_ns)
                               and not (silent and stranger)):
-            if self._learned < LEARNING and ahead > 0:
+            if ahead > 0 and (self._learned < LEARNING or passed_ns < ahead * self._tick_ns):
                 self._learned += 1
                 self._tick_ns = min(self._tick_ns or passed_ns, passed_ns // ahead)
             self._last, self._stamp_ns = number or 0, stamp_ns
@@ -135,5 +135,7 @@ class WriterWatch:
         if self._lock_step:
             return ahead == 1 and passed_ns == self._tick_ns
         # A clock that is set back must not make the writer a stranger.
-        return ahead * self._tick_ns <= passed_ns <= (
+        # Ticks may all have been lost between those from which their length was learned.
+        shorter = ahead == 1 and not self.has_strangers(now_ns)
+        return (SHORTEST_TICK_NS if shorter else ahead * self._tick_ns) <= passed_ns <= (
             FASTEST * max(0, now_ns - self._heard_ns) + MADE_UP_NS)
