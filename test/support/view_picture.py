@@ -49,11 +49,11 @@ def draw(page: Page, address: str) -> bytes:
     try:
         page.until(f"{STATE} === 'walking'", PATIENCE_S)
         begin = page.evaluate("parseFloat(document.querySelector('#clock').textContent)")
-        page.until(f"parseFloat(document.querySelector('#clock').textContent) > {begin + 6.0}",
+        page.until(f"parseFloat(document.querySelector('#clock').textContent) > {begin + 4.0}",
                    PATIENCE_S)
         page.resize(WIDTH, HEIGHT)
         page.evaluate("document.querySelector('#inhibit').click()")
-        page.until(f"['waiting', 'captured'].includes({STATE})", PATIENCE_S)
+        page.until(f"['waiting', 'captured', 'at rest'].includes({STATE})", PATIENCE_S)
         return page.picture()
     finally:
         over.set()
