@@ -322,7 +322,7 @@ def _copy(source: Path, target: Path, *, ros_only: bool) -> int:
                                 record.name, record.encoding, record.data)
                     case Channel() if record.id not in channels:
                         known = record.message_encoding == 'cdr' and record.schema_id in schemas
-                        if known or not ros_only:
+                        if known or not ros_only and record.schema_id in schemas:
                             channels[record.id] = writer.register_channel(
                                 record.topic, record.message_encoding, schemas[record.schema_id],
                                 record.metadata)

@@ -107,6 +107,8 @@ def cycle_starts(recording: Recording, start: float, end: float) -> Array:
     if np.count_nonzero(inside) < 2:
         return np.array([])
     turns, time = _turns(recording)[inside], time[inside]
+    if not abs(turns[-1] - turns[0]) <= len(turns):  # a cycle takes more than one sample
+        return np.array([])
     whole = np.arange(np.ceil(turns[0]), np.floor(turns[-1]) + 1.0)
     return np.interp(whole, np.maximum.accumulate(turns), time)
 

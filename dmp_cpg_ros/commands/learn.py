@@ -14,6 +14,7 @@ import numpy as np
 
 from dmp_cpg_ros.commands.demonstration_files import read_demonstration, read_motion
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.learning import discrete, period, rhythmic
 from dmp_cpg_ros.core.learning.learning import METHODS, FitOptions, ranges
@@ -83,7 +84,8 @@ def _main(options: argparse.Namespace, _: RosArguments) -> int:
         demonstrations = [Demonstration(read.times, read.positions, names=read.names)
                           for read in demonstrations]
     began = perf_counter()
-    primitive, errors = _learn(demonstrations, options)
+    with naming(', '.join(map(str, options.demonstrations))):
+        primitive, errors = _learn(demonstrations, options)
     seconds = perf_counter() - began
     save_primitive(primitive, options.out)
     kind, time = (('discrete', f'duration {primitive.duration:.6g} s')

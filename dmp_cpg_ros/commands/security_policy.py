@@ -3,6 +3,7 @@
 """``python -m dmp_cpg_ros.commands.security_policy``: the suite's SROS 2 policy, from its tables.
 
 Who may publish, subscribe, call and answer what; ``config/security/policy.xml`` is what it prints.
+With ``--enclaves`` it prints the names of the enclaves.
 """
 
 from __future__ import annotations
@@ -92,4 +93,5 @@ def policy_xml() -> str:
 
 
 if __name__ == '__main__':
-    sys.stdout.write(policy_xml())
+    sys.stdout.write(' '.join(f'{ENCLAVE}/{node}' for node in policies()) + '\n'
+                     if sys.argv[1:] == ['--enclaves'] else policy_xml())

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 from collections.abc import Collection, Mapping
 from typing import Any, TypeVar
 
@@ -132,7 +133,7 @@ def _checked_scalar(field: dataclasses.Field[Any], like: Any, value: Any) -> Any
     if isinstance(like, (bool, str)):
         return value
     low, high = _range(field)
-    if not (math.isfinite(value) and low <= value <= high):
+    if not (abs(value) <= sys.float_info.max and low <= value <= high):
         raise ParameterError(
             f"parameter '{name}' = {shown(value)} {unit} is outside its range "
             f'[{low:g}, {high:g}] {unit}'.replace('  ', ' ').rstrip())

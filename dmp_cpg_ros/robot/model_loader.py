@@ -6,6 +6,8 @@ world of :mod:`dmp_cpg_ros.core.robot_model.world` under it.
 
 from __future__ import annotations
 
+import logging
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,8 @@ import numpy as np
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.robot.mujoco_import import mujoco
+
+_log = logging.getLogger(__name__)
 
 LONGEST_PHYSICS_STEP = 0.001  # [s] the joint drive runs at 1 kHz or faster
 
@@ -63,7 +67,10 @@ def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjMo
             spec.add_texture(name='added_sky', type=_SKY, width=256, height=1536,
                              builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
                              rgb1=[0.36, 0.56, 0.80], rgb2=[0.86, 0.92, 0.97])
-        model = spec.compile()
+        with warnings.catch_warnings(record=True) as told:
+            model = spec.compile()
+        for warning in told:
+            _log.warning("model '%s': %s", path, warning.message)
     except (ValueError, mujoco.FatalError) as error:
         raise ParameterError(f"model '{path}' cannot be compiled: {error}") from error
     if world is not None and world.friction > 0.0:  # MuJoCo takes the larger of two geoms'

@@ -1,9 +1,10 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Frozen sensors: what repeats to the last bit while the robot moves is no reading any more.
+"""Sensors that look sound, one reading at a time: frozen ones, and a gyroscope that jumps.
 
-A frozen sensor looks sound, one reading at a time. Noise changes the last bits of every real one,
-but those of joints at rest: joints are judged while others move, and so is everything else.
+What repeats to the last bit while the robot moves is no reading any more. Noise changes the last
+bits of every real one, but those of joints at rest: joints are judged while others move, and so is
+everything else. No body changes its turn rate by ``JUMP`` from one tick to the next.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 
 FROZEN_NS = 50_000_000
 """Time over which readings repeat before they count as frozen [ns]."""
+
+JUMP, JUMPS_NS = 8.0, 100_000_000
+"""Change of a turn rate that is none [rad/s], and for how long it is not believed [ns]."""
 
 MOVING = 0.5
 """Velocity of a joint from which the robot moves [rad/s]."""
@@ -38,23 +42,37 @@ class SensorWatch:
         Stamp from which on the IMU, each leg's encoders and each contact repeat; −1: they do not.
     joint_position : ndarray (12,)
         Last usable angles [rad].
+    imu_ns : int
+        Stamp of the last turn rate that was believed [ns].
     """
 
     readings: SensorReadings
     since_ns: tuple[int, ...]
     joint_position: Array
+    imu_ns: int
 
 
 def first_watch(readings: SensorReadings) -> SensorWatch:
     """Memory after the first readings."""
     usable = np.where(np.isfinite(readings.joint_position), readings.joint_position, 0.0)
-    return SensorWatch(readings, (-1,) * (1 + 2 * N), usable)
+    return SensorWatch(readings, (-1,) * (1 + 2 * N), usable, readings.time_ns)
 
 
 def without_frozen(watch: SensorWatch, readings: SensorReadings
                    ) -> tuple[SensorWatch, SensorReadings]:
-    """Readings in which those of frozen sensors are missing (NaN)."""
+    """Readings in which those of sensors that freeze or jump are missing (NaN)."""
     last, now = watch.readings, readings.time_ns
+    x, y, z = (readings.rate_in_base - last.rate_in_base).tolist()
+    if max(x, y, z) > JUMP or min(x, y, z) < -JUMP:
+        if now - watch.imu_ns < JUMPS_NS:
+            nothing = np.full(3, np.nan)
+            readings = SensorReadings(
+                now, readings.joint_position, readings.joint_velocity, readings.joint_effort,
+                nothing, nothing, readings.foot_force)
+            joints = _known(watch, readings)
+            return replace_unchecked(watch, readings=_told(watch, readings, now),
+                                     joint_position=joints), readings
+    watch = replace_unchecked(watch, imu_ns=now)
     rates, q = readings.joint_velocity, readings.joint_position
     repeated = q == last.joint_position
     force = (readings.foot_force == last.foot_force) & (readings.foot_force != 0.0)
@@ -62,16 +80,13 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
     if not (imu or repeated.any() or force.any()):  # as it always is
         since = (-1,) * (1 + 2 * N)
         return SensorWatch(readings, since, q if all(readings.usable_legs) else _known(
-            watch, readings)), readings
+            watch, readings), now), readings
     imu = imu and np.array_equal(readings.rate_in_base, last.rate_in_base) and np.array_equal(
         readings.specific_force_in_base, last.specific_force_in_base)
     legs = (repeated & (rates == last.joint_velocity)).reshape(N, 3).all(axis=1)
-    fast = np.abs(np.nan_to_num(rates)).reshape(N, 3).max(axis=1) > MOVING
-    moves = [(fast & ~legs).any()] + [np.delete(fast & ~legs, i).any() for i in range(N)] + [
-        (fast & ~legs).any()] * N
-    since = tuple((before if before >= 0 else now) if same and moving else -1
-                  for before, same, moving in zip(
-                      watch.since_ns, [imu, *legs, *force], moves, strict=True))
+    moves = np.abs(np.nan_to_num(rates)).max() > MOVING  # also those say so that are frozen
+    since = tuple((before if before >= 0 else now) if same and moves else -1
+                  for before, same in zip(watch.since_ns, [imu, *legs, *force], strict=True))
     frozen = [begun >= 0 and now - begun >= FROZEN_NS for begun in since]
     if any(frozen):
         nothing, part = np.full(3, np.nan), np.repeat(frozen[1:1 + N], 3)
