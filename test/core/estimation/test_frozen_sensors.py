@@ -1,0 +1,80 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors that freeze or jump are missing, and others are as they were told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from dmp_cpg_ros.core.estimation.frozen import FROZEN_NS, first_watch, with_joints, without_frozen
+from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
+
+TICK_NS, RNG = 4_000_000, np.random.default_rng(0)
+
+
+def readings(k: int, *, moving: bool = True) -> SensorReadings:
+    noise = np.random.default_rng(k)
+    speed = 2.0 if moving else 0.0
+    return SensorReadings(
+        k * TICK_NS, noise.normal(size=12), speed * (1.0 + 0.1 * noise.random(12)),
+        noise.normal(size=12), noise.normal(size=3), noise.normal(size=3),
+        10.0 + noise.random(4))
+
+
+def watched(change: object = None, *, moving: bool = True, ticks: int = 40) -> SensorReadings:
+    """Last readings of a run in which a change is made to each, as they were passed on."""
+    first = readings(0, moving=moving)
+    watch = first_watch(first)
+    for k in range(1, ticks):
+        told = readings(k, moving=moving)
+        for name, part in (change or {}).items():  # type: ignore[attr-defined]
+            getattr(told, name)[part] = getattr(first, name)[part]
+        watch, passed = without_frozen(watch, told)
+    return with_joints(watch, passed) if change is None else passed
+
+
+def test_what_changes_is_passed_on_as_it_is() -> None:
+    last = readings(39)
+    for name, value in vars(watched()).items():
+        np.testing.assert_array_equal(value, getattr(last, name))
+
+
+@pytest.mark.parametrize('change, usable', [
+    ({'rate_in_base': slice(None), 'specific_force_in_base': slice(None)}, 'imu_is_usable'),
+    ({'joint_position': slice(3, 6), 'joint_velocity': slice(3, 6)}, 'usable_legs'),
+    ({'foot_force': slice(2, 3)}, 'usable_contacts')])
+def test_what_repeats_while_the_robot_moves_is_missing(change: dict[str, slice], usable: str
+                                                       ) -> None:
+    expected = {'imu_is_usable': True, 'usable_legs': (True,) * 4, 'usable_contacts': (True,) * 4}
+    failing = {'imu_is_usable': False, 'usable_legs': (True, False, True, True),
+               'usable_contacts': (True, True, False, True)}
+    passed = watched(change)
+    for name, sound in expected.items():
+        assert getattr(passed, name) == (failing[name] if name == usable else sound)
+    early = watched(change, ticks=FROZEN_NS // TICK_NS)
+    assert getattr(early, usable) == expected[usable]
+    assert getattr(watched(change, moving=False), usable) == expected[usable]
+
+
+def test_joints_that_are_missing_stand_where_they_were_known_last() -> None:
+    first, told = readings(0), readings(1)
+    told.joint_position[6:9] = told.joint_velocity[6:9] = np.nan
+    judged = SensorReadings(*(getattr(told, name) for name in (
+        'time_ns', 'joint_position', 'joint_velocity', 'joint_effort', 'rate_in_base',
+        'specific_force_in_base', 'foot_force')))
+    watch, passed = without_frozen(first_watch(first), judged)
+    filled = with_joints(watch, passed)
+    np.testing.assert_array_equal(filled.joint_position[6:9], first.joint_position[6:9])
+    assert not filled.joint_velocity[6:9].any()
+    np.testing.assert_array_equal(filled.joint_position[:6], told.joint_position[:6])
+
+
+def test_a_turn_rate_that_jumps_is_not_believed_for_a_while() -> None:
+    watch, seen = first_watch(readings(0)), []
+    for k in range(1, 60):
+        told = readings(k)
+        told.rate_in_base[:] += 50.0
+        watch, passed = without_frozen(watch, told)
+        seen.append(passed.imu_is_usable)
+    assert not any(seen[:20]) and all(seen[30:])

@@ -1,0 +1,90 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every failure of a component ends as the table says, and is named where it can be told."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.scenario.fault import COMPONENTS, KINDS, Fault
+from dmp_cpg_ros.core.scenario.scenario import Scenario
+from dmp_cpg_ros.studies.failures import CELLS, Outcome, trial
+
+DOCUMENT = Path(__file__).resolve().parents[2] / 'doc' / 'faults.md'
+
+
+def table() -> dict[tuple[str, str, str], str]:
+    """Expected outcome of each cell, from the tables of the document."""
+    found, gait, kinds = {}, '', []
+    for line in DOCUMENT.read_text(encoding='utf-8').split('## Failures')[1].splitlines():
+        cells = [cell.strip() for cell in line.strip('|').split('|')]
+        if line.startswith('### '):
+            gait = line[4:].split(' ')[0].lower()
+        elif cells[0] == 'component':
+            kinds = cells[1:]
+        elif line.startswith('| `'):
+            for kind, outcome in zip(kinds, cells[1:], strict=True):
+                found[gait, cells[0].strip('`'), kind] = outcome
+    return found
+
+
+EXPECTED = {cell: outcome for cell, outcome in table().items() if outcome != 'not run'}
+
+
+@cache
+def outcome(cell: tuple[str, str, str]) -> Outcome:
+    return trial(cell)
+
+
+def test_the_table_has_every_cell() -> None:
+    assert set(table()) == set(CELLS)
+
+
+@pytest.mark.parametrize('cell', EXPECTED, ids=' '.join)
+def test_every_failure_ends_as_the_table_says(cell: tuple[str, str, str]) -> None:
+    found = outcome(cell)
+    assert f'{found.end}{", named" if found.named else ""}' == EXPECTED[cell]
+
+
+@pytest.mark.parametrize('component, kind, name', [
+    ('imu', 'off', 'imu'), ('imu', 'stuck', 'imu'), ('contact', 'off', 'contact of fl'),
+    ('contact', 'stuck', 'contact of fl'), ('encoder', 'off', 'joints of fl'),
+    ('encoder', 'stuck', 'joints of fl')])
+def test_a_failing_sensor_is_named_and_walked_through(component: str, kind: str, name: str
+                                                      ) -> None:
+    assert outcome(('amble', component, kind)) == ('rests', (name,))
+
+
+def test_a_leg_that_sends_nothing_is_named_and_the_robot_stays_on_its_feet() -> None:
+    assert outcome(('amble', 'link', 'off')) == ('rests', ('targets of fl',))
+    assert outcome(('amble', 'clock', 'wrong')) == (
+        'rests', tuple(f'targets of {leg}' for leg in LEGS))
+
+
+@pytest.mark.parametrize('value, text', [
+    ('imu', 'mapping'), ({'component': 'imu'}, 'mapping'),
+    ({'component': 'wing', 'kind': 'off'}, 'valid are imu'),
+    ({'component': 'imu', 'kind': 'sad'}, 'valid are off'),
+    ({'component': 'imu', 'kind': ['off']}, 'valid are off'),
+    ({'component': 'imu', 'kind': 'off', 'leg': 'fl'}, 'no leg has a imu'),
+    ({'component': 'link', 'kind': 'off', 'leg': 'xx'}, 'valid are fl'),
+    ({'component': 'imu', 'kind': 'off', 'for_s': 0.0}, 'for_s'),
+    ({'component': 'imu', 'kind': 'off', 'for_s': True}, 'for_s'),
+    ({'component': 'imu', 'kind': 'off', 'for_s': 1e9}, 'for_s'),
+    ({'component': 'imu', 'kind': 'off', 'until': 3}, 'mapping')])
+def test_what_is_no_failure_is_refused_with_what_is_valid(value: object, text: str) -> None:
+    with pytest.raises(DataError, match=text):
+        Scenario.from_mapping({'duration': 1.0, 'events': [{'at': 0.5, 'fail': value}]})
+
+
+def test_a_failure_reads_back_as_it_was_written() -> None:
+    for component in COMPONENTS:
+        for kind in KINDS:
+            fault = Fault(component, kind, 0.25)
+            assert Fault.from_mapping(fault.as_mapping()) == fault
+            assert str(fault) == f'{component} {kind} for 0.25 s'
