@@ -420,21 +420,20 @@ class Suite:
     def start(self, node: Intruder) -> None:
         """Walk until the speed is steady; raises DmpCpgError when it does not come up."""
         self.end()
-        self._runs, begun = self._runs + 1, False
+        node.spin(1.0)  # what the last run has left in queues
+        node.fell, self._runs = False, self._runs + 1
+        node.poses.clear()
         out = self._folder / f'run{self._runs}'
         self._process = subprocess.Popen(
             [sys.executable, '-m', 'dmp_cpg_ros', 'walk', str(self._folder / 'walk.yaml'),
              '--no-report', '--out', str(out), *(['--composed'] if self._composed else [])],
             stdout=(self._folder / f'walk{self._runs}.log').open('wb'), stderr=subprocess.STDOUT)
         end = time.monotonic() + 120.0
-        while not (begun and node.poses[-1][0] > STEADY_S):
+        while not (node.poses and node.poses[-1][0] > STEADY_S):
             node.spin(0.2)
-            if not begun and node.poses and node.poses[-1][0] < STEADY_S:  # the new run
-                begun, node.fell, node.poses = True, False, node.poses[-1:]
             if time.monotonic() > end or self._process.poll() is not None:
                 said = (self._folder / f'walk{self._runs}.log').read_text(encoding='utf-8')
                 raise DmpCpgError(f'the suite does not walk: {said}')
-
         self.begin_mb = self.memory_mb()
 
     def memory_mb(self) -> float:
