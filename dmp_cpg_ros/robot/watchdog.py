@@ -2,26 +2,44 @@
 # SPDX-License-Identifier: Apache-2.0
 """Command watchdog: the newest joint targets, or a safe stop when a leg sends none.
 
-A standing robot holds its stance. One that is upright but low (on its way up or down, or on its
-belly) is lowered onto its belly. The joints of a tilted one are damped.
+A walking robot goes on with the rhythm of its last cycle, in steps that become smaller until it
+stands; without a rhythm it puts its feet down at once. A standing robot holds its stance. One that
+is upright but low (on its way up or down, or on its belly) is lowered onto its belly. The joints
+of a tilted one are damped. Targets are followed again when they rest where the joints are.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.modes.falls import BodySense, FallParameters
 from dmp_cpg_ros.core.modes.motion_library import RISE, Movements, lying_posture
 from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.robot.last_cycle import LastCycle, Rhythm
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 CARRIED_NS = 24_000_000
 """Age up to which late targets are carried on by their own velocity [ns]."""
 
-STAND_S = 0.6
-"""Time in which a stand is taken up from wherever the joints are [s]."""
+STAND_S = 0.15
+"""Time in which a stand is taken up from wherever the joints are [s]: a raised foot has to be down
+before the robot tips over to its side.
+"""
+
+STOP_CYCLES = 2.0
+"""Periods of its last rhythm in which a walking robot comes to a stand by itself."""
+
+NEAR, SLOW = 0.3, 0.3
+"""Distance [rad] and speed [rad/s] within which targets are at rest where the joints are held."""
+
+AT_EASE_NS = 100_000_000
+"""Time for which targets must have been at rest until they are followed again [ns]."""
+
+TAKEN_UP_S = 0.3
+"""Time in which the joints go over to targets that are followed again [s]."""
 
 STANDING_HEIGHT = 0.7
 """Fraction of the standing height from which the robot stands."""
@@ -32,7 +50,8 @@ class CommandWatchdog:
 
     Targets hold at their stamp. Those that act later are carried on by their own velocity to the
     time at which they act, as the joint would have moved if they had come in time; otherwise every
-    late message would hold the feet, and with them the body, back.
+    late message would hold the feet, and with them the body, back. When a leg's targets are
+    still later, all legs go on with the rhythm of their last cycle or take up their stance.
 
     Parameters
     ----------
@@ -58,6 +77,11 @@ class CommandWatchdog:
         self._ways = {'stand': (home_joint_position(description), STAND_S),
                       'lie': (lying_posture(description), RISE * Movements(description).time_unit)}
         self._tilt = FallParameters().fall_tilt
+        self._memory = LastCycle()
+        self._rhythm: Rhythm | None = None
+        self._given, self._off = np.zeros(12), np.zeros(12)
+        self._begin_ns = self._late_ns = self._uneasy_ns = self._taken_ns = 0
+        self._start = self._targets
 
     def accept(self, leg: str, stamp_ns: int, targets: JointTargets) -> None:
         """Take a leg's targets; older ones than the newest are ignored."""
@@ -68,6 +92,8 @@ class CommandWatchdog:
         self.stamps[i] = stamp_ns
         joints = slice(len(JOINTS_OF_LEG) * i, len(JOINTS_OF_LEG) * (i + 1))
         self._targets[:, joints] = targets.position, targets.velocity, targets.effort
+        if stamp_ns != newest:
+            self._memory.accept(i, stamp_ns, targets)
 
     def silent(self, now_ns: int) -> list[str]:
         """Legs whose targets are missing or too old."""
@@ -81,29 +107,102 @@ class CommandWatchdog:
 
     def targets(self, state: RobotState) -> JointTargets:
         """Targets of all joints, (12,) each, at a state of the robot."""
-        if self.silent(state.time_ns):
+        targets = self._chosen(state)
+        self._given = targets.position.copy()
+        return targets
+
+    def _chosen(self, state: RobotState) -> JointTargets:
+        now, known = state.time_ns, None not in self.stamps
+        if self.silent(now) or (self.fallback and known and not self._at_ease(now)):
             return self._falling_back(state)
-        self.fallback = ''
+        if self.fallback:
+            self._taken_ns, self.fallback = now, ''
+            self._off = self._given - self._targets[0]
+        ages = [now - stamp for stamp in self.stamps if stamp is not None]
         position, velocity, effort = self._targets.copy()
-        ages = [max(0, state.time_ns - stamp) for stamp in self.stamps if stamp is not None]
         if any(ages):
-            late = np.repeat([1e-9 * min(age, CARRIED_NS) for age in ages], len(JOINTS_OF_LEG))
-            position += late * velocity
+            late = np.repeat(ages, len(JOINTS_OF_LEG))
+            position += 1e-9 * np.clip(late, 0, CARRIED_NS) * velocity
+            if max(ages) > CARRIED_NS:
+                return JointTargets(*self._going_on(
+                    state, np.array((position, velocity, effort))))
+        if self._late_ns and max(ages) <= CARRIED_NS:
+            self._late_ns, self._taken_ns, self._off = 0, now, self._given - position
+        if self._taken_ns and now - self._taken_ns < TAKEN_UP_S * 1e9:
+            position += (1.0 - _share(now - self._taken_ns, TAKEN_UP_S)) * self._off
         return JointTargets(position, velocity, effort)
+
+    def _going_on(self, state: RobotState, last: Array) -> Array:
+        """Targets (3, 12) while a leg is late, but not yet silent, after the last ones. All legs go
+        on together: those that are in time know nothing of the one that is not.
+        """
+        now = state.time_ns
+        if not self._late_ns:
+            self._late_ns, self._start, self._rhythm = now, last, self._memory.rhythm()
+        if self._rhythm is not None:
+            return self._rhythm.at(now)
+        if not self._stands(state):
+            return last
+        return self._taking_up('stand', now - self._late_ns, state)
+
+    def _stands(self, state: RobotState) -> bool:
+        condition = self._sense.condition(state)
+        return (condition.tilt <= self._tilt
+                and condition.height >= STANDING_HEIGHT * self._stance_height)
+
+    def _at_ease(self, now: int) -> bool:
+        """Whether the targets have rested for a while where the joints are held."""
+        position, velocity, _ = self._targets
+        if np.abs(velocity).max() > SLOW or np.abs(position - self._given).max() > NEAR:
+            self._uneasy_ns = now
+        return now - self._uneasy_ns >= AT_EASE_NS
 
     def _falling_back(self, state: RobotState) -> JointTargets:
         """Targets of the fallback that the robot's state asked for when it began; a robot that
         tips over meanwhile is damped.
         """
-        condition, here = self._sense.condition(state), state.joint_position
-        if self.fallback != 'damp' and condition.tilt > self._tilt:
+        now, here = state.time_ns, state.joint_position
+        if self.fallback != 'damp' and self._sense.condition(state).tilt > self._tilt:
             self.fallback = 'damp'
         elif not self.fallback:
-            stands = condition.height >= STANDING_HEIGHT * self._stance_height
-            self.fallback, self._begin_ns = 'stand' if stands else 'lie', state.time_ns
-            self._start = here.copy()
+            self.fallback = 'stand' if self._stands(state) else 'lie'
+            known, still = None not in self.stamps, np.zeros((2, 12))
+            start = np.array((self._given if known else here, *still))
+            if known and not self._late_ns:
+                self._going_on(state, start)
+            self._begin_ns, self._late_ns, self._start = now, 0, start
+            self._off = self._given - self._rhythm.at(now)[0] if self._rhythm else np.zeros(12)
+        if self.silent(now):
+            self._uneasy_ns = now
         if self.fallback == 'damp':
             return JointTargets(here.copy(), np.zeros(12), np.zeros(12))
-        goal, seconds = self._ways[self.fallback]
-        share = float(minimum_jerk(np.array((state.time_ns - self._begin_ns) * 1e-9 / seconds)))
-        return JointTargets(self._start + share * (goal - self._start), np.zeros(12), np.zeros(12))
+        if self.fallback == 'stand' and self._rhythm is not None:
+            return self._coming_to_a_stand(self._rhythm, state)
+        return JointTargets(*self._taking_up(self.fallback, now - self._begin_ns, state))
+
+    def _taking_up(self, posture: str, ahead_ns: int, state: RobotState) -> Array:
+        """Targets (3, 12) on the way to a posture; a standing robot carries its weight."""
+        goal, seconds = self._ways[posture]
+        share, rate = _share(ahead_ns, seconds), _share(ahead_ns, seconds, 1) / seconds
+        left, away = (1.0 - share) * self._start, goal - self._start[0]
+        left[0] += share * goal
+        left[1] += rate * away
+        if posture == 'stand':
+            left[2] += self._sense.carrying_torque(state, share)
+        return left
+
+    def _coming_to_a_stand(self, rhythm: Rhythm, state: RobotState) -> JointTargets:
+        """The last rhythm about the stance, smaller and smaller."""
+        now, seconds, goal = state.time_ns, STOP_CYCLES * rhythm.period_s, self._ways['stand'][0]
+        ahead = now - self._begin_ns
+        size, rate = 1.0 - _share(ahead, seconds), -_share(ahead, seconds, 1) / seconds
+        position, velocity, effort = rhythm.at(now)
+        away = position + (1.0 - _share(ahead, TAKEN_UP_S)) * self._off - goal
+        carried = self._sense.carrying_torque(state, 1.0 - size)
+        return JointTargets(
+            goal + size * away, size * velocity + rate * away, size * effort + carried)
+
+
+def _share(time_ns: int, seconds: float, order: int = 0) -> float:
+    """Share of a movement of least jerk that is done after a time [ns], or its derivative."""
+    return float(minimum_jerk(np.array(time_ns * 1e-9 / seconds), order))

@@ -1,0 +1,109 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Memory of the legs' last targets, and the rhythm with which they go on when no more come.
+
+A steady gait is a limit cycle, so its last period is all that is left to know of it: the targets
+a time t after the last ones are those of a period T before, q_d(t) = q_d(t − T). T is the lag at
+which the memory resembles its own end most.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets
+
+SHORTEST_S, LONGEST_S = 0.2, 1.6
+"""Range of periods that are looked for [s]."""
+
+END_S = 0.1
+"""Part at the end of the memory that is compared with what was before [s]."""
+
+ALIKE = 0.1
+"""Largest mean squared deviation, as a share of the variance, of what counts as a rhythm."""
+
+GRID_S = 0.004
+"""Time step of the memory [s]."""
+
+KEPT = 2048
+"""Targets of each leg that are remembered, at most."""
+
+
+class LastCycle:
+    """Memory of the targets of four legs."""
+
+    def __init__(self) -> None:
+        """Start without any."""
+        self._heard: list[deque[tuple[int, Array]]] = [deque(maxlen=KEPT) for _ in LEGS]
+
+    def accept(self, place: int, stamp_ns: int, targets: JointTargets) -> None:
+        """Remember the targets of one leg."""
+        self._heard[place].append((stamp_ns, np.array(tuple(vars(targets).values()))))
+
+    def rhythm(self) -> Rhythm | None:
+        """Rhythm of the last targets up to the last that all legs sent; None where they have
+        none.
+        """
+        if not all(self._heard):
+            return None
+        end_ns = min(heard[-1][0] for heard in self._heard)
+        begin_ns = max(end_ns - round((LONGEST_S + END_S) * 1e9),
+                       *(heard[0][0] for heard in self._heard))
+        count = round((end_ns - begin_ns) * 1e-9 / GRID_S)
+        compared, first = round(END_S / GRID_S), round(SHORTEST_S / GRID_S)
+        if count < first + compared:
+            return None
+        times = GRID_S * np.arange(-count, 1, dtype=np.float64)
+        memory = np.concatenate([_sampled(heard, end_ns, times) for heard in self._heard], axis=2)
+        position = memory[:, 0]
+        spread = position[-first:].var(axis=0).sum()
+        lags = np.arange(first, count - compared + 1)
+        ends = position[-compared:]
+        off = np.array([((ends - position[-compared - lag:-lag]) ** 2).sum(axis=1).mean()
+                        for lag in lags])
+        best = off.argmin()
+        if not off[best] <= ALIKE * spread:
+            return None
+        # the first dip that is about as low: not twice the period
+        best = np.flatnonzero(off <= off[best] + 0.02 * spread)[0]
+        while best + 1 < len(off) and off[best + 1] < off[best]:
+            best += 1
+        return Rhythm(end_ns, memory[-lags[best] - 1:])
+
+
+class Rhythm:
+    """Targets that repeat themselves.
+
+    Parameters
+    ----------
+    end_ns : int
+        Stamp of the last of them [ns].
+    memory : ndarray (n + 1, 3, 12)
+        Position, velocity and effort of one period, both ends included.
+    """
+
+    def __init__(self, end_ns: int, memory: Array) -> None:
+        """Keep one period, and by how much its ends differ."""
+        self.end_ns, self._memory = end_ns, memory
+        self.period_s = GRID_S * (len(memory) - 1)
+        self._gap = memory[-1] - memory[0]
+
+    def at(self, time_ns: int) -> Array:
+        """Targets (3, 12) at a stamp after the end; the ends' difference fades within a period."""
+        ahead = (time_ns - self.end_ns) * 1e-9
+        place = (ahead % self.period_s) / GRID_S
+        i = min(int(place), len(self._memory) - 2)
+        now = self._memory[i] + (place - i) * (self._memory[i + 1] - self._memory[i])
+        result: Array = now + self._gap * max(0.0, 1.0 - ahead / self.period_s)
+        return result
+
+
+def _sampled(heard: deque[tuple[int, Array]], end_ns: int, times: Array) -> Array:
+    """What a leg sent, (n, 3, 3), at times before an end [s]."""
+    stamps = np.array([stamp - end_ns for stamp, _ in heard]) * 1e-9
+    values = np.array([value.ravel() for _, value in heard])
+    columns = [np.interp(times, stamps, column) for column in values.T]
+    return np.stack(columns, axis=1).reshape(len(times), 3, len(JOINTS_OF_LEG))

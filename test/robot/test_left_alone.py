@@ -1,0 +1,100 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A robot whose legs fall silent in the middle of a stride ends on its feet, and goes on again."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from math import pi, tau
+
+import numpy as np
+import pytest
+
+pytest.importorskip('mujoco')
+from dmp_cpg_ros.core.canonical.phase import scalar_phase
+from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
+from dmp_cpg_ros.suite import load_gaits, load_suite
+
+PHASES = 16
+TIMEOUT_NS = 200_000_000
+
+
+class Walk:
+    """A walk in the plain loop whose targets pass the watchdog."""
+
+    def __init__(self, gait: str, speed: float) -> None:
+        suite = load_suite(None, {'gait': gait, 'auto_inhibit': False, 'cmd_vel_timeout': 0.0})
+        self.robot = MujocoRobot(suite.robot_file, suite.tick_ns, 0)
+        self.loop = WalkingLoop(
+            self.robot.description, suite.gait, suite.parameters, load_gaits())
+        self.guard = CommandWatchdog(self.robot.description, TIMEOUT_NS)
+        self.state: RobotState = self.robot.reset()
+        self.phase = 0.0
+        self.go(1)
+        self.loop.request(False)
+        self.loop.command(speed)
+
+    def go(self, ticks: int, silent: str = '') -> Walk:
+        """Walk on; some legs are not heard."""
+        for _ in range(ticks):
+            tick = self.loop.tick(self.state)
+            self.phase = scalar_phase(*tick.x[0])
+            for place, leg in enumerate(LEGS):
+                joints, targets = slice(3 * place, 3 * place + 3), tick.targets
+                if leg not in silent:
+                    self.guard.accept(leg, self.state.time_ns, JointTargets(
+                        targets.position[joints], targets.velocity[joints],
+                        targets.effort[joints]))
+            self.state = self.robot.step(self.guard.targets(self.state))
+        return self
+
+    def left_alone(self, ticks: int) -> float:
+        """Walk on without any leg; returns the largest tilt [rad]."""
+        robot, guard, state = deepcopy(
+            (self.robot, self.guard, self.state), {id(self.robot.model): self.robot.model})
+        tilt = 0.0
+        for _ in range(ticks):
+            state = robot.step(guard.targets(state))
+            x, y = state.base_quaternion[:2]
+            tilt = max(tilt, float(np.arccos(1.0 - 2.0 * (x * x + y * y))))
+        assert guard.fallback == 'stand' and not robot.fallen
+        assert np.linalg.norm(state.base_velocity_in_base) < 0.05
+        return tilt
+
+
+@pytest.mark.parametrize(('gait', 'speed'), [
+    ('amble', 0.3), ('amble', 0.5), ('amble', 0.8), ('trot', 0.5), ('trot', 1.0), ('trot', 1.5)])
+def test_silent_in_any_phase_it_comes_to_a_stand(gait: str, speed: float) -> None:
+    walk = Walk(gait, speed).go(1000)
+    tilts: list[float] = []
+    while len(tilts) < PHASES:
+        wanted, before = tau * len(tilts) / PHASES, walk.phase
+        walk.go(1)
+        if (before - wanted + pi) % tau > pi - 0.5 and (before - wanted + pi) % tau <= pi <= (
+                walk.phase - wanted + pi) % tau:
+            tilts.append(walk.left_alone(600))
+    assert max(tilts) < 0.3
+
+
+@pytest.mark.parametrize(('gait', 'speed'), [('amble', 0.5), ('trot', 1.0)])
+def test_silent_while_it_speeds_up_it_puts_its_feet_down(gait: str, speed: float) -> None:
+    walk = Walk(gait, speed)
+    for _ in range(8):
+        assert walk.go(40).left_alone(500) < 0.6
+
+
+def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
+    walk = Walk('amble', 0.5).go(750).go(100, silent='fl')
+    assert walk.guard.fallback == 'stand'
+    walk.go(300)
+    assert walk.guard.fallback == 'stand'  # the legs still walk, the robot stands
+    walk.loop.request(True)
+    walk.go(800)
+    assert walk.loop.stop.state == 'at_rest' and not walk.guard.fallback
+    walk.loop.request(False)
+    walk.go(500)
+    assert not walk.guard.fallback and not walk.robot.fallen
+    assert walk.state.base_velocity_in_base[0] == pytest.approx(0.5, rel=0.3)
