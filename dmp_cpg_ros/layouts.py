@@ -38,8 +38,11 @@ POSTURE_ROWS = (*JOINT_NAMES, *SHIFT_ROWS, *CORRECTION_ROWS, *MODE_ROWS, *MOVEME
 phase of its canonical system, 0 while it does not move the legs.
 """
 
-GAIN_ROWS = (*LEGS, 'region_radius', 'requested', 'at_rest')
-"""Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, and two flags that are 0 or 1."""
+GAIN_ROWS = (*LEGS, 'region_radius', 'requested', 'at_rest', 'automatic')
+"""Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, and three flags that are 0 or 1."""
+
+REFERENCE_ROWS = ('v_x', 'v_y', 'gamma')
+"""Of ``gait_memory``, after those of ``canonical_state``."""
 
 
 def canonical_rows(gaits: Iterable[str]) -> tuple[str, ...]:

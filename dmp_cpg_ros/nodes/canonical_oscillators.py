@@ -7,24 +7,34 @@ the region C.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import nan
 from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters, initial_inhibition
+from dmp_cpg_ros.core.canonical.inhibition import (
+    Inhibition,
+    InhibitionParameters,
+    initial_inhibition,
+)
 from dmp_cpg_ros.core.certificates.lock_watch import LOCKED, LOST, PhaseLock, PhaseLockWatch
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import quarter_weight
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import GaitChoiceParameters
 from dmp_cpg_ros.core.gait.transition import GaitChangeParameters
+from dmp_cpg_ros.core.inhibition.handover import SilentStop
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
+from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, CertificateParameters
+from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader
 from dmp_cpg_ros.nodes.messages.values import stamped, told_at
 
@@ -54,6 +64,10 @@ class CanonicalOscillators(SuiteNode):
         gaits = self.certified.gaits
         self._state = self._canonical.initial_state(gaits.named(gait_name(self)), inhibition)
         self._inhibition = initial_inhibition(inhibition)
+        self._echoed: Inhibition | None = None
+        self._silent: SilentStop | None = None
+        self._gains_writer = conversions.InhibitionGainsWriter()
+        self._echo = self.publisher('acting_gains')
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
         self._writer = conversions.CanonicalStateWriter(tuple(gaits.gaits))
@@ -61,8 +75,13 @@ class CanonicalOscillators(SuiteNode):
         feedback = self.parameters_of(CanonicalParameters).contact_feedback
         contacts = {'foot_contacts': stamped(FootContactsReader().read)} if feedback else {}
         self.match('reference', {'reference': conversions.read_reference, **contacts},
-                   delayed={'inhibition_gains': conversions.InhibitionGainsReader().read},
+                   delayed={'inhibition_gains': stamped(conversions.InhibitionGainsReader().read)},
                    optional=contacts)
+        self._memory = self.remembered(gaits)
+
+    def activate(self) -> None:
+        """Tell late joiners what acts."""
+        self._echo.publish(self._gains_writer.fill(0, self._inhibition))
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
@@ -77,14 +96,41 @@ class CanonicalOscillators(SuiteNode):
         """Advance the oscillators to the stamp of the reference."""
         dt, r = self.elapsed, values['reference']
         force = told_at(stamp_ns, values.get('foot_contacts'), np.full(len(LEGS), np.nan))
-        self._inhibition = values['inhibition_gains'] or self._inhibition
+        if known := self._memory(stamp_ns):
+            dt, (x, x_dot, gait, _) = known
+            self._state = replace(self._state, x=x, x_dot=x_dot, gait=gait,
+                                  cadence_scale=gait.cadence_scale)
+        self._take_inhibition(stamp_ns, values['inhibition_gains'])
         state = self._canonical.step(
             self._state, r, self._inhibition, dt, force, self.certified.certificate.contact)
         message = self._writer.fill(  # refuses what is not finite
             stamp_ns, state.x, state.x_dot, state.gait, self._canonical.cadence_rate(state))
         self._state = state
         self._publisher.publish(message)
-        self._watch_phases(self._canonical.network(state.gait), r, dt)
+        network = self._canonical.network(state.gait)
+        if self._silent is not None:
+            self._silent.step(stamp_ns, network, state.x, state.x_dot, r)
+        self._watch_phases(network, r, dt)
+
+    def _take_inhibition(self, stamp_ns: int, gains: tuple[int, Inhibition] | None) -> None:
+        """Take what was heard last, or stop the gait when it is too old."""
+        if gains is not None and (self.lock_step or stamp_ns - gains[0] <= SILENT_NS):
+            if self._silent is not None:
+                self._silent = None
+                self.clear('inhibition')
+            self._inhibition = gains[1]
+        elif gains is not None:
+            if self._silent is None:
+                of = self.parameters_of
+                self._silent = SilentStop(GaitSupervisor(
+                    of(InhibitionParameters), of(VotingParameters),
+                    of(LegParameters).activity_rate), self._inhibition, stamp_ns)
+                self.warn('inhibition', 'inhibition is silent: the gait stops until it is back',
+                          error=True)
+            self._inhibition = self._silent.inhibition
+        if self._echoed is None or _differ(self._inhibition, self._echoed):
+            self._echoed = self._inhibition
+            self._echo.publish(self._gains_writer.fill(stamp_ns, self._inhibition))
 
     def _acting(self) -> Acting:
         state = self._state
@@ -114,3 +160,10 @@ class CanonicalOscillators(SuiteNode):
                 'gait_wanted': self._state.wanted.name,
                 'highest_speed': self._canonical.network(self._state.gait).highest_speed,
                 'certificate': certificate_words(self.certified.certificate)}
+
+
+def _differ(one: Inhibition, other: Inhibition) -> bool:
+    return one is not other and (
+        (one.requested, one.at_rest, one.automatic, one.region_radius, one.gains.tobytes())
+        != (other.requested, other.at_rest, other.automatic, other.region_radius,
+            other.gains.tobytes()))

@@ -6,16 +6,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
 from dmp_cpg_ros.core.gait.running import CanonicalState
+from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, predict
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
@@ -35,8 +36,20 @@ from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, cer
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, read_imu
-from dmp_cpg_ros.nodes.messages.values import Array, stamped
+from dmp_cpg_ros.nodes.messages.values import Array, stamp_ns, stamped
+
+FOLLOWING = conversions.DRIVE_MODES[0]
+
+HEARTBEAT_NS = 100_000_000
+"""Time after which the gains are told again although they are the same [ns]."""
+
+PATIENT_TICKS = 25
+"""Ticks after which a restarted node begins although nobody tells what acts."""
+
+BLIND_NS = 250_000_000
+"""Time on the robot's clock without a tick after which nothing is known of the gait [ns]."""
 
 
 class InhibitionNode(SuiteNode):
@@ -62,10 +75,21 @@ class InhibitionNode(SuiteNode):
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
         self._predicted = self._bound = self._way = nan
+        self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
+        self._drive, self._joined, self._waited = FOLLOWING, False, 0
+        self._found: Inhibition | None = None
         self._told: tuple[Any, ...] = ()
         self._publisher = self.publisher('inhibition_state')
         self._gains_writer = conversions.InhibitionGainsWriter()
         self._gains_publisher = self.publisher('inhibition_gains')
+        gains_reader = conversions.InhibitionGainsReader()
+        self.listen('acting_gains', lambda message: self._find(gains_reader.read(message)))
+        self.listen('drive_mode', self._on_drive)
+        if self.lock_step:
+            self._memory_writer = conversions.GaitMemoryWriter(tuple(gaits.gaits))
+            self._memory = self.publisher('gait_memory')
+        else:
+            self.listen('/clock', lambda message: self._watch(stamp_ns(message.clock)))
         body, sensors = conversions.CommandReader(), {}
         if self._voting.voting.voting:
             sensors = {'foot_contacts': stamped(FootContactsReader().read),
@@ -83,10 +107,11 @@ class InhibitionNode(SuiteNode):
         self.serve('inhibit', self._take_request)
 
     def activate(self) -> None:
-        """Tell late joiners the state from the start; in lock-step the first tick does."""
+        """Tell people the state from the start; in lock-step the first tick does. What the others
+        know of a stop they keep until then.
+        """
         if not self.lock_step:
             self._publish()
-            self._publish_gains()
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
@@ -108,6 +133,8 @@ class InhibitionNode(SuiteNode):
         self._x, self._x_dot, gait = values['canonical_state']
         self._r = values['reference']
         self._network = network = self._running_gait.network(gait)
+        if not self._joined and not self._join(stamp_ns):
+            return
         before = self._state
         self._body_mode = values['posture_feedback'] or self._body_mode
         self._votes = self._voting.step(
@@ -115,15 +142,88 @@ class InhibitionNode(SuiteNode):
             before.state in ('walking', 'free'), self._inbox.take())
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
-            self._votes.tally, self._body_mode)
+            self._votes.tally, self._barring)
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
             self._predict()
         news = self._news() != self._told
         if news:
             self._publish()
-        if news or self.lock_step:
+        if news or self.lock_step or stamp_ns - self._told_ns >= HEARTBEAT_NS:
             self._publish_gains()
+        if self.lock_step:
+            self._memory.publish(
+                self._memory_writer.fill(stamp_ns, self._x, self._x_dot, gait, self._r))
+        if self._blind:
+            self._blind = ''
+            self.clear('blind')
+        self._watch_bound(stamp_ns)
+
+    # Restarts, and what is missing -------------------------------------------------------------
+
+    def _find(self, acting: Inhibition) -> None:
+        self._found = acting
+
+    def _join(self, stamp_ns: int) -> bool:
+        """Take up what acts on a gait that began before this node; the first tick of a run has
+        the stamp 0. False while it is not known yet: what others know of a stop holds until then.
+        """
+        self._waited += 1
+        if stamp_ns > 0 and self._found is None and not self.lock_step and (
+                self._waited < PATIENT_TICKS):
+            return False
+        self._joined = True
+        if stamp_ns > 0:
+            # Who does not know whether it was stopped leaves it to the service to start.
+            unknown = replace(self._supervisor.inhibition(self._state), automatic=False)
+            self._state = adopted(self._found or unknown, stamp_ns)
+            self._acting = self._supervisor.inhibition(self._state)
+            if self._state.requested:
+                self._predict()
+        return True
+
+    @property
+    def _barring(self) -> str:
+        """What keeps the gait from running: the body's mode, or what the drive does by itself."""
+        if self._body_mode != 'standing' or self._drive == FOLLOWING:
+            return self._body_mode
+        return 'damped' if self._drive == 'damp' else f'looking after itself ({self._drive})'
+
+    def _on_drive(self, message: Any) -> None:
+        """Stop the gait at once while the robot does not follow the legs."""
+        self._drive = conversions.read_drive_mode(message)
+        if self._drive != FOLLOWING and self._x is not None:
+            self._stop_now()
+
+    def _stop_now(self) -> None:
+        if not self._state.requested:
+            self._state = self._supervisor.request(self._state, True, True)
+            self._acting = self._supervisor.inhibition(self._state)
+            self._predict()
+            self._publish()
+            self._publish_gains()
+
+    def _watch(self, now_ns: int) -> None:
+        """Notice on the robot's clock that nothing is known of the gait any more."""
+        if self._x is None:
+            return
+        if now_ns - self._state.time_ns > BLIND_NS and not self._blind:
+            topic = next((name for name in ('reference', 'canonical_state')
+                          if now_ns - self.inputs.newest_ns(name) > BLIND_NS), 'canonical_state')
+            self._blind = (f'no {topic} from {interface(topic).publishers[0]} since '
+                           f'{self._state.time_ns * 1e-9:.3f} s')
+            self.warn('blind', f'{self._blind}: nothing is known of the gait', error=True)
+            self._stop_now()
+        self._watch_bound(now_ns)
+
+    def _watch_bound(self, now_ns: int) -> None:
+        """Report a stop that takes longer than was promised."""
+        if not self._state.requested or isfinite(self._state.measured_s):
+            self._due_ns = inf
+            self.clear('bound')
+        elif now_ns > self._due_ns:
+            self.warn('bound', f'the gait was to rest by {self._due_ns * 1e-9:.3f} s and does not',
+                      error=True)
 
     def _acting_now(self) -> Acting:
         if self._x is None:
@@ -144,11 +244,18 @@ class InhibitionNode(SuiteNode):
         stop: bool = request.data
         if self._x is None:
             return False, 'no canonical_state and reference yet; is canonical_oscillators running?'
-        if not stop and self._body_mode != 'standing':
-            service = 'recover' if self._body_mode == 'damped' else 'stand_up'
+        barring = self._barring
+        if not stop and barring != 'standing':
+            service = 'recover' if barring == 'damped' else 'stand_up'
             return False, (
-                f'the gait cannot start: the robot is {self._body_mode}, not standing; call '
+                f'the gait cannot start: the robot is {barring}, not standing; call '
                 f'{service}, or wait until it stands')
+        if self._blind:
+            if stop:
+                self._state = self._supervisor.request(self._state, True)
+            return False, (
+                f'{self._blind}: no time to rest can be promised' + (
+                    '; the stop is requested and will be carried out' if stop else ''))
         already = stop == self._state.requested
         self._state = self._supervisor.request(self._state, stop)
         if stop != self._state.requested:
@@ -181,6 +288,8 @@ class InhibitionNode(SuiteNode):
             self._bound = running.time_to_rest(self._network, self._x, self._r)
         else:
             self._bound = self.certified.certificate_in(gait).time_to_walking
+        requested = self._state.requested and isfinite(self._bound)
+        self._due_ns = self._state.time_ns + 1e9 * self._bound if requested else inf
 
     def _bound_by_votes(self) -> float:
         """Bound on the time from now to rest under the votes [s]."""
@@ -202,7 +311,8 @@ class InhibitionNode(SuiteNode):
                 now.tally.causes, now.tally.weights.tobytes())
 
     def _publish_gains(self) -> None:
-        self._gains_publisher.publish(self._gains_writer.fill(self._state.time_ns, self._acting))
+        self._told_ns = self._state.time_ns
+        self._gains_publisher.publish(self._gains_writer.fill(self._told_ns, self._acting))
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()

@@ -18,8 +18,12 @@ from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.robot_state import JointsReader
+from dmp_cpg_ros.nodes.messages.values import stamped
 from dmp_cpg_ros.primitive_files import load_motion
 from dmp_cpg_ros.suite_table import KINDS, LEG
+
+FEEDBACK_NS = 60_000_000
+"""Age of the newest ``posture_feedback`` from which a leg does without, and says nothing [ns]."""
 
 NO_JOINTS = (np.full(len(JOINT_NAMES), np.nan),) * 3
 """Measured joints where they are not read."""
@@ -45,13 +49,13 @@ class LegTransformation(SuiteNode):
         gaits, description = known_gaits(self), description_of(self)
         self._leg = LegControl(
             leg, description, parameters, Movements(description), load_motion(parameters.motion))
-        self._state = self._leg.initial_state()
+        self._state, self._joined = self._leg.initial_state(), False
         self._writer = conversions.JointTargetsWriter(leg)
         self._publisher = self.publisher('joint_targets')
         readers: dict[str, Callable[[Any], Any]] = {
             'canonical_state': conversions.CanonicalStateReader(gaits).read,
             'reference': conversions.read_reference,
-            'posture_feedback': conversions.PostureFeedbackReader().read,
+            'posture_feedback': stamped(conversions.PostureFeedbackReader().read),
         }
         if parameters.reading == 'torque':
             readers['joint_states'] = JointsReader().read
@@ -62,9 +66,19 @@ class LegTransformation(SuiteNode):
         x, x_dot, gait = values['canonical_state']
         follow_gait(self, gait)
         position, velocity, _ = values.get('joint_states', NO_JOINTS)
+        told_ns, feedback = values['posture_feedback']
+        if stamp_ns - told_ns > FEEDBACK_NS:
+            self.warn('feedback', f'no posture_feedback since {told_ns * 1e-9:.3f} s: the robot '
+                      'has to stop by itself', error=True)
+            return
+        self.clear('feedback')
+        if not self._joined:
+            self._joined = True
+            if self.lock_step and stamp_ns > 0:
+                self._state = self._leg.picked_up(gait, x, x_dot, values['reference'], feedback)
         state, targets = self._leg.step(
-            self._state, gait, x, x_dot, values['reference'], values['posture_feedback'], position,
-            velocity, self.elapsed)
+            self._state, gait, x, x_dot, values['reference'], feedback, position, velocity,
+            self.elapsed)
         message = self._writer.fill(stamp_ns, targets)  # refuses what is not finite
         self._state = state
         self._publisher.publish(message)

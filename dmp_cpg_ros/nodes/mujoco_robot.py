@@ -12,6 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
 
 from dmp_cpg_ros.configuration import find_config, parse_yaml
 from dmp_cpg_ros.core import suite_parameters as core
@@ -87,6 +88,7 @@ class MujocoRobotNode(SuiteNode):
         self._arrived: dict[str, int] = {}
         work = () if self._state.joint_work is None else ('joint_work',)
         self._state_publishers = {name: self.publisher(name) for name in (*work, *STATE_TOPICS)}
+        self._drive_mode, self._drive_publisher = '', self.publisher('drive_mode')
         self.listen('joint_targets', self._on_targets)
         self.listen('body_mode', self._on_body_mode)
         self.listen('push', self._on_push, command=True)
@@ -102,6 +104,7 @@ class MujocoRobotNode(SuiteNode):
     def activate(self) -> None:
         """Begin with the first tick: at the gate, when all nodes are connected, or at once."""
         self._timer: Any = None
+        self._tell_drive('')
         if self._options.gated:
             self._hold()
         elif self.lock_step:
@@ -181,12 +184,15 @@ class MujocoRobotNode(SuiteNode):
             writer.fill_failing(self._faults.sensed(self._state))
             self._tell_failures(self._faults.acting)
         self._timing.published(stamp)
-        clock_ticks = self.lock_step or stamp // self._tick_ns % CLOCK_EVERY == 0
+        self._publish_all()
+        self.end_tick()
+
+    def _publish_all(self) -> None:
+        clock_ticks = self.lock_step or self._state.time_ns // self._tick_ns % CLOCK_EVERY == 0
         for name, publisher in self._state_publishers.items():
-            message = getattr(writer, name.strip('/'))
+            message = getattr(self._writer, name.strip('/'))
             if message is not None and (clock_ticks or name != '/clock'):
                 publisher.publish(message)
-        self.end_tick()
 
     def _tell_failures(self, faults: Sequence[Fault]) -> None:
         """Tell what fails on purpose, and when nothing does any more."""
@@ -216,6 +222,8 @@ class MujocoRobotNode(SuiteNode):
     def _watch_silence(self, now: int) -> None:
         """Tell once that legs are silent, until all have been heard for a while."""
         silent = self._guard.silent(now)
+        if any(self._guard.stamps):
+            self._tell_drive(self._guard.fallback)
         if not silent:
             if now - self._silent_ns > INCIDENT_NS:
                 self.clear('silent')
@@ -225,6 +233,17 @@ class MujocoRobotNode(SuiteNode):
                 self.warn('silent', f'no targets from {", ".join(silent)} for '
                           f'{self._options.target_timeout} s: the robot looks after itself: '
                           f'{RETREATS[self._guard.fallback]}', error=True)
+
+    def _tell_drive(self, fallback: str) -> None:
+        """Say whether the joints follow the legs, or what the robot does by itself."""
+        mode = fallback or conversions.DRIVE_MODES[0]
+        if mode != self._drive_mode:
+            self._drive_mode = mode
+            self._drive_publisher.publish(String(data=mode))
+            if fallback == 'damp' and not self._fell:
+                self._fell = True
+                self.warn('fell', f'the robot fell at {self._state.time_ns * 1e-9:.3f} s while it '
+                          'looked after itself', error=True)
 
     def _start_over(self, time_ns: int, why: str) -> None:
         """Put the robot back when its simulation has diverged; time goes on."""
@@ -290,7 +309,11 @@ class MujocoRobotNode(SuiteNode):
         self._held.publish(message)
 
     def _on_advance(self, message: Clock) -> None:
-        self._open_until = max(self._open_until, stamp_ns(message.clock))
+        until = stamp_ns(message.clock)
+        if self.lock_step and not self._holding and until == self._open_until:
+            self._publish_all()  # a node was restarted, and may not have heard the last tick
+            return
+        self._open_until = max(self._open_until, until)
         if not self._holding or self._open_until < self._state.time_ns:
             return
         if self.lock_step:

@@ -174,6 +174,7 @@ class PostureControl(SuiteNode):
             description, self.parameters_of(PostureParameters),
             self.parameters_of(ModeParameters), legs)
         self._state, self._told = self._control.initial_state(), ''
+        self._joined = False
         self._mode_publisher = self.publisher('body_mode')
         self._writer = conversions.PostureFeedbackWriter()
         self._publisher = self.publisher('posture_feedback')
@@ -199,6 +200,10 @@ class PostureControl(SuiteNode):
         state = self._body.state(stamp_ns, values)
         x, x_dot, gait = values['canonical_state']
         follow_gait(self, gait)
+        if not self._joined:
+            self._joined = True
+            if stamp_ns > 0:
+                self._state = self._control.picked_up(self._state, state)
         control, feedback = self._control.step(
             self._state, state, gait, x, x_dot, values['reference'], self.elapsed)
         message = self._writer.fill(stamp_ns, feedback)  # refuses what is not finite

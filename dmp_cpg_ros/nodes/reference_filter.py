@@ -16,6 +16,8 @@ from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, ReferenceWriter
+from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
+from dmp_cpg_ros.nodes.messages.values import stamped
 
 
 class ReferenceFilter(SuiteNode):
@@ -36,7 +38,8 @@ class ReferenceFilter(SuiteNode):
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
         gains = InhibitionGainsReader()
         self.match('joint_states', {'joint_states': lambda _: None},
-                   delayed={'inhibition_gains': lambda message: gains.read(message).requested})
+                   delayed={'inhibition_gains': stamped(gains.read)})
+        self._memory = self.remembered(self.certified.gaits)
         self._gate = self.certified.commands()
 
     def on_parameters(self) -> None:
@@ -47,8 +50,12 @@ class ReferenceFilter(SuiteNode):
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
         dt, wanted = self.elapsed, self.parameters_of(CanonicalParameters).cadence_scale
+        if known := self._memory(stamp_ns):
+            dt, (*_, self._r) = known
         self._cadence = approached(self._cadence, wanted, dt)
-        command, self._requested = self._gate.at(stamp_ns), bool(values['inhibition_gains'])
+        command, gains = self._gate.at(stamp_ns), values['inhibition_gains']
+        silent = not self.lock_step and gains is not None and stamp_ns - gains[0] > SILENT_NS
+        self._requested = silent or gains is not None and gains[1].requested
         r_ext = np.zeros(3) if self._requested else np.array(command)
         self._r = self._system.step(self._r, r_ext, dt)
         self._publisher.publish(self._writer.fill(stamp_ns, self._r))

@@ -64,12 +64,15 @@ class Inhibition:
         r0 of the regions C_i = {|x_{i,d} − x_i| ≤ r0}.
     at_rest : bool
         Whether oscillators, reference and swings have come to rest.
+    automatic : bool
+        Whether a command ends the stop, and not only the service.
     """
 
     requested: bool
     gains: Array
     region_radius: float
     at_rest: bool = False
+    automatic: bool = True
 
     def acting_gains(self, x: Array, target: Array) -> Array:
         """Gains that act at a state: α_i inside C_i and zero outside.

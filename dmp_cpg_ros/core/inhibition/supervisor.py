@@ -169,7 +169,7 @@ class GaitSupervisor:
         each leg of what was asked for and what was voted, once the reference is slow.
         """
         return Inhibition(state.requested, self._gains(state, state.armed),
-                          self.parameters.region_radius, state.state == 'at_rest')
+                          self.parameters.region_radius, state.state == 'at_rest', state.automatic)
 
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
         if not state.requested:

@@ -70,6 +70,10 @@ class BodyControl:
         """State at the start."""
         return BodyState(self.modes.initial_state(), self.posture.initial_state())
 
+    def picked_up(self, state: BodyState, measured: RobotState) -> BodyState:
+        """State of a block that comes to a robot that has long begun."""
+        return BodyState(self.modes.picked_up(state.mode, measured), state.balance)
+
     def request(self, state: BodyState, what: str) -> tuple[BodyState, ModeAnswer]:
         """Take a request; see :func:`~dmp_cpg_ros.core.modes.requests.request`."""
         mode, answer = request(self.modes, state.mode, what)

@@ -199,6 +199,15 @@ class LegControl:
         """State of a leg that stands at its foothold."""
         return LegControlState(self.primitive.initial_state())
 
+    def picked_up(self, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
+                  feedback: PostureFeedback) -> LegControlState:
+        """State of a leg that comes to a robot in motion: where its joints are, its swing as high
+        as its pace asks for; arguments as for :meth:`step`.
+        """
+        return LegControlState(self.primitive.picked_up(
+            gait, x[self.primitive.place], x_dot[self.primitive.place], r,
+            feedback.measured[self.joints]))
+
     def step(
         self, state: LegControlState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
         feedback: PostureFeedback, position: Array, velocity: Array, dt: float,

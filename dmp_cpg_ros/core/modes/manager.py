@@ -114,6 +114,17 @@ class ModeManager:
         """State at the start."""
         return ModeState(0, self.parameters.start_mode, reason='as started')
 
+    def picked_up(self, state: ModeState, measured: RobotState) -> ModeState:
+        """Mode of a robot that was to stand at the start, after a restart in the middle of things:
+        what it is found in.
+        """
+        condition = self._sense.condition(measured)
+        if state.mode != 'standing' or condition.height >= RISEN_HEIGHT * self._stance_height and (
+                condition.tilt <= UPRIGHT_TILT):
+            return state
+        mode = 'lying' if condition.tilt <= UPRIGHT_TILT else 'damped'
+        return replace(state, mode=mode, reason='found like that after a restart')
+
     def command(self, state: ModeState) -> BodyCommand:
         """What the legs have to do at the tick of a state."""
         if not state.movements:

@@ -164,6 +164,16 @@ class LegPrimitive:
         q = self.kinematics.inverse(self.foothold_in_base)
         return LegState(SpringState(q, np.zeros(3)), 0.0, np.zeros(3))
 
+    def picked_up(self, gait: GaitInForce, x: Array, x_dot: Array, r: Array, measured: Array
+                  ) -> LegState:
+        """State in the middle of a motion, from what is on the topics: the leg's oscillator (2,),
+        the reference (3,) and the measured angles (3,).
+        """
+        omega = gait.pace(r, self.scale)[2][self.place]
+        rate = scalar_phase_rate(*x.tolist(), *x_dot.tolist()) + gait.rest_rate
+        activity = activity_step(0.0, rate, omega, self.parameters.activity_rate, 10.0)
+        return LegState(SpringState(measured.copy(), np.zeros(3)), activity, np.zeros(3))
+
     def step(self, state: LegState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
              feedback: LegFeedback, dt: float) -> tuple[LegState, Array, Array]:
         """Advance the leg to the time at which the inputs hold.

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection
+from functools import partial
 from typing import Any
 
 from rclpy.publisher import Publisher
@@ -75,14 +76,22 @@ class SuitePublisher:
         Name of the topic in the table of interfaces.
     local : LocalDelivery, optional
         The process's delivery, where several nodes share it.
+    said : list of callable (), optional
+        Where to put what publishes a message once more.
     """
 
-    def __init__(self, publisher: Publisher, topic: str, local: LocalDelivery | None) -> None:
+    def __init__(self, publisher: Publisher, topic: str, local: LocalDelivery | None,
+                 said: list[Callable[[], None]] | None = None) -> None:
         """Keep the parts."""
-        self._publisher, self._topic, self._local = publisher, topic, local
+        self._publisher, self._topic, self._local, self._said = publisher, topic, local, said
 
     def publish(self, message: Any) -> None:
         """Publish outside, then inside."""
+        if self._said is not None:
+            self._said.append(partial(self._publish, message))
+        self._publish(message)
+
+    def _publish(self, message: Any) -> None:
         self._publisher.publish(message.serialized if isinstance(message, Serialized) else message)
         if self._local is not None:
             self._local.publish(self._topic, message)

@@ -10,6 +10,7 @@ node overrides the hooks that it needs: ``configure``, ``activate``, ``deactivat
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from math import inf
@@ -24,6 +25,7 @@ from rclpy.subscription import Subscription
 from dmp_cpg_ros.core.certificates.gate import shown
 from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
+from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import OWNER
@@ -35,8 +37,10 @@ from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePubli
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
 from dmp_cpg_ros.nodes.framework.writers import WriterWatch
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader, serialized_stamp
+from dmp_cpg_ros.nodes.messages.conversions import GaitMemoryReader
 from dmp_cpg_ros.nodes.messages.interfaces import (
     PUBLISHER_DEPTH,
+    REPEATED,
     Interface,
     expected_count,
     interface,
@@ -56,6 +60,10 @@ SEVERAL_S = 2.0
 
 STALE_NS = 250_000_000
 """In real time: age from which messages of ticks are not worth being worked through [ns]."""
+
+FRESH_NS = 20_000_000
+"""Age up to which a memory of the gait is where a restarted node goes on [ns]: within it the robot
+has not moved, which waits in lock-step."""
 
 P = TypeVar('P', bound=Parameters)
 Readers = Mapping[str, Callable[[Any], Any]]
@@ -89,6 +97,8 @@ class SuiteNode(GuardedLifecycleNode):
         Parameters that were accepted last; they take effect at the next tick.
     following : bool
         Whether the change that is judged is one that its owner has accepted.
+    inputs : TickInputs
+        Of :meth:`match`.
     elapsed : float
         Time since the tick before, 0 at the first one [s].
     local : LocalDelivery or None
@@ -100,6 +110,7 @@ class SuiteNode(GuardedLifecycleNode):
     CHANGEABLE: ClassVar[Collection[str]] = ()
     certified: Certified | None = None
     local: LocalDelivery | None = None
+    inputs: TickInputs
     following = False
     elapsed = 0.0
 
@@ -112,6 +123,7 @@ class SuiteNode(GuardedLifecycleNode):
         self.add_on_set_parameters_callback(self._check_change)
         self.add_post_set_parameters_callback(self._accept_change)
         self._undo: list[Callable[[], object]] = []
+        self._said: list[Callable[[], None]] = []
         self._commands: list[Subscription] = []
         self._commands_taken: dict[str, int] = {}
         self._inputs: list[tuple[Interface, Subscription]] = []
@@ -259,7 +271,8 @@ class SuiteNode(GuardedLifecycleNode):
         publisher = self.create_publisher(topic.type, topic.name, qos)
         self._undo.append(partial(self.destroy_publisher, publisher))
         self._outputs.append((topic, publisher))
-        return SuitePublisher(publisher, topic.name, self.local)
+        said = self._said if self.lock_step and topic.name in REPEATED else None
+        return SuitePublisher(publisher, topic.name, self.local, said)
 
     def listen(self, topic: str | Interface, callback: Callable[[Any], None], *,
                command: bool = False, raw: bool = False,
@@ -494,7 +507,9 @@ class SuiteNode(GuardedLifecycleNode):
         delayed = delayed or {}
         self._clock_of_ticks = TickClock()
         ticks = TickInputs(self._run_tick, tuple(readers), trigger, delayed=tuple(delayed),
-                           optional=tuple(optional), lock_step=self.lock_step)
+                           optional=tuple(optional), lock_step=self.lock_step,
+                           on_repeat=self._repeat)
+        self.inputs = ticks
 
         def feeding(name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
             def feed(message: Any) -> None:
@@ -508,6 +523,33 @@ class SuiteNode(GuardedLifecycleNode):
 
         for name, read in {**readers, **delayed}.items():
             self.listen(name, feeding(name, read))
+
+    def remembered(self, gaits: KnownGaits) -> Callable[[int], tuple[float, Any] | None]:
+        """Listen for what the node held before it was restarted, as others remember it.
+
+        Returns
+        -------
+        callable (stamp_ns)
+            At the first tick: the time since the memory [s] and what it says, if it is of the
+            tick or of one shortly before; None at all others.
+        """
+        reader: GaitMemoryReader | None = GaitMemoryReader(gaits)
+        kept: deque[Any] = deque(maxlen=1)
+        heard = self.listen('gait_memory', kept.append)
+
+        def take(stamp_ns: int) -> tuple[float, Any] | None:
+            nonlocal reader
+            if reader is None:
+                return None
+            said = [(stamp_ns - header_ns(message), reader.read(message))
+                    for message in kept]
+            reader = None
+            if heard is not None:  # nobody needs it any more
+                self._inputs = [entry for entry in self._inputs if entry[1] is not heard]
+                self.destroy_subscription(heard)
+            return next(((1e-9 * age, what) for age, what in said if 0 <= age <= FRESH_NS), None)
+
+        return take
 
     def begin_tick(self, stamp_ns: int) -> None:
         """Start a tick: waiting commands are taken and changed parameters take effect."""
@@ -534,9 +576,15 @@ class SuiteNode(GuardedLifecycleNode):
 
     def _run_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         self.elapsed = self._clock_of_ticks.step(stamp_ns)
+        self._said.clear()
         self.begin_tick(stamp_ns)
         self.on_tick(stamp_ns, values)
         self.end_tick()
+
+    def _repeat(self) -> None:
+        """Publish the last tick's messages again, for a node that was restarted meanwhile."""
+        for publish in list(self._said):
+            publish()
 
     # Diagnostics -------------------------------------------------------------------------------
 

@@ -36,7 +36,8 @@ class TickInputs:
     """Collects the inputs of each tick and calls back once per tick, in the order of the stamps.
 
     In lock-step a tick fires when every input with its stamp is there, and every delayed input
-    with the stamp of the tick before (at the first tick delayed inputs are None). In real time it
+    with the stamp of the tick before (at the first tick delayed inputs are what came before it, or
+    None). A message that comes again is passed on to ``on_repeat``. In real time it
     fires the same way, or else with the newest value of each input that does not come: that was
     lost, for a later one of its kind is there; that is silent; or for which ``HOLD_TICKS`` later
     ticks have waited. A node that stalls so delays those behind it instead of being left behind.
@@ -56,17 +57,21 @@ class TickInputs:
         the first arrives.
     lock_step : bool
         Whether ticks wait for exact stamps.
+    on_repeat : callable (), optional
+        Called in lock-step when the trigger of the last tick, or of one that waits, comes again.
     """
 
     def __init__(self, on_tick: TickCallback, inputs: Sequence[str], trigger: str, *,
                  delayed: Sequence[str] = (),
-                 optional: Sequence[str] = (), lock_step: bool = False) -> None:
+                 optional: Sequence[str] = (), lock_step: bool = False,
+                 on_repeat: Callable[[], None] = lambda: None) -> None:
         """Start without any message."""
         others = set(inputs) - {trigger}
         if trigger not in inputs or not set(optional) <= others or set(delayed) & set(inputs):
             raise ValueError('trigger and optional inputs must be inputs, delayed ones must not')
         self._on_tick, self._inputs, self._trigger = on_tick, tuple(inputs), trigger
         self._delayed, self._optional, self._lock_step = tuple(delayed), optional, lock_step
+        self._on_repeat = on_repeat
         self._others = tuple(name for name in inputs if name != trigger)
         self._held: dict[str, Any] = dict.fromkeys(delayed)
         self._astray: list[tuple[str, int, Any]] = []
@@ -117,11 +122,11 @@ class TickInputs:
             if last is None or stamp_ns >= last:
                 self._missed[name] = 0
         if last is not None and stamp_ns <= last:
-            self.ignored += 1
+            self._ignore(name, stamp_ns == last)
             return True
         tick = self._pending.setdefault(stamp_ns, {})
         if name in tick:
-            self.ignored += 1
+            self._ignore(name, last is not None)
             return True
         tick[name] = value
         if self._lock_step:
@@ -146,6 +151,15 @@ class TickInputs:
             self.add(*message)
         return True
 
+    def newest_ns(self, name: str) -> int:
+        """Newest stamp of an input [ns]; −1 without any."""
+        return self._newest.get(name, (-1, None))[0]
+
+    def _ignore(self, name: str, repeated: bool) -> None:
+        self.ignored += 1
+        if repeated and self._lock_step and name == self._trigger:
+            self._on_repeat()
+
     def _add_delayed(self, name: str, stamp_ns: int, value: Any) -> None:
         if not self._lock_step:
             self._held[name] = value
@@ -166,7 +180,9 @@ class TickInputs:
             for name in self._delayed:
                 if last is not None and last not in self._late[name]:
                     return
-                tick[name] = None if last is None else self._late[name][last]
+                late = self._late[name]
+                known = max((at for at in late if at <= stamp), default=-1)
+                tick[name] = late[last] if last is not None else late.get(known)
             self._fire(stamp, tick)
 
     def _fire_newest(self) -> None:

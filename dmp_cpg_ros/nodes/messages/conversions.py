@@ -37,6 +37,9 @@ from dmp_cpg_ros.nodes.messages.values import Array, checked_numbers, header_ns,
 
 AnyJointState: TypeAlias = JointState | cdr.SerializedJointState
 
+DRIVE_MODES = ('following', 'stand', 'lie', 'damp')
+"""What ``drive_mode`` can say."""
+
 _OSCILLATORS = slice(0, len(layouts.OSCILLATOR_ROWS))
 _GAITS = slice(_OSCILLATORS.stop, None)
 _JOINTS = slice(0, len(JOINT_NAMES))
@@ -157,6 +160,51 @@ class CanonicalStateReader:
         return x, x_dot, self._last[1]
 
 
+class GaitMemoryWriter:
+    """Writes ``gait_memory``.
+
+    Parameters
+    ----------
+    gaits : sequence of str
+        Names of all gaits that are known.
+    """
+
+    def __init__(self, gaits: Sequence[str]) -> None:
+        """Lay the message out."""
+        self._gaits = tuple(gaits)
+        self._writer = JointStateWriter(
+            (*layouts.canonical_rows(gaits), *layouts.REFERENCE_ROWS), cdr.FIELDS[:2])
+
+    def fill(self, time_ns: int, x: Array, x_dot: Array, gait: GaitInForce, r: Array
+             ) -> cdr.SerializedJointState:
+        """Refill with what :class:`CanonicalStateReader` read, and r, ndarray (3,)."""
+        shares, rates = layouts.gait_rows(shares_of(gait), 0.0, self._gaits)
+        return self._writer.fill(time_ns, np.concatenate((x.ravel(), shares, r)),
+                                 np.concatenate((x_dot.ravel(), rates, np.zeros(3))))
+
+
+class GaitMemoryReader:
+    """Reads ``gait_memory``.
+
+    Parameters
+    ----------
+    gaits : KnownGaits
+        All gaits that are known.
+    """
+
+    def __init__(self, gaits: KnownGaits) -> None:
+        """Prepare the order."""
+        self._canonical = CanonicalStateReader(gaits)
+        self._r = JointStateReader(layouts.REFERENCE_ROWS, cdr.FIELDS[:1])
+
+    def read(self, message: AnyJointState) -> tuple[Array, Array, GaitInForce, Array]:
+        """States x and rates ẋ, ndarrays (4, 2), the gait in force, and r, ndarray (3,); raises
+        DataError.
+        """
+        (r,) = self._r.read(message)
+        return *self._canonical.read(message), r
+
+
 def _joints_of(leg: str) -> list[str]:
     return [f'{leg}_{joint}' for joint in JOINTS_OF_LEG]
 
@@ -260,7 +308,7 @@ class InhibitionGainsWriter:
         """Refill; raises DataError when a number is not finite."""
         return self._writer.fill(time_ns, np.array((
             *inhibition.gains, inhibition.region_radius, inhibition.requested,
-            inhibition.at_rest)))
+            inhibition.at_rest, inhibition.automatic)))
 
 
 _LARGEST_GAIN = (range_of(InhibitionParameters, 'inhibition_gain')[1]
@@ -285,8 +333,8 @@ class InhibitionGainsReader:
         if not low <= radius <= high:
             raise DataError(f'region_radius = {radius} must be from {low:g} to {high:g}')
         if not {0.0, 1.0}.issuperset(flags):
-            raise DataError(f'requested and at_rest must be 0 or 1, not {flags}')
-        return Inhibition(bool(flags[0]), gains, radius, bool(flags[1]))
+            raise DataError(f'requested, at_rest and automatic must be 0 or 1, not {flags}')
+        return Inhibition(bool(flags[0]), gains, radius, bool(flags[1]), bool(flags[2]))
 
 
 def read_votes(message: JointState) -> tuple[dict[str, float], str]:
@@ -311,6 +359,14 @@ def read_body_mode(message: String) -> str:
     """Mode in ``body_mode``; raises DataError when it is none."""
     if message.data not in MODES:
         raise DataError(f"body mode '{message.data[:40]}' must be one of {', '.join(MODES)}")
+    return str(message.data)
+
+
+def read_drive_mode(message: String) -> str:
+    """Mode in ``drive_mode``; raises DataError when it is none."""
+    if message.data not in DRIVE_MODES:
+        raise DataError(
+            f"drive mode '{message.data[:40]}' must be one of {', '.join(DRIVE_MODES)}")
     return str(message.data)
 
 

@@ -163,13 +163,25 @@ TOPICS: tuple[Interface, ...] = (
     Interface('estimated_odom', Odometry,
               "estimated pose and twist of base_link, at the parameter's rate",
               (POSTURE,), (), sometimes=(POSTURE,)),
-    Interface('/clock', Clock, 'the clock of the robot', (ROBOT,), ()),
+    Interface('/clock', Clock, 'the clock of the robot', (ROBOT,), (INHIBITION,),
+              sometimes=(INHIBITION,)),
     Interface('inhibition_state', DiagnosticArray,
               'stop and start for people: state, gains, times, when they change',
               (INHIBITION,), ('user',), latched=True),
     Interface('inhibition_gains', JointState,
-              'position = gain of each leg [1/s], region_radius, requested, at_rest',
+              'position = gain of each leg [1/s], region_radius, requested, at_rest, automatic; '
+              'when they change, and ten times a second',
               (INHIBITION,), (REFERENCE, CANONICAL), latched=True),
+    Interface('acting_gains', JointState,
+              'what acts of inhibition_gains, when it changes: who restarts inhibition finds it',
+              (CANONICAL,), (INHIBITION,), latched=True),
+    Interface('gait_memory', JointState,
+              'lock-step: canonical_state and reference of the last tick, for who is restarted',
+              (INHIBITION,), (REFERENCE, CANONICAL), latched=True,
+              sometimes=(REFERENCE, CANONICAL, INHIBITION)),
+    Interface('drive_mode', String,
+              'following, or what the robot does by itself while legs are silent: stand, lie, '
+              'damp; when it changes', (ROBOT,), (INHIBITION,), latched=True),
     Interface('body_mode', String,
               'standing, lying, moving between the two, or fallen, when it changes',
               (POSTURE,), (ROBOT,), latched=True),
@@ -186,6 +198,13 @@ TOPICS: tuple[Interface, ...] = (
               (RECORDER,), ('user',), latched=True, recorded=False),
 )
 """Topics of the suite."""
+
+SILENT_NS = 500_000_000
+"""Age of the newest ``inhibition_gains`` from which inhibition counts as gone [ns]."""
+
+REPEATED = ('reference', 'canonical_state', 'posture_feedback', 'joint_targets',
+            'inhibition_gains')
+"""What nodes publish again in lock-step when they hear the trigger of their last tick again."""
 
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 """Topics that a bag can have."""
