@@ -46,6 +46,10 @@ def generate_launch_description() -> LaunchDescription:
             'processes', default_value='each', choices=list(PROCESSES),
             description='a process for every node, for every block of them, or one for all'),
         DeclareLaunchArgument(
+            'respawn', default_value='false', choices=['true', 'false'],
+            description='whether to start nodes again that end before their time, all but the '
+                        'robot'),
+        DeclareLaunchArgument(
             'record', default_value='false', choices=['true', 'false'],
             description='whether to record all topics of the suite in a bag'),
         DeclareLaunchArgument(
@@ -94,5 +98,6 @@ def nodes(context: LaunchContext) -> list[Node]:
             remappings=[rule for rule in namespace_rules(namespace) if rule[0] != '__ns'],
             output='screen', emulate_tty=True,
             # Without the robot there is nothing to walk: the others end with it.
-            on_exit=Shutdown() if ROBOT in names else None))
+            on_exit=Shutdown() if ROBOT in names else None,
+            respawn=given('respawn') == 'true' and ROBOT not in names))
     return described

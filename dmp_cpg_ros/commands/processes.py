@@ -33,6 +33,7 @@ class ProcessGroup:
         logs.mkdir(parents=True, exist_ok=True)
         self._logs = logs
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._commands: dict[str, tuple[str, Sequence[str]]] = {}
 
     def start(self, name: str, module: str, arguments: Sequence[str], *,
               logged: bool = True) -> None:
@@ -40,9 +41,10 @@ class ProcessGroup:
         this process only; it ends with this process. What is not logged is written where this
         process writes.
         """
+        self._commands[name] = module, arguments
         # Matrices of a few rows: threads of the algebra library would only contend for the cores.
         environment = {'OPENBLAS_NUM_THREADS': '1', **os.environ, 'PYTHONUNBUFFERED': '1'}
-        with open(self._logs / f'{name}.log' if logged else os.devnull, 'wb') as log:
+        with open(self._logs / f'{name}.log' if logged else os.devnull, 'ab') as log:
             output = log if logged else None
             self._processes[name] = subprocess.Popen(
                 [sys.executable, '-m', __name__, str(os.getpid()), module, *arguments],
@@ -50,17 +52,27 @@ class ProcessGroup:
                 stderr=subprocess.STDOUT if logged else None,
                 start_new_session=True, env=environment)
 
-    def ended(self) -> list[str]:
-        """Say of every process that has ended how, with the last line of its output."""
-        found = []
+    def restart(self, name: str) -> None:
+        """Start a process that has ended once more."""
+        self.start(name, *self._commands[name])
+
+    def kill(self, name: str) -> None:
+        """End a process that does not answer."""
+        self._processes[name].kill()
+
+    def ended(self) -> dict[str, str]:
+        """Say by the name of every process that has ended how, with the last line of its
+        output.
+        """
+        found = {}
         for name, process in self._processes.items():
             status = process.poll()
             if status is not None:
-                how = (f'was ended by signal {-status}' if status < 0 else
-                       f'ended with status {status}')
+                how = (f'was ended by signal {-status} ({signal.Signals(-status).name})'
+                       if status < 0 else f'ended with status {status}')
                 log = (self._logs / f'{name}.log').read_text(encoding='utf-8', errors='replace')
                 last = log.strip().rpartition('\n')[2]
-                found.append(f'{name} {how}{last and ": " + last}')
+                found[name] = f'{name} {how}{last and ": " + last}'
         return found
 
     def stop(self, patience_s: float = 15.0) -> list[str]:

@@ -9,7 +9,8 @@ import os
 import signal
 import stat
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
@@ -29,6 +30,7 @@ from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.nodes.framework import claims, execution, health
+from dmp_cpg_ros.nodes.messages.conversions import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import PROCESSES, RECORDER, ROBOT, WALKING_NODES, instances
@@ -44,6 +46,15 @@ LAST_WORDS_S = 10.0
 
 LYING_WITHIN_S = 60.0
 """How long a machine may take to simulate how the robot lies down [s]."""
+
+HUNG_S = 60.0
+"""How long nodes may leave the robot waiting without an answer [s]."""
+
+MOST_RESTARTS = 3
+"""How often a process is started again before all nodes have been ready."""
+
+REST_NS = 4_000_000_000
+"""Time on the robot's clock in which it comes to rest without some nodes [ns]."""
 
 SETTLED_S = 0.3
 """Time without a new message after which the recording counts as complete [s]."""
@@ -123,7 +134,8 @@ def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
 
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say, *,
-              lock_step: bool, processes: str, view: bool = False) -> str:
+              lock_step: bool, processes: str, view: bool = False, respawn: bool = False
+              ) -> str:
     """Run the suite from nothing to nothing.
 
     A walk goes on without its recorder, which says at once when it cannot write any more.
@@ -146,6 +158,9 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         How nodes share processes, a key of :data:`~dmp_cpg_ros.suite_table.PROCESSES`.
     view : bool
         Whether to serve a live view, whose end does not end the run.
+    respawn : bool
+        Whether processes that end before their time are started again, all but the robot's: with
+        it a simulated robot has lost its state.
 
     Returns
     -------
@@ -155,7 +170,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
     Raises
     ------
     SuiteError
-        If nodes do not get ready, or one ends before its time; its last words are in the text.
+        If nodes do not get ready, or one ends before its time or hangs; its last words are in the
+        text. The gait is stopped before.
     PlayerError
         If the suite does not take a command.
     InterruptedRunError
@@ -168,7 +184,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
             if view:  # its address holds a token, which is for the terminal only
                 views.start('live_view', 'dmp_cpg_ros', ['live_view', *arguments], logged=False)
             kinds = {name: kind.name for kind, name, _ in instances()}
-            for process, nodes in {RECORDER: (RECORDER,), **PROCESSES[processes]}.items():
+            shared = {RECORDER: (RECORDER,), **PROCESSES[processes]}
+            for process, nodes in shared.items():
                 if len(nodes) == 1:
                     node = ('-r', f'__node:={nodes[0]}')
                     group.start(process, 'dmp_cpg_ros', [kinds[nodes[0]], *arguments, *node])
@@ -177,7 +194,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
             player = ScenarioPlayer(scenario, tick_ns, lock_step, say)
             executor = execution.make_executor('events')
             executor.add_node(player)
-            watch = _Watch(executor, player, group, interrupted, say)
+            watch = _Watch(executor, player, group, interrupted, say, shared, respawn)
             try:
                 watch.until_ready()
                 player.begin()
@@ -196,6 +213,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
             rclpy.try_shutdown()
             if killed:
                 say(math.nan, f'had to kill {", ".join(killed)}')
+        if killed:
+            raise SuiteError(f'{", ".join(killed)} hung: no answer at the end of the run')
 
 
 class _Watch:
@@ -209,9 +228,18 @@ class _Watch:
     """
 
     def __init__(self, executor: Executor, player: ScenarioPlayer, group: ProcessGroup,
-                 interrupted: list[int], say: Say) -> None:
+                 interrupted: list[int], say: Say, shared: Mapping[str, Sequence[str]],
+                 respawn: bool) -> None:
         self._executor, self._player, self._group = executor, player, group
         self._interrupted, self._say = interrupted, say
+        self._shared, self._respawn = shared, respawn
+        self._gone: set[str] = set()  # nodes that have ended and are not started again
+        self._told: set[str] = set()  # processes of which that is known
+        self._restarts: Counter[str] = Counter()  # since all were ready
+        self._returning: health.ReadinessOfOthers | None = None
+        self._progress: tuple[int, bool] | None = None
+        self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), 0.0
+        self._asked: health.ReadinessOfOthers | None = None
         self._transitions = {name: player.create_client(ChangeState, f'{name}/change_state')
                              for name in (*WALKING_NODES, RECORDER)}
         self._recording, self._ending, self.unrecorded = True, False, ''
@@ -229,20 +257,66 @@ class _Watch:
             self._executor.spin_until_future_complete(future, timeout_sec=SLICE_S)
             if self._interrupted and not self._ending:
                 raise InterruptedRunError(self._interrupted[0])
-            if ended := self._ended():
-                raise SuiteError('; '.join(ended))
+            self._look_after_processes()
         return bool(future.done())
 
-    def _ended(self) -> list[str]:
-        """Processes that have ended; of a recorder, while it walks, it is told once."""
-        ended = self._group.ended()
-        lost = [how for how in ended if how.startswith(f'{RECORDER} ')]
-        if lost and self._player.begun:
-            if self._recording:
-                self._recording, self.unrecorded = False, lost[0]
-                self._say(self._player.time_ns * 1e-9, f'{lost[0]}; the walk goes on unrecorded')
-            ended.remove(lost[0])
-        return ended
+    def _look_after_processes(self) -> None:
+        """Start what has ended again, or raise SuiteError with how it ended, once."""
+        news = {name: how for name, how in self._group.ended().items() if name not in self._told}
+        for name, how in news.items():
+            nodes = self._shared[name]
+            if (self._respawn and not self._ending and ROBOT not in nodes
+                    and self._restarts[name] < MOST_RESTARTS):
+                self._say(self._player.progress_ns * 1e-9, f'{how}; it is started again')
+                self._restarts[name] += 1
+                self._group.restart(name)
+                # Who was there before has to know the new one, too.
+                self._returning = health.ReadinessOfOthers(self._player, list(self._transitions))
+            else:
+                self._told.add(name)
+                self._gone.update(nodes)
+        if RECORDER in news and RECORDER in self._told and self._player.begun:
+            self._recording, self.unrecorded = False, news.pop(RECORDER)
+            self._say(self._player.progress_ns * 1e-9,
+                      f'{self.unrecorded}; the walk goes on unrecorded')
+        if lost := [how for name, how in news.items() if name in self._told]:
+            raise SuiteError('; '.join(lost))
+        if self._returning is not None and not self._returning.missing():
+            self._returning = None
+            self._say(self._player.progress_ns * 1e-9, 'all nodes are ready again')
+            self._player.renew([node for name in self._restarts for node in self._shared[name]])
+            self._restarts.clear()
+        if not self._ending:
+            self._look_for_stall()
+
+    def _look_for_stall(self) -> None:
+        """Say which nodes do not answer while no tick ends, or while the robot does not follow;
+        after a while end those that hang, or the run.
+        """
+        player, now = self._player, time.monotonic()
+        progress = player.progress_ns, player.drive == DRIVE_MODES[0]
+        if self._progress is None or progress != self._progress and progress[1]:
+            self._progress, self._asked = progress, None
+            self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), now
+        elif self._stalled.due() and progress[0] > 0 and self._returning is None:
+            if self._asked is None:
+                self._asked = health.ReadinessOfOthers(player, list(self._transitions))
+                self._asked.missing()
+                return
+            missing = [text for text in self._asked.missing() if text.endswith(health.NO_ANSWER)]
+            self._say(player.progress_ns * 1e-9, 'the robot waits'
+                      + (f' for {"; ".join(missing)}' if missing else ''))
+            if missing and now > self._stalled_s + HUNG_S:
+                self._end_hung({text.partition(':')[0] for text in missing})
+
+    def _end_hung(self, nodes: set[str]) -> None:
+        hung = [name for name, own in self._shared.items() if nodes.intersection(own)]
+        if not self._respawn:
+            raise SuiteError(f'{", ".join(hung)} hung: no answer for {HUNG_S:g} s')
+        for name in hung:
+            self._say(self._player.progress_ns * 1e-9, f'{name} hung and is ended')
+            self._group.kill(name)
+        self._progress = None
 
     def until_ready(self) -> None:
         """Ask every node whether it is active and connected until all say yes."""
@@ -259,9 +333,12 @@ class _Watch:
     def lay_down(self) -> None:
         """End the recording, then lay the robot down; a second Ctrl-C cuts it short."""
         self._ending, begun = True, len(self._interrupted)
-        if self._ended():
+        if ROBOT in self._gone:
             return
         with suppress(DmpCpgError):
+            if self._gone - {RECORDER}:
+                self._come_to_rest(begun)
+                return
             for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
                 if self._recording:
                     self._change_state(RECORDER, transition)
@@ -271,20 +348,32 @@ class _Watch:
                 if self.until(down, SLICE_S):
                     return
 
+    def _come_to_rest(self, begun: int) -> None:
+        """Let a robot that has lost nodes come to a stand; where nodes are left that can stop the
+        gait they do, and else the drive does.
+        """
+        player, deadline = self._player, time.monotonic() + LYING_WITHIN_S
+        rested_ns = player.time_ns + REST_NS
+        player.stop()
+        while (player.time_ns < rested_ns and len(self._interrupted) == begun
+               and time.monotonic() < deadline and ROBOT not in self._gone):
+            with suppress(SuiteError):
+                self.until(Future(), SLICE_S)
+
     def finish_work(self) -> None:
         """Stop the robot, let the recorder take all that was said, deactivate everything."""
         self._ending = True
-        if self._ended():
-            return
         with suppress(DmpCpgError):
             self._change_state(ROBOT)
-            if self._recording:
+            if self._recording and RECORDER not in self._gone:
                 self._until_recorded()
             for name in self._transitions:
                 if name != ROBOT and (name != RECORDER or self._recording):
                     self._change_state(name)
 
     def _change_state(self, name: str, transition: int = Transition.TRANSITION_DEACTIVATE) -> None:
+        if name in self._gone:
+            return
         request = ChangeState.Request(transition=Transition(id=transition))
         self._ask(self._transitions[name], request, LAST_WORDS_S)
 

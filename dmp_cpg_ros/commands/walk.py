@@ -187,7 +187,7 @@ def _run(plan: _Plan, folder: Path) -> int:
         unrecorded = run_suite(
             plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say,
             lock_step=options.lock_step, processes=options.processes,
-            view=options.view)
+            view=options.view, respawn=options.respawn)
         if unrecorded:
             print(f'walk: {unrecorded}; the rest of the walk was not recorded', file=sys.stderr)
         return FAILED if unrecorded else OK
@@ -254,6 +254,8 @@ def _parser() -> argparse.ArgumentParser:
         help='a process for every node (default), or for every block: gait, posture, legs, robot')
     sharing.add_argument('--composed', dest='processes', action='store_const', const='composed',
                          help='all nodes in one process and one executor')
+    add('--respawn', action='store_true',
+        help='start processes that end before their time again, all but the robot')
     add('--robot', metavar='FILE', help='robot file (default: the one of the parameter file)')
     add('--motion', metavar='FILE', help='motion of the feet, from learn --motion')
     add('--parameters', metavar='FILE', help='parameter file (default: config/suite.yaml)')

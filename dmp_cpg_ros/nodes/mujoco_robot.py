@@ -310,8 +310,8 @@ class MujocoRobotNode(SuiteNode):
 
     def _on_advance(self, message: Clock) -> None:
         until = stamp_ns(message.clock)
-        if self.lock_step and not self._holding and until == self._open_until:
-            self._publish_all()  # a node was restarted, and may not have heard the last tick
+        if self.lock_step and until == self._open_until:
+            self._publish_all()  # again: a node was restarted and may not have heard the last tick
             return
         self._open_until = max(self._open_until, until)
         if not self._holding or self._open_until < self._state.time_ns:

@@ -7,7 +7,7 @@ the robot down at the end.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -29,7 +29,12 @@ from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Command, Scenario
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
 from dmp_cpg_ros.nodes.framework.parameters import plain
-from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_state_word
+from dmp_cpg_ros.nodes.messages.conversions import (
+    DRIVE_MODES,
+    read_body_mode,
+    read_drive_mode,
+    read_state_word,
+)
 from dmp_cpg_ros.nodes.messages.interfaces import GATE_OWNER, interface
 from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
 
@@ -64,6 +69,7 @@ class AcknowledgedTopic:
         topic, taken, self._name = interface(name), interface('~/commands_taken'), name
         self._publisher = node.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._sent, self._taken = 0, dict.fromkeys(topic.subscribers, 0.0)
+        self._missed, self._last = dict.fromkeys(topic.subscribers, 0), list[Any]()
         self._then: Callable[[], None] | None = None
         self._answers = [
             node.create_subscription(taken.type, f'{reader}/commands_taken',
@@ -79,8 +85,16 @@ class AcknowledgedTopic:
         """Publish, and call back once, when every reader has taken everything that was sent."""
         for message in messages:
             self._publisher.publish(message)
-        self._sent, self._then = self._sent + len(messages), then
+        self._sent, self._then, self._last = self._sent + len(messages), then, [*messages]
         self._look()
+
+    def renew(self, readers: Collection[str]) -> None:
+        """Send the last messages again when one of the readers was restarted."""
+        restarted = [reader for reader in readers if reader in self._taken]
+        for reader in restarted:
+            self._missed[reader], self._taken[reader] = self._sent, 0.0
+        if restarted and self._sent:
+            self.send(self._last, self._then or (lambda: None))
 
     def _hearing(self, reader: str) -> Callable[[JointState], None]:
         def hear(message: JointState) -> None:
@@ -91,7 +105,9 @@ class AcknowledgedTopic:
         return hear
 
     def _look(self) -> None:
-        if self._then is not None and min(self._taken.values()) >= self._sent:
+        if self._then is not None and all(
+                taken + self._missed[reader] >= self._sent
+                for reader, taken in self._taken.items()):
             then, self._then = self._then, None
             then()
 
@@ -196,7 +212,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._end_ns = scenario.ticks(tick_ns) * tick_ns
         self.begun, self._busy, self._word = False, False, ''
         self._holding_ns, self._inhibition_ns = -1, -1
-        self.time_ns, self.mode, self.finished = 0, '', Future()
+        self.time_ns, self.mode, self.drive, self.finished = 0, '', DRIVE_MODES[0], Future()
+        self._until_ns = -1
         self._lain: Future | None = None
         voting = any(action.kind == 'votes' for action in self._actions)
         self._topics = {name: AcknowledgedTopic(self, name) for name in (
@@ -215,6 +232,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         heard: dict[str, Callable[[Any], None]] = {
             f'{GATE_OWNER}/holding_at': self._on_holding, 'inhibition_state': self._on_inhibition,
             'inhibition_gains': self._on_gains, 'body_mode': self._on_body_mode,
+            'drive_mode': self._on_drive_mode,
             **({} if lock_step else {'/clock': self._on_clock})}
         for name, callback in heard.items():
             topic = interface(name)
@@ -234,6 +252,20 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._continue()
         else:
             self._open(FAR_NS)
+
+    @property
+    def progress_ns(self) -> int:
+        """Stamp of the last tick that is known to have ended [ns]."""
+        return max(self.time_ns, self._inhibition_ns)
+
+    def renew(self, nodes: Collection[str]) -> None:
+        """Tell nodes that were restarted what they missed: the commands and, in lock-step, the
+        last tick.
+        """
+        for topic in self._topics.values():
+            topic.renew(nodes)
+        if self._lock_step and self._until_ns >= 0:
+            self._open(self._until_ns)
 
     # Lock-step: the robot holds, everything is delivered, the robot goes on ----------------------
 
@@ -344,6 +376,13 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
                 self._say(self.time_ns * 1e-9, mode)
         self._watch_lying()
 
+    def _on_drive_mode(self, message: String) -> None:
+        drive = read_drive_mode(message)
+        if drive != self.drive:
+            self.drive = drive
+            self._say(self.progress_ns * 1e-9, 'the robot follows its legs again'
+                      if drive == DRIVE_MODES[0] else f'the robot looks after itself: {drive}')
+
     def _set(self, values: dict[str, Any]) -> None:
         """Ask the owner for a change; the robot walks on when it is refused."""
 
@@ -381,6 +420,11 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         elif not self._busy:
             self._deliver_due()
 
+    def stop(self) -> None:
+        """Ask for a stop of the gait, if somebody is there to be asked."""
+        if self._callees['inhibit'].service_is_ready():
+            self._callees['inhibit'].call_async(SetBool.Request(data=True))
+
     def lie_down(self) -> Future:
         """Lay the robot down at the end of a real-time run, so that it does not drop; the future
         holds how it ended, in words, once it has.
@@ -415,5 +459,6 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     def _open(self, until_ns: int) -> None:
         message: Any = Clock()
+        self._until_ns = until_ns
         set_stamp(message.clock, until_ns)
         self._gate.publish(message)

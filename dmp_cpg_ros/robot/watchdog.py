@@ -133,8 +133,8 @@ class CommandWatchdog:
         return JointTargets(position, velocity, effort)
 
     def _going_on(self, state: RobotState, last: Array) -> Array:
-        """Targets (3, 12) while a leg is late, but not yet silent, after the last ones. All legs go
-        on together: those that are in time know nothing of the one that is not.
+        """Targets (3, 12) while a leg is late, but not yet silent, after the last ones. All legs
+        go on together: those that are in time know nothing of the one that is not.
         """
         now = state.time_ns
         if not self._late_ns:

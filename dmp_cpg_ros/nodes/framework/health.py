@@ -187,6 +187,10 @@ ASK_AGAIN_S = 2.0
 """Time after which a request without an answer is repeated [s]."""
 
 
+NO_ANSWER = 'it does not answer'
+"""What is said of nodes that say nothing."""
+
+
 class Intervals:
     """Growing intervals of wall time at which someone who waits says what for.
 
@@ -243,7 +247,7 @@ class ReadinessOfOthers:
             if (answer is not None or lost) and client.service_is_ready():
                 client.remove_pending_request(future)
                 self._asked[name] = time.monotonic(), client.call_async(Trigger.Request())
-        return [f'{name}: {self._said.get(name, "it does not answer")}' for name in self._clients]
+        return [f'{name}: {self._said.get(name, NO_ANSWER)}' for name in self._clients]
 
 
 def missing_connections(node: Node, kind: str,
