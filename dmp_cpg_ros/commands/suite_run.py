@@ -242,7 +242,8 @@ class _Watch:
         self._asked: health.ReadinessOfOthers | None = None
         self._transitions = {name: player.create_client(ChangeState, f'{name}/change_state')
                              for name in (*WALKING_NODES, RECORDER)}
-        self._recording, self._ending, self.unrecorded = True, False, ''
+        self._recording, self._begun, self._ending = True, False, False
+        self.unrecorded = ''
         self._recorded: Any = None
         topic = interface('~/recorded')
         player.create_subscription(
@@ -265,7 +266,7 @@ class _Watch:
         news = {name: how for name, how in self._group.ended().items() if name not in self._told}
         for name, how in news.items():
             nodes = self._shared[name]
-            if (self._respawn and not self._ending and ROBOT not in nodes
+            if (self._respawn and self._begun and not self._ending and ROBOT not in nodes
                     and self._restarts[name] < MOST_RESTARTS):
                 self._say(self._player.progress_ns * 1e-9, f'{how}; it is started again')
                 self._restarts[name] += 1
@@ -329,6 +330,7 @@ class _Watch:
             if tell.due():
                 self._say(math.nan, f'waiting for {waiting}')
             self.until(Future(), SLICE_S)
+        self._begun = True
 
     def lay_down(self) -> None:
         """End the recording, then lay the robot down; a second Ctrl-C cuts it short."""

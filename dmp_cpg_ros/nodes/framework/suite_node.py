@@ -271,7 +271,7 @@ class SuiteNode(GuardedLifecycleNode):
         publisher = self.create_publisher(topic.type, topic.name, qos)
         self._undo.append(partial(self.destroy_publisher, publisher))
         self._outputs.append((topic, publisher))
-        said = self._said if self.lock_step and topic.name in REPEATED else None
+        said = self._said if topic.name in REPEATED and self.lock_step else None
         return SuitePublisher(publisher, topic.name, self.local, said)
 
     def listen(self, topic: str | Interface, callback: Callable[[Any], None], *,
