@@ -350,7 +350,7 @@ class MujocoRobotNode(SuiteNode):
         the robot fall.
         """
         now, lag = self._state.time_ns, round(self._options.longest_lag * 1e9)
-        if lag == 0 or self._guard.age_ns(now) <= lag or self._guard.silent(now):
+        if lag == 0 or self._guard.age_ns(now) <= lag:
             self._waits = 0
             return False
         self._waits += 1

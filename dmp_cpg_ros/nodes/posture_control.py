@@ -39,6 +39,9 @@ from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS
 from dmp_cpg_ros.nodes.messages.values import stamped, told_at
 from dmp_cpg_ros.suite_table import POSTURE
 
+FORGOTTEN_NS = 300_000_000
+"""Gap after which the estimator begins anew [ns]: the robot has come to a stand by itself."""
+
 WELL_AGAIN_NS = 1_000_000_000
 """Time without a problem after which sensors count as well again [ns]."""
 
@@ -114,6 +117,8 @@ class BodyState:
             return RobotState(stamp_ns, position, velocity, effort, *base, np.zeros(3),
                               np.zeros(len(LEGS)))
         readings = sensor_readings(stamp_ns, values)
+        if self._memory and stamp_ns - self._memory.estimate.time_ns > FORGOTTEN_NS:
+            self._memory = None
         self._memory, estimate = self._estimator.step(self._memory, readings)
         self.estimate = estimate
         self._tell_problems(stamp_ns, estimate)

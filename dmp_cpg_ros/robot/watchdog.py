@@ -32,6 +32,9 @@ before the robot tips over to its side.
 STOP_CYCLES = 2.0
 """Periods of its last rhythm in which a walking robot comes to a stand by itself."""
 
+LONGEST_STOP_S = 1.6
+"""Longest time of that [s]: the period that is found may be several."""
+
 NEAR, SLOW = 0.3, 0.3
 """Distance [rad] and speed [rad/s] within which targets are at rest where the joints are held."""
 
@@ -101,9 +104,12 @@ class CommandWatchdog:
                 if stamp is None or now_ns - stamp > self._timeout_ns]
 
     def age_ns(self, now_ns: int) -> int:
-        """Age of the oldest leg's targets [ns]; 0 while a leg has never sent any."""
+        """Age of the oldest targets of the legs that are not silent [ns]; 0 while a leg has never
+        sent any.
+        """
         known = [stamp for stamp in self.stamps if stamp is not None]
-        return now_ns - min(known) if len(known) == len(self.stamps) else 0
+        ages = [now_ns - stamp for stamp in known if now_ns - stamp <= self._timeout_ns]
+        return max(ages, default=0) if len(known) == len(self.stamps) else 0
 
     def targets(self, state: RobotState) -> JointTargets:
         """Targets of all joints, (12,) each, at a state of the robot."""
@@ -193,7 +199,8 @@ class CommandWatchdog:
 
     def _coming_to_a_stand(self, rhythm: Rhythm, state: RobotState) -> JointTargets:
         """The last rhythm about the stance, smaller and smaller."""
-        now, seconds, goal = state.time_ns, STOP_CYCLES * rhythm.period_s, self._ways['stand'][0]
+        now, goal = state.time_ns, self._ways['stand'][0]
+        seconds = min(STOP_CYCLES * rhythm.period_s, LONGEST_STOP_S)
         ahead = now - self._begin_ns
         size, rate = 1.0 - _share(ahead, seconds), -_share(ahead, seconds, 1) / seconds
         position, velocity, effort = rhythm.at(now)
