@@ -65,7 +65,7 @@ STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
 FIGURE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-adversary study-files benchmark-walking doc-images view-image paper-figures bench lint install clean
+.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-files benchmark-walking doc-images view-image paper-figures bench lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -84,6 +84,9 @@ study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, wal
 
 study-recovery: $(INSTALLED) ## stand up, lie down, recover from 50 falls (STUDY_ARGS=...)
 	$(ACTIVATED) study_recovery $(STUDY_ARGS)
+
+study-faults: $(INSTALLED) ## kill nodes of walking suites, with and without respawn (STUDY_ARGS=...)
+	$(ACTIVATED) python -m dmp_cpg_ros.studies.study_faults $(STUDY_ARGS)
 
 study-adversary: $(INSTALLED) ## search for a certificate that is wrong (STUDY_ARGS='--seconds 600')
 	$(BIN)/python -m dmp_cpg_ros.studies.adversary $(STUDY_ARGS)

@@ -1,0 +1,276 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Kills nodes of a walking suite with SIGKILL, each in turn at random times, and tabulates it all.
+
+With --respawn one walk takes many kills, each after all nodes have been ready again; without, one.
+A walk is in phase again when its legs are in their places and the body has half of its speed; the
+cycles until then count from the moment at which the robot follows its legs again, or at which
+all nodes are ready, whichever is earlier. Exit status 1 when a robot fell.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import cycle, islice
+from math import inf, nan
+from pathlib import Path
+
+import numpy as np
+
+from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.analysis.motion import tilt
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.core.canonical.phase import scalar_phase
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.suite import load_gaits
+from dmp_cpg_ros.suite_table import ROBOT, WALKING_NODES
+
+WALKS = (('amble', 0.5), ('trot', 1.0))
+
+READY, FOLLOWS = 'all nodes are ready again', 'the robot follows its legs again'
+
+WITHIN_S = 120.0
+"""How long the suite may take to be ready, at first and again, before a walk is given up [s]."""
+
+FALLEN_TILT, LOW = 0.9, 0.7
+"""Tilt of a robot that has fallen [rad]; share of its height at the start below which it lies."""
+
+COLUMNS = ('gait', 'time', 'respawn', 'walks', 'kills', 'fell', 'in phase again', 'cycles, median '
+           '/ worst', 'seconds after the kill, median / worst', 'ended standing / lying / fallen')
+
+
+@dataclass
+class Kill:
+    """One kill of a node, and when the walk was itself again.
+
+    Attributes
+    ----------
+    node : str
+        Which.
+    time_s : float
+        On the robot's clock [s].
+    back_s, in_phase_s : float
+        When its messages were followed again, and when the walk was in phase again [s].
+    period_s : float
+        Of the gait before [s].
+    """
+
+    node: str
+    time_s: float = nan
+    back_s: float = inf
+    in_phase_s: float = inf
+    period_s: float = nan
+
+    @property
+    def cycles(self) -> float:
+        """Cycles from its return to the walk in phase."""
+        return max(0.0, self.in_phase_s - self.back_s) / self.period_s
+
+
+@dataclass
+class Outcome:
+    """What became of one walk.
+
+    Attributes
+    ----------
+    gait : str
+        Of it.
+    lock_step, respawn : bool
+        How it was run.
+    status : int
+        Exit status of ``walk``.
+    end : str
+        ``standing``, ``lying``, ``fallen``, or ``unknown`` without a recording.
+    fell : bool
+        Whether it was ever tilted as if fallen.
+    kills : list of Kill
+        In order.
+    """
+
+    gait: str
+    lock_step: bool
+    respawn: bool
+    status: int = -1
+    end: str = 'unknown'
+    fell: bool = False
+    kills: list[Kill] = field(default_factory=list)
+
+
+class _Walking:
+    """A ``walk`` in a process of its own, with what it says."""
+
+    def __init__(self, command: Sequence[str]) -> None:
+        self.lines: list[str] = []
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env={**os.environ, 'PYTHONUNBUFFERED': '1'})
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        self.lines.extend(self.process.stdout)
+
+    def said(self, pattern: str, begin: int = 0) -> float:
+        """Wait for a line that ends like that; its time [s], infinite when it does not come."""
+        deadline = time.monotonic() + WITHIN_S
+        while time.monotonic() < deadline and self.process.poll() is None:
+            for line in self.lines[begin:]:
+                if found := re.search(rf'^ *([\d.]+) s .*{pattern}', line):
+                    return float(found[1])
+            time.sleep(0.05)
+        return inf
+
+    def pid_of(self, node: str) -> int:
+        """Process of a node."""
+        for path in Path('/proc').glob('[0-9]*/cmdline'):
+            try:
+                words = path.read_text().split('\0')
+            except OSError:
+                continue
+            if str(self.process.pid) in words and f'__node:={node}' in words:
+                return int(path.parent.name)
+        return 0
+
+
+def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence[str],
+        rng: random.Random, folder: Path) -> Outcome:
+    """Walk, and kill some nodes one after the other."""
+    scenario = folder / 'scenario.yaml'
+    scenario.write_text(json.dumps({
+        'name': 'kills', 'duration': 3600.0, 'parameters': {'gait': gait},
+        'events': [{'at': 0.5, 'command': {'v_x': speed}}]}))
+    walk = _Walking([sys.executable, '-m', 'dmp_cpg_ros', 'walk', str(scenario), '--no-report',
+                     '--out', str(folder / 'run'), *['--lock-step'] * lock_step,
+                     *['--respawn'] * respawn])
+    outcome = Outcome(gait, lock_step, respawn)
+    going = walk.said('walking') < inf
+    for node in nodes if going else ():
+        time.sleep(rng.uniform(1.0, 5.0))
+        begin, pid = len(walk.lines), walk.pid_of(node)
+        if not pid:
+            break
+        kill = Kill(node)
+        outcome.kills.append(kill)
+        os.kill(pid, signal.SIGKILL)
+        if not respawn:
+            break
+        kill.time_s = walk.said(f'{node} was ended', begin)
+        ready = walk.said(READY, begin)
+        told = [re.search(rf'^ *([\d.]+) s .*{FOLLOWS}', line) for line in walk.lines[begin:]]
+        kill.back_s = min([ready, *(float(found[1]) for found in told if found)])
+        if ready == inf:
+            break
+    if respawn:
+        time.sleep(rng.uniform(4.0, 6.0))
+        walk.process.send_signal(signal.SIGINT)
+    outcome.status = walk.process.wait()
+    (folder / 'said.txt').write_text(''.join(walk.lines))
+    _judge(outcome, speed, folder / 'run')
+    return outcome
+
+
+def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
+    """Read from the recording how the walk went."""
+    try:
+        recording = load_recording(folder)
+    except Exception as error:  # noqa: BLE001 - without a recording the outcome is unknown
+        print(f'no recording of {outcome}: {error}', file=sys.stderr)
+        return
+    odometry, canonical = recording.odometry, recording.canonical
+    leaning, height = tilt(odometry.quaternion), odometry.position_in_world[:, 2]
+    low = LOW * height[0]
+    outcome.fell = bool(leaning.max() > FALLEN_TILT)
+    outcome.end = 'fallen' if leaning[-1] > FALLEN_TILT else (
+        'lying' if height[-1] < low else 'standing')
+    phases = load_gaits()[outcome.gait].phases
+    own = np.array([[scalar_phase(*leg) for leg in x] for x in canonical.x.tolist()]) - phases
+    off = np.abs(np.angle(np.exp(1j * (own - own[:, :1])))).max(axis=1)
+    pace = np.interp(canonical.time, odometry.time, odometry.velocity_in_base[:, 0])
+    well = (off <= LOCKED_PHASE_ERROR) & (pace > 0.5 * speed)
+    turned = np.unwrap(own[:, 0])
+    for kill in outcome.kills if outcome.respawn else ():
+        before = (canonical.time > kill.time_s - 1.0) & (canonical.time <= kill.time_s)
+        if before.sum() > 1:
+            way = np.ptp(turned[before]) / np.ptp(canonical.time[before])
+            kill.period_s = 2.0 * np.pi / way if way > 0.0 else nan
+        again = canonical.time[well & (canonical.time >= kill.back_s)]
+        kill.in_phase_s = float(again[0]) if len(again) else inf
+
+
+def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
+    """Row of the table for each way to walk."""
+    ways = dict.fromkeys((one.gait, one.lock_step, one.respawn) for one in outcomes)
+    for way in ways:
+        own = [one for one in outcomes if (one.gait, one.lock_step, one.respawn) == way]
+        kills, ends = [kill for one in own for kill in one.kills], [one.end for one in own]
+        again = [kill for kill in kills if kill.in_phase_s < inf]
+        cycles = [kill.cycles for kill in again if kill.cycles < inf]
+        seconds = [kill.in_phase_s - kill.time_s for kill in again]
+        yield [way[0], 'lock-step' if way[1] else 'real', 'yes' if way[2] else 'no',
+               str(len(own)), str(len(kills)), str(sum(one.fell for one in own)),
+               f'{len(again)} of {len(kills)}' if way[2] else '', _spread(cycles),
+               _spread(seconds),
+               ' / '.join(str(ends.count(end)) for end in ('standing', 'lying', 'fallen')) + (
+                   f', unknown {ends.count("unknown")}' if 'unknown' in ends else '')]
+
+
+def _spread(values: Sequence[float]) -> str:
+    return f'{np.median(values):.2f} / {max(values):.2f}' if values else ''
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    return run_command(_parser(), arguments, _main)
+
+
+def _main(options: argparse.Namespace, ros: RosArguments) -> int:
+    rng, outcomes = random.Random(options.seed), list[Outcome]()
+    for round_ in range(options.rounds):
+        for respawn in options.respawn:
+            for lock_step in options.lock_step:
+                for gait, speed in WALKS:
+                    nodes = [node for node in WALKING_NODES if node != ROBOT]
+                    if respawn:
+                        rng.shuffle(nodes)
+                        wanted = list(islice(cycle(nodes), options.kills))
+                    else:
+                        wanted = [rng.choice(nodes)]
+                    with tempfile.TemporaryDirectory() as folder:
+                        outcomes.append(
+                            run(gait, speed, lock_step, respawn, wanted, rng, Path(folder)))
+                    print(f'round {round_}: {json.dumps(asdict(outcomes[-1]))}', flush=True)
+                    write_results(options.json, [asdict(one) for one in outcomes])
+    print(markdown_table(COLUMNS, list(rows(outcomes))))
+    return int(any(one.fell for one in outcomes))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = parser_of('study_faults', __doc__, 'every walk', jobs=False)
+    add = parser.add_argument
+    add('--rounds', type=int, default=5, help='times through all ways to walk (default: 5)')
+    add('--kills', type=int, default=16, help='kills in a walk with --respawn (default: 16)')
+    add('--respawn', type=_choices, default=[True, False], metavar='yes|no|both')
+    add('--lock-step', type=_choices, default=[True, False], metavar='yes|no|both')
+    add('--seed', type=int, default=0, help='of nodes and times (default: 0)')
+    return parser
+
+
+def _choices(text: str) -> list[bool]:
+    return {'yes': [True], 'no': [False], 'both': [True, False]}[text]
+
+
+if __name__ == '__main__':
+    sys.exit(main())
