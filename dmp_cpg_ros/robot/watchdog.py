@@ -87,16 +87,15 @@ class CommandWatchdog:
         self._start = self._targets
 
     def accept(self, leg: str, stamp_ns: int, targets: JointTargets) -> None:
-        """Take a leg's targets; older ones than the newest are ignored."""
+        """Take a leg's targets, unless they are not newer than the newest."""
         i = LEGS.index(leg)
         newest = self.stamps[i]
-        if newest is not None and stamp_ns < newest:
+        if newest is not None and stamp_ns <= newest:
             return
         self.stamps[i] = stamp_ns
         joints = slice(len(JOINTS_OF_LEG) * i, len(JOINTS_OF_LEG) * (i + 1))
         self._targets[:, joints] = targets.position, targets.velocity, targets.effort
-        if stamp_ns != newest:
-            self._memory.accept(i, stamp_ns, targets)
+        self._memory.accept(i, stamp_ns, targets)
 
     def silent(self, now_ns: int) -> list[str]:
         """Legs whose targets are missing or too old."""

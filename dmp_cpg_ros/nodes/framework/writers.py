@@ -7,7 +7,8 @@ to callbacks and keeps the publisher's identity to itself, so a reader knows the
 by a run of numbers that goes on, by no more than one for each tick of the robot's time. Somebody
 else's message is behind it, or ahead of it, or has the stamp of a tick that has been written
 already. Who the others are, the graph tells. Another publisher becomes the writer when the former
-one is silent and nobody else is in the graph.
+one is silent and nobody else is in the graph. In lock-step a writer repeats its last message for a
+node that was restarted; that changes nothing for the others.
 
 Who has sent exactly as many messages as the writer and is quicker at every tick passes: numbers
 protect from mistakes and from what does not know them, DDS Security from the rest.
@@ -56,7 +57,7 @@ class WriterWatch:
     """
 
     __slots__ = ('_heard_ns', '_last', '_learned', '_lock_step', '_may_take_over', '_stamp_ns',
-                 '_stranger', '_stranger_ns', '_tick_ns', '_ticked', '_tried')
+                 '_repeats', '_stranger', '_stranger_ns', '_tick_ns', '_ticked', '_tried')
 
     def __init__(self, may_take_over: Callable[[], bool | None], *, ticked: bool = True,
                  lock_step: bool = False) -> None:
@@ -67,7 +68,8 @@ class WriterWatch:
 
     def _begin(self, number: int, stamp_ns: int, now_ns: int) -> None:
         self._last, self._stamp_ns, self._heard_ns = number, stamp_ns, now_ns
-        self._tick_ns, self._learned, self._tried = 0, 0, (0, 0, 0)
+        self._tick_ns, self._learned, self._repeats = 0, 0, 0
+        self._tried = (0, 0, 0)
 
     def admits(self, number: int | None, stamp_ns: int, now_ns: int) -> bool:
         """Whether a message is the writer's; True where the middleware does not number.
@@ -82,13 +84,18 @@ class WriterWatch:
             Time of its reception [ns].
         """
         ahead, passed_ns = (number or 0) - self._last, stamp_ns - self._stamp_ns
+        if self._is_repeat(ahead, passed_ns):
+            self._repeats = ahead
+            return True
         silent = now_ns - self._heard_ns > SILENT_NS
         stranger = number is not None and number == self._stranger + 1
         if number is None or (self._continues(ahead, passed_ns, now_ns)
                               and not (silent and stranger)):
             if ahead > 0 and (self._learned < LEARNING or passed_ns < ahead * self._tick_ns):
                 self._learned += 1
-                self._tick_ns = min(self._tick_ns or passed_ns, passed_ns // ahead)
+                own_ns = passed_ns // max(1, ahead - self._repeats)
+                self._tick_ns = min(self._tick_ns or own_ns, own_ns)
+            self._repeats = 0
             self._last, self._stamp_ns = number or 0, stamp_ns
             # What is sent again after a loss is received later than what waited behind it.
             self._heard_ns = max(self._heard_ns, now_ns)
@@ -117,11 +124,16 @@ class WriterWatch:
     def may_admit(self, number: int | None, stamp_ns: int, now_ns: int) -> bool:
         """Whether :meth:`admits` can be true: False for most of what is not the writer's."""
         return (number is None or now_ns - self._heard_ns > SILENT_NS
+                or self._is_repeat(number - self._last, stamp_ns - self._stamp_ns)
                 or self._continues(number - self._last, stamp_ns - self._stamp_ns, now_ns))
 
     def has_strangers(self, now_ns: int) -> bool:
         """Whether strangers have been heard lately."""
         return now_ns - self._stranger_ns < REMEMBERED_NS
+
+    def _is_repeat(self, ahead: int, passed_ns: int) -> bool:
+        return (self._lock_step and self._ticked and self._last > 0 and passed_ns == 0
+                and ahead == self._repeats + 1)
 
     def _continues(self, ahead: int, passed_ns: int, now_ns: int) -> bool:
         """Whether a message can be the writer's next one, with losses before it perhaps."""
@@ -131,9 +143,9 @@ class WriterWatch:
             return self._last + ahead != self._stranger + 1 and (
                 ahead == 1 or (ahead <= LOST and self._stranger < 0))
         if self._learned < LEARNING:
-            return ahead <= LOST and passed_ns >= ahead * SHORTEST_TICK_NS
+            return ahead <= LOST and passed_ns >= (ahead - self._repeats) * SHORTEST_TICK_NS
         if self._lock_step:
-            return ahead == 1 and passed_ns == self._tick_ns
+            return ahead <= self._repeats + 1 and passed_ns == self._tick_ns
         # A clock that is set back must not make the writer a stranger.
         # Ticks may all have been lost between those from which their length was learned.
         shorter = ahead == 1 and not self.has_strangers(now_ns)
