@@ -239,3 +239,27 @@ def test_commands_that_arrived_before_a_tick_act_in_it(ros: Ros, kind: str) -> N
         assert got == list(range(sent))
     finally:
         executor.remove_node(ros.node)
+
+
+def test_in_lock_step_a_trigger_that_comes_again_is_passed_on() -> None:
+    repeats: list[int] = []
+    inputs, fired = recorder(lock_step=True, on_repeat=lambda: repeats.append(len(fired)))
+    for name in INPUTS:
+        inputs.add(name, 0, name)
+    for name in INPUTS:
+        inputs.add(name, 0, name)
+    assert len(fired) == 1 and repeats == [1]
+    inputs.add('a', TICK, 'a')  # waits for the others
+    inputs.add('a', TICK, 'a')
+    assert repeats == [1, 1]
+
+
+def test_a_node_that_is_started_late_begins_with_the_delayed_input_that_was_kept() -> None:
+    inputs, fired = recorder(lock_step=True, delayed=('d',))
+    inputs.add('d', 4 * TICK, 'kept')
+    for tick in (5, 6):
+        for name in INPUTS:
+            inputs.add(name, tick * TICK, name)
+    assert [values['d'] for _, values in fired] == ['kept']
+    inputs.add('d', 5 * TICK, 'new')
+    assert fired[-1][1]['d'] == 'new'

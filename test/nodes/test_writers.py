@@ -155,3 +155,15 @@ def test_in_lock_step_the_writer_does_not_keep_to_the_clock() -> None:
 
 def test_without_numbers_everybody_is_heard() -> None:
     assert WriterWatch(lambda: False).admits(None, 0, 0)
+
+
+def test_in_lock_step_the_writer_may_say_again_what_it_said() -> None:
+    watch = WriterWatch(lambda: True, lock_step=True)
+    number = 0
+    for tick in range(1, 100):
+        for _ in range(1 + (tick % 10 == 0) + (tick > 60) * (tick % 20 == 0)):
+            number += 1
+            assert watch.admits(number, tick * TICK_NS, tick * TICK_NS)
+    assert not watch.admits(number + 2, 99 * TICK_NS, 99 * TICK_NS)
+    assert not watch.admits(number + 2, 100 * TICK_NS, 99 * TICK_NS)
+    assert watch.admits(number + 1, 100 * TICK_NS, 99 * TICK_NS)

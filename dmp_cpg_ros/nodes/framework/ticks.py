@@ -181,7 +181,7 @@ class TickInputs:
                 if last is not None and last not in self._late[name]:
                     return
                 late = self._late[name]
-                known = max((at for at in late if at <= stamp), default=-1)
+                known = max((at for at in late if at < stamp), default=-1)
                 tick[name] = late[last] if last is not None else late.get(known)
             self._fire(stamp, tick)
 

@@ -1,0 +1,91 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes that die while the robot walks come back, or the gait stops and ``walk`` names them."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+pytest.importorskip('mujoco')
+
+import numpy as np
+import ros_processes
+from ros_processes import NodeProcess, Processes
+
+from dmp_cpg_ros.analysis.loading import load_recording
+from dmp_cpg_ros.analysis.motion import tilt
+
+processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
+
+RUN_S = 300.0
+"""How long a run may take on a loaded machine before the test gives up [s]."""
+
+AGAIN = 'all nodes are ready again'
+
+
+def walk(processes: Processes, folder: Path, duration_s: float, *arguments: str) -> NodeProcess:
+    scenario = folder / 'kills.yaml'
+    scenario.write_text(json.dumps({'name': 'kills', 'duration': duration_s, 'events': [
+        {'at': 0.3, 'command': {'v_x': 0.4}}]}), encoding='utf-8')
+    return processes.python('-m', 'dmp_cpg_ros', 'walk', str(scenario), '--no-report', '--out',
+                            str(folder / 'run'), *arguments)
+
+
+def send(process: NodeProcess, node: str, number: int) -> None:
+    """Send a signal to a node of a walk."""
+    for path in Path('/proc').glob('[0-9]*/cmdline'):
+        try:
+            words = path.read_text(encoding='utf-8').split('\0')
+        except OSError:
+            continue
+        if str(process.pid) in words and f'__node:={node}' in words:
+            os.kill(int(path.parent.name), number)
+            return
+    pytest.fail(f'{node} does not run:\n{process.output}')
+
+
+def test_in_lock_step_the_walk_goes_on_as_if_nobody_had_died(
+        processes: Processes, tmp_path: Path) -> None:
+    process = walk(processes, tmp_path, 6.0, '--lock-step', '--respawn')
+    process.wait_for_output(r's +walking', RUN_S)
+    dead = ('inhibition', 'canonical_oscillators', 'leg_transformation_fl')
+    for node in dead:
+        send(process, node, signal.SIGKILL)
+        process.wait_for_output(rf'{node} was ended by signal 9 \(SIGKILL\)', RUN_S)
+    process.wait_for_output(AGAIN, RUN_S)
+    assert process.wait(RUN_S) == 0, process
+    recording = load_recording(tmp_path / 'run')
+    stamps = np.unique(recording.joints.time)
+    assert np.allclose(np.diff(stamps), 0.004)
+    assert tilt(recording.odometry.quaternion).max() < 0.2
+    assert json.loads((tmp_path / 'run' / 'metrics.json').read_text(encoding='utf-8'))[
+        'gait']['phase_error_rad_max'] < 0.05
+
+
+@pytest.mark.parametrize('node', ['canonical_oscillators', 'inhibition'])
+def test_without_respawn_the_robot_comes_to_a_stand_and_walk_names_who_died(
+        processes: Processes, tmp_path: Path, node: str) -> None:
+    process = walk(processes, tmp_path, 60.0)
+    process.wait_for_output(r's +walking', RUN_S)
+    send(process, node, signal.SIGKILL)
+    assert process.wait(RUN_S) == 1, process
+    assert re.search(rf'walk: {node} was ended by signal 9 \(SIGKILL\)', process.output)
+    odometry = load_recording(tmp_path / 'run').odometry
+    assert tilt(odometry.quaternion).max() < 0.5
+    assert np.linalg.norm(odometry.velocity_in_base[-1]) < 0.05
+
+
+def test_a_node_that_hangs_is_named_and_the_run_has_failed(
+        processes: Processes, tmp_path: Path) -> None:
+    process = walk(processes, tmp_path, 2.0)
+    process.wait_for_output(r's +walking', RUN_S)
+    send(process, 'bag_recorder', signal.SIGSTOP)
+    assert process.wait(RUN_S) == 1, process
+    assert 'bag_recorder hung' in process.output
