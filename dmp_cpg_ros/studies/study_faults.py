@@ -158,7 +158,7 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
     outcome = Outcome(gait, lock_step, respawn)
     going = walk.said('walking') < inf
     for node in nodes if going else ():
-        time.sleep(rng.uniform(1.0, 5.0))
+        time.sleep(rng.uniform(2.0, 8.0))
         begin, pid = len(walk.lines), walk.pid_of(node)
         if not pid:
             break
@@ -171,7 +171,7 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
         ready = walk.said(READY, begin)
         told = [re.search(rf'^ *([\d.]+) s .*{FOLLOWS}', line) for line in walk.lines[begin:]]
         kill.back_s = min([ready, *(float(found[1]) for found in told if found)])
-        if ready == inf:
+        if ready == inf or (not lock_step and walk.said('walking', begin) == inf):
             break
     if respawn:
         time.sleep(rng.uniform(4.0, 6.0))
@@ -201,13 +201,15 @@ def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
     pace = np.interp(canonical.time, odometry.time, odometry.velocity_in_base[:, 0])
     well = (off <= LOCKED_PHASE_ERROR) & (pace > 0.5 * speed)
     turned = np.unwrap(own[:, 0])
-    for kill in outcome.kills if outcome.respawn else ():
+    following = [kill.time_s for kill in outcome.kills[1:]] + [inf]
+    for kill, following_s in zip(outcome.kills, following, strict=True):
         before = (canonical.time > kill.time_s - 1.0) & (canonical.time <= kill.time_s)
         if before.sum() > 1:
             way = np.ptp(turned[before]) / np.ptp(canonical.time[before])
             kill.period_s = 2.0 * np.pi / way if way > 0.0 else nan
         again = canonical.time[well & (canonical.time >= kill.back_s)]
-        kill.in_phase_s = float(again[0]) if len(again) else inf
+        # one that the next kill forestalled says nothing
+        kill.in_phase_s = float(again[0]) if len(again) and again[0] <= following_s else inf
 
 
 def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
