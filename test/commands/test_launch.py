@@ -30,7 +30,7 @@ from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, WALKING_NODES
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
 ARGUMENTS = {'parameters': '', 'robot': '', 'lock_step': '', 'namespace': '', 'record': 'false',
-             'processes': 'each', 'bag': 'bag'}
+             'processes': 'each', 'bag': 'bag', 'respawn': 'false'}
 
 UP_S = 90.0
 """How long nine processes may take to start and to find each other on a loaded machine [s]."""
@@ -98,6 +98,15 @@ def test_launched_nodes_are_those_of_the_table(launch_file: ModuleType) -> None:
     assert recording[-1].name == ROBOT and recording[-1].on_exit is not None
     sections = {name.rpartition('/')[2] for name in load_yaml(find_config('suite.yaml'))}
     assert sections - {'**'} <= {*WALKING_NODES, RECORDER}
+
+
+def test_all_but_the_robot_come_back_where_that_is_asked_for(launch_file: ModuleType) -> None:
+    for respawn in ('true', 'false'):
+        for shared in ('each', 'blocks'):
+            given = {**ARGUMENTS, 'respawn': respawn, 'processes': shared, 'record': 'true'}
+            *others, robot = launch_file.nodes(given)
+            assert {node.respawn for node in others} == {respawn == 'true'}
+            assert robot.on_exit is not None and not robot.respawn
 
 
 @pytest.mark.parametrize(('lock_step', 'namespace', 'shared'), [
