@@ -1,0 +1,130 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes whose partners fall silent notice it on the robot's clock, and promise nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import ros_processes
+from ros_processes import Ros
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
+from dmp_cpg_ros.nodes.inhibition import InhibitionNode
+from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
+from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
+from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
+from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
+from dmp_cpg_ros.suite import load_suite
+
+pytest.importorskip('mujoco')
+from dmp_cpg_ros.robot.model_reader import load_description
+
+ros, ros_domain = ros_processes.ros, ros_processes.ros_domain
+SUITE = load_suite(None, {'cmd_vel_timeout': 0.0})
+TICK = SUITE.tick_ns
+
+
+def walked(ticks: int) -> tuple[WalkingLoop, RobotState, Any]:
+    robot = PerfectTrackingRobot(load_description(SUITE.robot_file), TICK, 'standing')
+    loop = WalkingLoop(robot.description, SUITE.gait, SUITE.parameters)
+    state = robot.reset()
+    loop.command(0.5)
+    for _ in range(ticks):
+        before, tick = state, loop.tick(state)
+        state = robot.step(tick.targets)
+    return loop, before, tick
+
+
+def watching(ros: Ros, acting: Inhibition | None) -> tuple[InhibitionNode, int]:
+    """A node that is started while the robot walks, with what the oscillators tell."""
+    _, state, tick = walked(300)
+    node = InhibitionNode('inhibition', context=ros.context)
+    node.start()
+    if acting is not None:
+        node._find(acting)
+    for _ in range(30):
+        node.on_tick(state.time_ns, {'canonical_state': (tick.x, tick.x_dot, tick.gait),
+                                     'reference': tick.r, 'posture_feedback': 'standing'})
+    return node, state.time_ns
+
+
+RUNS = Inhibition(False, np.zeros(4), 0.3)
+
+
+def test_while_nothing_is_known_of_the_gait_no_time_to_rest_is_promised(ros: Ros) -> None:
+    node, now = watching(ros, RUNS)
+    assert not node._state.requested
+    told, answer = node._take_request(SetBool.Request(data=True))
+    assert told and 'at rest in' in answer
+    node._take_request(SetBool.Request(data=False))
+    node._watch(now + 200_000_000)
+    assert not node.health.has_problem('blind')
+    node._watch(now + 300_000_000)
+    assert node.health.has_problem('blind') and node._state.state == 'waiting'
+    for stop in (True, False):
+        told, answer = node._take_request(SetBool.Request(data=stop))
+        assert not told and 'from reference_filter' in answer and 'at rest in' not in answer
+    node._watch(now + 10_000_000_000)
+    assert node.health.has_problem('bound')
+    node.destroy_node()
+
+
+def test_a_restarted_node_keeps_a_stop_and_does_not_stop_a_gait(ros: Ros) -> None:
+    for acting in (RUNS, Inhibition(True, np.zeros(4), 0.3, automatic=False)):
+        node, _ = watching(ros, acting)
+        assert (node._state.requested, node._state.automatic) == (
+            acting.requested, acting.automatic)
+        node.destroy_node()
+    node, _ = watching(ros, None)  # nobody knows: only the service starts
+    assert node._state.requested and not node._state.automatic
+    node.destroy_node()
+
+
+def test_the_gait_stops_while_the_robot_looks_after_itself(ros: Ros) -> None:
+    node, _ = watching(ros, RUNS)
+    node._on_drive(String(data='stand'))
+    assert node._state.requested and node._state.automatic
+    told, answer = node._take_request(SetBool.Request(data=False))
+    assert not told and 'looking after itself' in answer
+    node.destroy_node()
+
+
+def test_reference_and_oscillators_stop_without_the_inhibition(ros: Ros) -> None:
+    reference = ReferenceFilter('reference_filter', context=ros.context)
+    canonical = CanonicalOscillators('canonical_oscillators', context=ros.context)
+    for node in (reference, canonical):
+        node.start()
+    for age, silent in ((SILENT_NS, False), (SILENT_NS + TICK, True)):
+        told = (0, RUNS)
+        reference.on_tick(age, {'joint_states': None, 'inhibition_gains': told})
+        canonical.on_tick(age, {'reference': np.zeros(3), 'inhibition_gains': told})
+        assert reference._requested == canonical._inhibition.requested == silent
+        assert canonical.health.has_problem('inhibition') == silent
+    told = (SILENT_NS + TICK, RUNS)
+    canonical.on_tick(SILENT_NS + 2 * TICK, {
+        'reference': np.zeros(3), 'inhibition_gains': told})
+    assert not canonical._inhibition.requested
+    for node in (reference, canonical):
+        node.destroy_node()
+
+
+def test_a_leg_without_feedback_of_the_posture_says_nothing(ros: Ros) -> None:
+    _, state, tick = walked(10)
+    leg, sent = LegTransformation('leg_transformation_fl', context=ros.context), []
+    leg.start()
+    leg._publisher.publish = sent.append  # type: ignore[method-assign]
+    for age, silent in ((15 * TICK, False), (16 * TICK, True), (TICK, False)):
+        sent.clear()
+        leg.on_tick(state.time_ns, {
+            'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r,
+            'posture_feedback': (state.time_ns - age, tick.feedback)})
+        assert bool(sent) != silent and leg.health.has_problem('feedback') == silent
+    leg.destroy_node()
