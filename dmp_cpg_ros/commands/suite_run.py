@@ -200,7 +200,6 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
                 player.begin()
                 watch.until(player.finished, math.inf)
                 player.finished.result()
-                return watch.unrecorded
             finally:
                 # In lock-step no time passes that nobody asks for: nothing can fall.
                 if not lock_step and player.time_ns > 0:
@@ -215,6 +214,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
                 say(math.nan, f'had to kill {", ".join(killed)}')
         if killed:
             raise SuiteError(f'{", ".join(killed)} hung: no answer at the end of the run')
+    return watch.unrecorded
 
 
 class _Watch:

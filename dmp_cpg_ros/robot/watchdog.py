@@ -211,4 +211,5 @@ class CommandWatchdog:
 
 def _share(time_ns: int, seconds: float, order: int = 0) -> float:
     """Share of a movement of least jerk that is done after a time [ns], or its derivative."""
-    return float(minimum_jerk(np.array(time_ns * 1e-9 / seconds), order))
+    s = min(max(time_ns * 1e-9 / seconds, 0.0), 1.0)
+    return 30.0 * (s * (1.0 - s)) ** 2 if order else float(minimum_jerk(np.array(s)))
