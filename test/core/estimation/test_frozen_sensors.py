@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -55,6 +57,17 @@ def test_what_repeats_while_the_robot_moves_is_missing(change: dict[str, slice],
     early = watched(change, ticks=FROZEN_NS // TICK_NS)
     assert getattr(early, usable) == expected[usable]
     assert getattr(watched(change, moving=False), usable) == expected[usable]
+
+
+def test_a_robot_without_noise_is_not_frozen() -> None:
+    """The stand-in with perfect tracking is level and shares its weight evenly."""
+    ideal = {'rate_in_base': np.array((0.0, 0.0, 0.3)), 'foot_force': np.full(4, 20.0),
+             'specific_force_in_base': np.array((0.1, 0.0, 9.81))}
+    watch = first_watch(replace(readings(0), **ideal))
+    for k in range(1, 40):
+        told = replace(readings(k), **ideal)
+        watch, passed = without_frozen(watch, told)
+        assert passed is told
 
 
 def test_joints_that_are_missing_stand_where_they_were_known_last() -> None:
