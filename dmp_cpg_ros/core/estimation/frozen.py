@@ -4,8 +4,8 @@
 
 What repeats to the last bit while the robot moves is no reading any more. Noise changes the last
 bits of every real one, but those of joints at rest: joints are judged while others move, and so is
-everything else; a stand-in that does not sway at all is not judged. No body changes its turn rate
-by ``JUMP`` from one tick to the next.
+everything else; contacts while the force of another one changes. No body changes its turn rate by
+``JUMP`` from one tick to the next.
 """
 
 from __future__ import annotations
@@ -76,10 +76,12 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
     watch = replace_unchecked(watch, imu_ns=now)
     rates, q = readings.joint_velocity, readings.joint_position
     repeated = q == last.joint_position
-    force = (readings.foot_force == last.foot_force) & (readings.foot_force != 0.0)
-    imu = bool(readings.rate_in_base[0] == last.rate_in_base[0])
-    gravity, level = readings.specific_force_in_base[2], not readings.rate_in_base[:2].any()
-    if level and gravity != 0.0 or not (imu or repeated.any() or force.any()):  # as it always is
+    loaded = (readings.foot_force != 0.0) & (last.foot_force != 0.0)
+    change = readings.foot_force - last.foot_force
+    force = loaded & (change == 0.0) & (loaded & (np.abs(change) > 0.0)).any()
+    # A simulated body may ride level, without any noise.
+    imu = bool(readings.rate_in_base[0] == last.rate_in_base[0] and readings.rate_in_base.all())
+    if not (imu or repeated.any() or force.any()):  # as it always is
         since = (-1,) * (1 + 2 * N)
         return SensorWatch(readings, since, q if all(readings.usable_legs) else _known(
             watch, readings), now), readings
