@@ -44,6 +44,7 @@ from dmp_cpg_ros.primitive_files import load_motion, load_primitive, save_primit
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.robot_file import own_robot_file
 from dmp_cpg_ros.suite import load_gaits, load_suite
+from dmp_cpg_ros.suite_table import POSTURE
 
 KINDS = ('scenario', 'suite', 'gaits', 'robot', 'mjcf', 'primitive', 'motion', 'numpy', 'csv',
          'mcap', 'sqlite', 'metadata', 'run', 'proof')
@@ -166,7 +167,7 @@ def make(folder: Path) -> Path:
     shutil.copytree(folder / 'mcap' / 'bag', folder / 'run' / 'run' / 'bag')
     write_json(folder / 'run' / 'run' / 'manifest.json', {
         'created': 'now', 'lock_step': True, 'scenario': 'x', 'seeds': {'robot': 0},
-        'parameters': {'posture_control': {'robot': 'robots/mini_quadruped.yaml', 'radius': 1.0,
+        'parameters': {POSTURE: {'robot': 'robots/mini_quadruped.yaml', 'radius': 1.0,
                                            'gait': 'amble', 'gaits_file': 'gaits.yaml',
                                            'inhibited_legs': ['fl'], 'terrain': 'flat'}}})
     write_json(folder / 'run' / 'run' / 'metrics.json', {'certificate': certificate})

@@ -49,13 +49,14 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.layouts import GAIN_ROWS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.messages.interfaces import TOPICS, Interface, interface
 from dmp_cpg_ros.nodes.messages.values import set_stamp
 from dmp_cpg_ros.studies.output import markdown_table
-from dmp_cpg_ros.suite_table import ROBOT, WALKING_NODES
+from dmp_cpg_ros.suite_table import POSTURE, ROBOT, WALKING_NODES
 
 NAME = 'intruder'
 """Its node; what ``/diagnostics`` must name."""
@@ -321,7 +322,7 @@ def _events(node: Intruder) -> None:
             ('alpha_r', ParameterValue(type=3, double_value=9.0)),
             ('rho', ParameterValue(type=3, double_value=1e300)),
             ('region_radius', ParameterValue(type=3, double_value=1.9))]
-    for owner in ('canonical_oscillators', 'reference_filter', 'inhibition'):
+    for owner in (core.CANONICAL, core.REFERENCE, core.INHIBITION):
         for name, value in lies:
             node.sent += 1
             publisher.publish(ParameterEvent(node=f'/{owner}', changed_parameters=[
@@ -381,8 +382,8 @@ ATTACKS: dict[str, Callable[[Intruder], None]] = {
        for name in ('canonical_state', 'joint_targets', 'joint_states')},
     'parameter events': _events,
     'transitions': _transitions,
-    '1,000 rho a second': _parameters('canonical_oscillators', 'rho'),
-    '1,000 friction a second': _parameters('posture_control', 'friction'),
+    '1,000 rho a second': _parameters(core.CANONICAL, 'rho'),
+    '1,000 friction a second': _parameters(POSTURE, 'friction'),
     'second robot': _second_robot,
 }
 """What the intruder does, by name."""
