@@ -21,7 +21,8 @@ DOCUMENT = Path(__file__).resolve().parents[2] / 'doc' / 'faults.md'
 def table() -> dict[tuple[str, str, str], str]:
     """Expected outcome of each cell, from the tables of the document."""
     found, gait, kinds = {}, '', []
-    for line in DOCUMENT.read_text(encoding='utf-8').split('## Failures')[1].splitlines():
+    text = DOCUMENT.read_text(encoding='utf-8').split('\n## Failures')[1].split('\n## ')[0]
+    for line in text.splitlines():
         cells = [cell.strip() for cell in line.strip('|').split('|')]
         if line.startswith('### '):
             gait = line[4:].split(' ')[0].lower()
