@@ -475,7 +475,7 @@ class SuiteNode(GuardedLifecycleNode):
             if information is None:  # as in _from_writers
                 message, information = message
             number = information['publication_sequence_number'] or 0
-            if number != former + 1 and former:
+            if number <= former:  # larger steps are losses
                 now_s, then_s = time.monotonic(), changed_s
                 changed_s = now_s
                 if now_s < then_s + SEVERAL_S:
