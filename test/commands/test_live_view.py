@@ -307,8 +307,7 @@ def test_a_view_that_ends_lets_go(client: Client, suite: Processes, ros: Ros) ->
     second.scene()
     assert second.address != client.address
     commands = heard(ros, 'cmd_vel')
-    second.send(velocity=[0.2, 0, 0])
-    ros.spin_until(lambda: commands)
+    ros.spin_until(lambda: second.send(velocity=[0.2, 0, 0])[0] and commands)
     second.process.signal(signal.SIGTERM)
     assert second.process.wait(PATIENCE_S) == 0, second.process
     ros.spin_until(lambda: commands[-1].linear.x == 0.0)
