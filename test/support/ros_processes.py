@@ -18,6 +18,7 @@ import sys
 import tempfile
 import threading
 import time
+import uuid
 from collections.abc import Callable, Iterator, Sequence
 from math import inf
 from pathlib import Path
@@ -37,6 +38,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 DEADLINE_S = 30.0
 """How long a condition may take before a test fails; a loaded machine is no failure."""
+
+MARK = 'DMP_CPG_ROS_TEST'
+"""Variable by which the processes of a test, and theirs, are known."""
 
 ASK_AGAIN_S = 3.0
 """Time after which a request that may be repeated is repeated."""
@@ -136,13 +140,15 @@ class Processes:
     def __init__(self, domain: int) -> None:
         self.domain = domain
         self._started: list[NodeProcess] = []
+        self._mark = uuid.uuid4().hex
 
     @property
     def environment(self) -> dict[str, str]:
         """Environment that keeps nodes in the domain and on this machine."""
         paths = [str(ROOT), *filter(None, [os.environ.get('PYTHONPATH')])]
         return {**os.environ, 'ROS_DOMAIN_ID': str(self.domain), 'PYTHONUNBUFFERED': '1',
-                'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'PYTHONPATH': os.pathsep.join(paths)}
+                'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'PYTHONPATH': os.pathsep.join(paths),
+                MARK: self._mark}
 
     def start(self, *command: str, **environment: str) -> NodeProcess:
         """Start any command."""
@@ -161,9 +167,25 @@ class Processes:
         return self.python('-m', 'dmp_cpg_ros', kind, '--ros-args', *ros_arguments, *given)
 
     def end(self) -> None:
-        """Kill what still runs."""
+        """Kill what still runs, and what that has started in sessions of its own.
+
+        A node whose ``walk`` was killed takes a moment to end, and has its name until then.
+        """
         for process in self._started:
             process.kill()
+        if self._started:
+            wait_until(lambda: not self._kill_the_marked(), what=lambda: 'the end of them all')
+
+    def _kill_the_marked(self) -> bool:
+        """Kill every process with this environment; whether there was one."""
+        mark, found = f'{MARK}={self._mark}'.encode(), False
+        for folder in Path('/proc').glob('[0-9]*'):
+            # Not ours, or gone; what has ended but is not yet waited for has an empty environment.
+            with contextlib.suppress(OSError):
+                if mark in (folder / 'environ').read_bytes().split(b'\0'):
+                    os.kill(int(folder.name), signal.SIGKILL)
+                    found = True
+        return found
 
 
 class Ros:
