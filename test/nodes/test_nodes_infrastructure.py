@@ -31,6 +31,7 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSCompatibility, ReliabilityPolicy, qos_check_compatible
 from rclpy.task import Future
@@ -336,6 +337,18 @@ def test_help_tells_everything_without_starting_ros() -> None:
 
 
 # Lifecycle -------------------------------------------------------------------------------------
+
+
+def test_a_node_that_is_destroyed_leaves_the_graph_though_python_still_knows_it(ros: Ros) -> None:
+    node = relay(ros, autostart=False)
+    other = Node('other', context=ros.context)
+    name = node.get_name()
+    ros.spin_until(lambda: name in other.get_node_names())
+    node.start()
+    node.destroy_node()
+    node.destroy_node()
+    ros.spin_until(lambda: name not in other.get_node_names())
+    other.destroy_node()
 
 
 def test_the_lifecycle_makes_and_destroys_the_topics(ros: Ros) -> None:

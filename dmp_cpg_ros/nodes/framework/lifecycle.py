@@ -110,6 +110,11 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
             if transition() != TransitionCallbackReturn.SUCCESS:
                 raise self.failure or RuntimeError(f'{self.get_name()} could not start')
 
+    def destroy_node(self) -> None:
+        """Destroy the node, and its state machine, which would keep it in the graph otherwise."""
+        self._state_machine.destroy_when_not_in_use()
+        super().destroy_node()
+
     def close(self) -> None:
         """End the node's work without transitions, at shutdown; safe to call twice."""
         try:
