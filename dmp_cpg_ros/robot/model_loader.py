@@ -20,9 +20,15 @@ _log = logging.getLogger(__name__)
 
 LONGEST_PHYSICS_STEP = 0.001  # [s] the joint drive runs at 1 kHz or faster
 
+USUAL_IMPRATIO = 100.0
+"""Of a model that says nothing, with elliptic cones. MuJoCo's defaults (pyramids and 1) let
+standing feet creep under their load, and leg odometry takes them for still (MuJoCo's
+documentation, "Preventing slip"; MuJoCo Menagerie's quadrupeds have this value)."""
+
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 _SKY = mujoco.mjtTexture.mjTEXTURE_SKYBOX
 _LOW, _HIGH = np.array((0.52, 0.56, 0.52, 1.0)), np.array((0.80, 0.76, 0.66, 1.0))
+_EVERY = 0x7FFFFFFF
 _CONTACT = ('friction', 'solref', 'solimp', 'condim', 'contype', 'conaffinity', 'priority',
             'solmix', 'margin', 'gap')
 
@@ -32,7 +38,8 @@ def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjMo
 
     A floor is added when the world body has neither plane nor height field, a light that follows
     the base when there is no light at all, and a sky when there is none. A physics step longer
-    than 1 ms is shortened to 1 ms, the rate of the joint drive.
+    than 1 ms is shortened to 1 ms, the rate of the joint drive. Friction cones and ``impratio``
+    that are both MuJoCo's defaults become elliptic and ``USUAL_IMPRATIO``.
 
     Parameters
     ----------
@@ -76,6 +83,8 @@ def load_model(path: Path, base: str, world: World | None = None) -> mujoco.MjMo
     if world is not None and world.friction > 0.0:  # MuJoCo takes the larger of two geoms'
         model.geom_friction[:, 0] = model.pair_friction[:, :2] = world.friction
     model.opt.timestep = min(model.opt.timestep, LONGEST_PHYSICS_STEP)
+    if model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and model.opt.impratio == 1.0:
+        model.opt.cone, model.opt.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, USUAL_IMPRATIO
     return model
 
 
@@ -85,8 +94,9 @@ def _add_floor(spec: mujoco.MjSpec) -> None:
                      rgb2=[0.70, 0.73, 0.76], width=512, height=512)
     material = spec.add_material(name='added_floor', texrepeat=[2, 2], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = 'added_floor'
+    # Every bit: what the model's defaults say is for its own shapes, and may be that none touch.
     spec.worldbody.add_geom(name='added_floor', type=_PLANE, size=[0.0, 0.0, 0.25],
-                            material='added_floor')
+                            material='added_floor', contype=_EVERY, conaffinity=_EVERY)
 
 
 def _add_world(spec: mujoco.MjSpec, world: World) -> None:

@@ -29,6 +29,10 @@ STANCE_LEG_SHARE = 0.7  # distance hip-foot over leg length when the model has n
 USUAL_VELOCITY_LIMIT = 30.0  # [rad/s] Unitree Go1's published figure, for models that say nothing
 GAIN_OVER_WEIGHT = 1.7  # kp / (m g L); gives 60 N m/rad for 9 kg and legs of 0.4 m
 DAMPING_TIME = 0.15  # kd / kp in units of sqrt(L / g)
+DAMPING_SHARE = 0.5
+"""Largest share kd dt/I of a joint's speed that the drive's damping takes away in a physics step.
+Torque is held for the step, so that speed is multiplied by 1 - kd dt/I: above 1 it changes its
+sign at every step and the joint chatters, above 2 it grows."""
 _PLACE_OF_LEG = {'fl': (1, 1), 'fr': (1, -1), 'rl': (-1, 1), 'rr': (-1, -1)}  # signs of x, y
 
 BISECTIONS = 30
@@ -84,18 +88,39 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
                                 for leg in legs]))
     mass = float(model.body_subtreemass[ids.base])
     kp = file.kp or (GAIN_OVER_WEIGHT * mass * GRAVITY * leg_length,) * 3
-    kd = file.kd or tuple(DAMPING_TIME * np.sqrt(leg_length / GRAVITY) * gain for gain in kp)
     description = RobotDescription(
         name=file.model.stem, legs=legs, mass=mass, base_inertia=np.zeros((3, 3)),
-        com_in_base=np.zeros(3), kp=np.array(kp), kd=np.array(kd),
+        com_in_base=np.zeros(3), kp=np.array(kp), kd=np.zeros(3),
         stance_height=file.stance_height or _stance_height(model, ids, legs, leg_length, home),
         belly_depth=_belly_depth(model, ids.base, at_zero))
     standing = pose(model, ids, home_joint_position(description))
     com, inertia = _composite_inertia(model, standing, ids.base)
+    kd = _damping(model, standing, ids, file, DAMPING_TIME * np.sqrt(leg_length / GRAVITY)
+                  * description.kp)
     radius = _rolling_radius(model, standing, ids)
     if radius is not None:
         legs = tuple(replace(leg, foot_radius=radius) for leg in legs)
-    return replace(description, legs=legs, base_inertia=inertia, com_in_base=com)
+    return replace(description, legs=legs, base_inertia=inertia, com_in_base=com, kd=kd)
+
+
+def _damping(model: mujoco.MjModel, standing: mujoco.MjData, ids: ModelIds, file: RobotFile,
+             usual: Array) -> Array:
+    """Damping (3,) of the drive [N m s/rad]: the file's, or the usual one, less where it would
+    stop a joint of a swinging leg within a physics step; I = 1/(M⁻¹)_jj, the least of four legs.
+    """
+    inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_crb(model, standing)
+    mujoco.mj_fullM(model, standing, inertia)
+    free = 1.0 / np.diag(np.linalg.inv(inertia))[model.jnt_dofadr[ids.joints]].reshape(4, 3)
+    stopping = free.min(axis=0) / model.opt.timestep
+    if file.kd is None:
+        return np.minimum(usual, DAMPING_SHARE * stopping)
+    if (np.array(file.kd) >= 2.0 * stopping).any():
+        raise ParameterError(
+            f'kd = {list(file.kd)} N m s/rad makes joints swing ever faster: with physics steps '
+            f"of {model.opt.timestep * 1e3:g} ms and this robot's legs it must be less than "
+            f'{(2.0 * stopping).round(2).tolist()}')
+    return np.array(file.kd)
 
 
 def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, index: int,

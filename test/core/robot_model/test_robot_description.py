@@ -14,11 +14,12 @@ from checkout import ROOT
 
 from dmp_cpg_ros.core.errors import DataError, MissingFileError, ParameterError
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
-from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.robot.model_loader import load_model
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.robot.model_loader import USUAL_IMPRATIO, load_model
 from dmp_cpg_ros.robot.model_parts import find_ids, foot_position
 from dmp_cpg_ros.robot.model_reader import load_description, pose, read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
+from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
@@ -242,3 +243,55 @@ def test_a_model_without_ground_gets_a_floor(tmp_path):
     file = own_variant(tmp_path, (r'(?s)<geom name="floor".*?/>', ''))
     model = load_model(file.model, file.base)
     assert (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).sum() == 1
+
+
+NO_FLOOR = (r'(?s)<geom name="floor".*?/>', '')
+
+
+@pytest.mark.parametrize('bits', [0, 1, 2])
+def test_every_foot_touches_the_floor_that_is_added(tmp_path, bits):
+    """Whatever the model's defaults say of its own shapes' contact bits."""
+    default = '<default><geom contype="0" conaffinity="0"/><default class="mini"><geom contype='
+    file = own_variant(
+        tmp_path, NO_FLOOR, (r'conaffinity="0" fric', f'conaffinity="{2 * (bits == 0)}" fric'),
+        (r'<default>\s*<default class="mini">\s*<geom contype="1" ', f'{default}"{bits}" '))
+    robot = MujocoRobot(file)
+    state = robot.reset()
+    for _ in range(5):
+        state = robot.step(JointTargets(state.joint_position, np.zeros(12), np.zeros(12)))
+    assert (state.foot_force > 1.0).all()
+
+
+def test_contacts_of_a_model_that_says_nothing_do_not_creep(tmp_path):
+    said = r'cone="elliptic" impratio="10"'
+    silent = own_variant(tmp_path, (said, ''))
+    option = load_model(silent.model, silent.base).opt
+    assert (option.cone, option.impratio) == (mujoco.mjtCone.mjCONE_ELLIPTIC, USUAL_IMPRATIO)
+    file = own_variant(tmp_path, (said, 'cone="pyramidal" impratio="5"'))
+    option = load_model(file.model, file.base).opt
+    assert (option.cone, option.impratio) == (mujoco.mjtCone.mjCONE_PYRAMIDAL, 5.0)
+
+
+def test_the_drive_stops_no_joint_within_a_physics_step(file):
+    """Swinging legs: in the air, torque is held for a step; speed must not change its sign."""
+    model = load_model(file.model, file.base)
+    model.opt.gravity[:] = 0.0
+    description, ids = read_description(model, file), find_ids(model, file)
+    dof, kd = model.jnt_dofadr[ids.joints], np.tile(description.kd, 4)
+    for i in range(12):
+        data = pose(model, ids, home_joint_position(description))
+        data.qpos[ids.base_qpos + 2] = 10.0
+        data.qvel[dof[i]] = 1.0
+        data.qfrc_applied[dof[i]] = -kd[i]
+        mujoco.mj_step(model, data)
+        assert 0.4 < data.qvel[dof[i]] < 1.0
+
+
+def test_damping_that_makes_the_joints_swing_is_refused_and_lighter_legs_get_less(tmp_path):
+    usual = read(replace(own_robot_file(), kd=None)).kd
+    with pytest.raises(ParameterError, match=r'kd = .* must be less than \[[0-9]'):
+        read(replace(own_robot_file(), kd=(1.8, 1.8, 13.0)))
+    light = own_variant(tmp_path, (r'armature="0.00548408"', 'armature="0"'))
+    kd = read(replace(light, kd=None)).kd
+    np.testing.assert_allclose(kd[:2], usual[:2])
+    assert 0.0 < kd[2] < 0.8 * usual[2]
