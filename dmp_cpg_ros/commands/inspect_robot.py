@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``inspect_robot``: from an MJCF to the robot file with which it walks, and a picture."""
+"""``inspect_robot``: from an MJCF to the robot file with which it walks, its URDF, a picture."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add('model', metavar='FILE.xml', type=Path, help='MJCF file')
     add('--output', metavar='FILE.yaml', type=Path,
         help='where to write the robot file (default: print it)')
+    add('--urdf', metavar='FILE.urdf', type=Path, help='write the robot as URDF too')
     add('--picture', metavar='FILE.png', type=Path, help='draw the robot with its legs in colours')
     return run_command(parser, arguments, _inspect)
 
@@ -34,6 +35,10 @@ def _inspect(options: argparse.Namespace, _: RosArguments) -> int:
         print(robot_yaml(found), end='')
     else:
         options.output.write_text(robot_yaml(found, options.output.parent), encoding='utf-8')
+    if options.urdf is not None:
+        from dmp_cpg_ros.robot.urdf import urdf
+
+        options.urdf.write_text(urdf(found.file), encoding='utf-8')
     if options.picture is not None:
         from matplotlib import image
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rosgraph_msgs.msg import Clock
@@ -36,6 +37,7 @@ from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
 from dmp_cpg_ros.robot.robot_file import load_robot_file
+from dmp_cpg_ros.robot.urdf import urdf
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT
 
@@ -88,6 +90,7 @@ class MujocoRobotNode(SuiteNode):
         self._arrived: dict[str, int] = {}
         work = () if self._state.joint_work is None else ('joint_work',)
         self._state_publishers = {name: self.publisher(name) for name in (*work, *STATE_TOPICS)}
+        self.publisher('robot_description').publish(String(data=urdf(self._file)))
         self._drive_mode, self._drive_publisher = '', self.publisher('drive_mode')
         self.listen('joint_targets', self._on_targets)
         self.listen('body_mode', self._on_body_mode)
@@ -365,8 +368,12 @@ class MujocoRobotNode(SuiteNode):
         return CommandWatchdog(
             self._robot.description, round(self._options.target_timeout * 1e9))
 
+    @property
+    def _file(self) -> Path:
+        return find_config(self.parameters_of(core.RobotFileParameters).robot)
+
     def _make_robot(self) -> Robot:
-        p, file = self._options, find_config(self.parameters_of(core.RobotFileParameters).robot)
+        p, file = self._options, self._file
         world = core.chosen_world(self.parameters_of(WorldParameters), p)
         if p.physics == 'perfect_tracking':
             return PerfectTrackingRobot(load_description(file), self._tick_ns, p.start_pose)

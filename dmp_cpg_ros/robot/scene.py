@@ -94,21 +94,15 @@ class Scene:
     def _shown(self) -> list[int]:
         model = self._model
         return [geom for geom in range(model.ngeom) if model.geom_group[geom] < SHOWN_GROUPS
-                and self._kind(geom) and self._colour(geom)[3] > 0.0]
-
-    def _colour(self, geom: int) -> NDArray[np.float64]:
-        """Red, green, blue, opacity; a material's colour holds where the shape has the default."""
-        model, material = self._model, self._model.geom_matid[geom]
-        own = model.geom_rgba[geom]
-        given = material < 0 or not np.allclose(own, (0.5, 0.5, 0.5, 1.0))
-        return np.asarray(own if given else model.mat_rgba[material], dtype=float)
+                and self._kind(geom) and geom_colour(model, geom)[3] > 0.0]
 
     def _shape(self, geom: int) -> dict[str, Any]:
         model, material = self._model, self._model.geom_matid[geom]
         return {
             'body': int(model.geom_bodyid[geom]), 'kind': self._kind(geom),
             'size': model.geom_size[geom].tolist(), 'place': model.geom_pos[geom].tolist(),
-            'quaternion': model.geom_quat[geom].tolist(), 'colour': self._colour(geom).tolist(),
+            'quaternion': model.geom_quat[geom].tolist(),
+            'colour': geom_colour(model, geom).tolist(),
             'glow': float(model.mat_emission[material]) if material >= 0 else 0.0,
             'mesh': int(model.geom_dataid[geom])}
 
@@ -119,6 +113,13 @@ class Scene:
         corners = model.mesh_vert[corner:corner + model.mesh_vertnum[mesh]]
         faces = model.mesh_face[face:face + model.mesh_facenum[mesh]]
         return {'corners': _text(corners.astype('<f4')), 'faces': _text(faces.astype('<i4'))}
+
+
+def geom_colour(model: mujoco.MjModel, geom: int) -> NDArray[np.float64]:
+    """Red, green, blue, opacity; a material's colour holds where the shape has the default."""
+    own, material = model.geom_rgba[geom], model.geom_matid[geom]
+    given = material < 0 or not np.allclose(own, (0.5, 0.5, 0.5, 1.0))
+    return np.asarray(own if given else model.mat_rgba[material], dtype=float)
 
 
 def _text(numbers: NDArray[Any]) -> str:
