@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib import image
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
@@ -22,7 +21,6 @@ from dmp_cpg_ros.analysis.episodes import MOVING, requested_stops, steady_segmen
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import held, roll_pitch_yaw, stretches
 from dmp_cpg_ros.analysis.recording import Array, Recording
-from dmp_cpg_ros.analysis.report import render, write_figures
 from dmp_cpg_ros.analysis.strict_json import plain, write_json
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -98,6 +96,8 @@ def write_pictures(recording: Recording, context: RunContext, folder: Path, draw
         File and caption by name; empty without pictures.
     """
     chosen = moments(recording, context)
+    from matplotlib import image
+
     if not (recording.joints.time.size and recording.odometry.time.size and chosen):
         return {}
     poses = [_pose(recording, moment.time, context.world.is_flat) for moment in chosen]
@@ -198,6 +198,8 @@ def write_results(
     write_json(folder / 'manifest.json', facts)
     if not report:
         return RunResults(folder, metrics, facts)
+    from dmp_cpg_ros.analysis.report import render, write_figures
+
     figures = write_figures(recording, context, folder / 'figures')
     pictures = {} if draw is None else write_pictures(recording, context, folder / 'figures', draw)
     page = folder / 'report.html'

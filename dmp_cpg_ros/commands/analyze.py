@@ -13,9 +13,9 @@ from typing import Any
 
 from dmp_cpg_ros.analysis.bag import find_bag, payload_digests
 from dmp_cpg_ros.analysis.context import find_parameter
+from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.manifest import build_manifest
-from dmp_cpg_ros.analysis.report import facts
 from dmp_cpg_ros.analysis.run import RunResults, write_results
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.commands.run_folder import picture_taker, read_json, run_context

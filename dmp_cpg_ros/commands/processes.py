@@ -37,9 +37,9 @@ class ProcessGroup:
 
     def start(self, name: str, module: str, arguments: Sequence[str], *,
               logged: bool = True) -> None:
-        """Run ``python -m module arguments`` in a session of its own, so that Ctrl-C reaches
-        this process only; it ends with this process. What is not logged is written where this
-        process writes.
+        """Run ``python -m module arguments`` with this copy of the package, in a session of its
+        own so that Ctrl-C reaches this process only; it ends with this process. What is not logged
+        is written where this process writes.
         """
         self._commands[name] = module, arguments
         # Matrices of a few rows: threads of the algebra library would only contend for the cores.
@@ -47,7 +47,7 @@ class ProcessGroup:
         with open(self._logs / f'{name}.log' if logged else os.devnull, 'ab') as log:
             output = log if logged else None
             self._processes[name] = subprocess.Popen(
-                [sys.executable, '-m', __name__, str(os.getpid()), module, *arguments],
+                [sys.executable, __file__, str(os.getpid()), module, *arguments],
                 stdin=subprocess.DEVNULL, stdout=output,
                 stderr=subprocess.STDOUT if logged else None,
                 start_new_session=True, env=environment)
@@ -112,5 +112,6 @@ def end_with(parent: int) -> None:
 
 if __name__ == '__main__':
     end_with(int(sys.argv[1]))
+    sys.path[0] = str(Path(__file__).parents[2])  # and not what lies in the working folder
     del sys.argv[:2]
     runpy.run_module(sys.argv[0], run_name='__main__', alter_sys=True)

@@ -13,12 +13,11 @@ import json
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from dmp_cpg_ros.analysis.context import RunContext, find_parameter
-from dmp_cpg_ros.analysis.run import Draw
 from dmp_cpg_ros.configuration import find_config, first_free
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
@@ -27,6 +26,9 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
 from dmp_cpg_ros.suite import load_gait, load_gaits, node_sets
 from dmp_cpg_ros.suite_table import RECORDER, instances
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.analysis.run import Draw
 
 _log = logging.getLogger(__name__)
 

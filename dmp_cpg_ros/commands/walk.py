@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dmp_cpg_ros.commands import film, ros_arguments, run_folder
-from dmp_cpg_ros.commands.analyze import analyze_run, print_facts
+from dmp_cpg_ros.commands import ros_arguments, run_folder
 from dmp_cpg_ros.commands.certify import running_parameters
 from dmp_cpg_ros.configuration import (
     config_folders,
@@ -119,6 +118,8 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
             f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
             'proposes gains that hold; --set allow_uncertified:=true walks all the same)')
     if options.video:
+        from dmp_cpg_ros.commands import film
+
         film.checked_film_path(Path(options.video))
     return _Plan(scenario, suite, certificate, overrides, options, ros)
 
@@ -201,6 +202,9 @@ def _run(plan: _Plan, folder: Path) -> int:
 
 def _analyze(plan: _Plan, folder: Path) -> int:
     """Write the run's folder and print what it says; returns the exit status."""
+    # Late: figures and films cost a second of imports, which who is refused need not wait for.
+    from dmp_cpg_ros.commands.analyze import analyze_run, print_facts
+
     lock_step = plan.options.lock_step
     try:
         results = analyze_run(
@@ -221,6 +225,8 @@ def _analyze(plan: _Plan, folder: Path) -> int:
 
 def _film(folder: Path, given: str) -> None:
     """Film the run; one that cannot be drawn here is no failure of the run."""
+    from dmp_cpg_ros.commands import film
+
     path = Path(given) if given else folder / f'walk.{"mp4" if film.has_encoder() else "gif"}'
     try:
         print(f'video: {os.path.relpath(path)}, {film.film_run(folder, path)} frames')

@@ -20,10 +20,10 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from synthetic_bag import STORE, WALL_PER_ROBOT, make, write_bag
 from synthetic_walk import SyntheticWalk
 
+from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.recording import JointSeries, Recording, StatusEvent
-from dmp_cpg_ros.analysis.report import facts
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.layouts import OSCILLATOR_ROWS

@@ -13,6 +13,7 @@ import pytest
 from synthetic_walk import BELIEVED, MASS, SyntheticWalk, robot
 
 from dmp_cpg_ros.analysis.context import RunContext
+from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import feet_in_base, foot_slip, rotations, shank_rate_in_base
 from dmp_cpg_ros.analysis.recording import (
@@ -23,7 +24,6 @@ from dmp_cpg_ros.analysis.recording import (
     StatusEvent,
     WorkSeries,
 )
-from dmp_cpg_ros.analysis.report import facts
 from dmp_cpg_ros.analysis.strict_json import to_json
 
 

@@ -19,11 +19,12 @@ from synthetic_walk import SyntheticWalk, robot
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import planned_stance
+from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
-from dmp_cpg_ros.analysis.report import CATALOGUE, facts, flattened, label, write_figures
+from dmp_cpg_ros.analysis.report import CATALOGUE, flattened, label, write_figures
 from dmp_cpg_ros.analysis.run import RunResults, moments, write_pictures, write_results
 from dmp_cpg_ros.commands.analyze import analyze_run, main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT

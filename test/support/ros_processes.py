@@ -32,9 +32,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
 
+from dmp_cpg_ros import __file__ as package
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 
-ROOT = Path(__file__).resolve().parents[2]
+TESTS, PACKAGES = (str(Path(file).resolve().parents[1]) for file in (__file__, package))
+"""Where processes run, and where they find the package: the same that the tests import."""
 
 DEADLINE_S = 30.0
 """How long a condition may take before a test fails; a loaded machine is no failure."""
@@ -60,7 +62,7 @@ class NodeProcess:
     def __init__(self, command: Sequence[str], environment: dict[str, str]) -> None:
         self.command = list(command)
         self._process = subprocess.Popen(self.command, env=environment, stdout=subprocess.PIPE,
-                                         stderr=subprocess.STDOUT, text=True, cwd=ROOT,
+                                         stderr=subprocess.STDOUT, text=True, cwd=TESTS,
                                          start_new_session=True)
         self._lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -145,7 +147,7 @@ class Processes:
     @property
     def environment(self) -> dict[str, str]:
         """Environment that keeps nodes in the domain and on this machine."""
-        paths = [str(ROOT), *filter(None, [os.environ.get('PYTHONPATH')])]
+        paths = [PACKAGES, *filter(None, [os.environ.get('PYTHONPATH')])]
         return {**os.environ, 'ROS_DOMAIN_ID': str(self.domain), 'PYTHONUNBUFFERED': '1',
                 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'PYTHONPATH': os.pathsep.join(paths),
                 MARK: self._mark}

@@ -21,6 +21,7 @@ import traceback
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import rclpy
 from rclpy.context import Context
@@ -37,8 +38,10 @@ from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.nodes.framework.claims import claim
 from dmp_cpg_ros.nodes.framework.parameters import BATCH, NodeParameters, help_text
-from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.suite_table import KINDS
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 
 PROFILE = 'fastdds.xml'
 """Profile of Fast DDS in the config folder; it says why it is there."""
