@@ -151,26 +151,24 @@ def test_a_walk_reads_the_sections_of_its_namespace(processes: Processes, tmp_pa
     assert 'nodes /inhibition' in outside.output, outside
 
 
-@pytest.mark.parametrize('options', [
-    ('--lock-step', '--no-report'), ('--lock-step', '--composed', '--no-report'), ('--composed',)])
-def test_a_walk_in_a_namespace_is_the_walk_without(
-        processes: Processes, tmp_path: Path, options: tuple[str, ...]) -> None:
-    brief = scenario(tmp_path, 0.6)
-    runs = {}
-    for namespace, given in (('', ()), (
-            '/robot1', ('--ros-args', '-r', '__ns:=/robot1', '-p', 'seed:=0'))):
-        out = tmp_path / f'run{namespace.strip("/")}'
+def test_a_walk_in_a_namespace_is_the_walk_without(processes: Processes, tmp_path: Path) -> None:
+    brief, digests = scenario(tmp_path, 0.6), []
+    lock_step, composed = ('--lock-step', '--no-report'), ('--composed',)
+    inside = ('--ros-args', '-r', '__ns:=/robot1', '-p', 'seed:=0')
+    for number, (options, given) in enumerate([
+            (lock_step + composed, ()), (lock_step + composed, inside), (lock_step, inside),
+            (composed, inside)]):
+        out = tmp_path / str(number)
         process = walk(processes, brief, '--out', str(out), *options, *given)
         assert process.wait(RUN_S) == 0, process
         assert 'deprecated' not in process.output
         recording = load_recording(out / 'bag')
         assert len(recording.joints.time) >= 149
-        assert recording.counts[f'{namespace}/clock'] > 1
+        assert recording.counts['/robot1/clock' if given else '/clock'] > 1
         assert (out / 'metrics.json').is_file()
         assert (out / 'report.html').is_file() == ('--no-report' not in options)
-        runs[namespace] = payload_digests(out / 'bag')
-    if '--lock-step' in options:
-        assert runs[''] == runs['/robot1'] and len(runs['']) == 6
+        digests += [payload_digests(out / 'bag')] if '--lock-step' in options else []
+    assert digests[0] == digests[1] == digests[2] and len(digests[0]) == 6
 
 
 # Ending ------------------------------------------------------------------------------------------

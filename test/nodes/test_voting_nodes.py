@@ -76,7 +76,7 @@ def test_one_vote_does_not_stop_the_nodes_and_three_do(
     scenario, out = tmp_path / 'votes.yaml', tmp_path / 'run'
     scenario.write_text(SCENARIO, encoding='utf-8')
     process = processes.python('-m', 'dmp_cpg_ros.commands.walk', str(scenario), '--lock-step',
-                               '--processes', 'blocks', '--no-report', '--out', str(out))
+                               '--composed', '--no-report', '--out', str(out))
     assert process.wait(RUN_S) == 0, process
     recording, ticks = load_recording(out / 'bag'), plain_run(scenario)
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])

@@ -85,7 +85,7 @@ def plain_run(scenario_file: Path) -> tuple[list[RobotState], list[Any]]:
 def test_services_act_at_their_ticks_and_nodes_agree_with_the_plain_loop_bit_for_bit(
     processes: Processes, tmp_path: Path
 ) -> None:
-    process = start(processes, UP_AND_DOWN, tmp_path, '--lock-step')
+    process = start(processes, UP_AND_DOWN, tmp_path, '--lock-step', '--processes', 'blocks')
     assert process.wait(RUN_S) == 0, process
     assert 'lie_down: lying' in process.output
     recording = load_recording(tmp_path / 'run' / 'bag')
@@ -106,7 +106,7 @@ def test_services_act_at_their_ticks_and_nodes_agree_with_the_plain_loop_bit_for
 def test_the_gait_does_not_start_while_the_robot_lies_and_the_reason_is_said(
     processes: Processes, tmp_path: Path
 ) -> None:
-    process = start(processes, TOO_EARLY, tmp_path, '--lock-step')
+    process = start(processes, TOO_EARLY, tmp_path, '--lock-step', '--composed')
     assert process.wait(RUN_S) == 1
     assert 'the gait cannot start: the robot is lying, not standing; call stand_up' in (
         process.output)

@@ -185,6 +185,8 @@ def test_contacts_reach_the_nodes_at_the_tick_at_which_they_are_measured(
         scenario,
         tmp_path / 'run',
         '--lock-step',
+        '--processes',
+        'blocks',
         *(word for option in options for word in ('--set', option)),
     )
     recording, (_, ticks) = load_recording(run / 'bag'), plain_run(scenario, **values)
@@ -231,7 +233,7 @@ def test_a_dead_node_ends_the_run_and_is_named(
 def test_ctrl_c_ends_the_run_with_a_readable_bag(
     processes: Processes, scenario: Path, tmp_path: Path
 ) -> None:
-    process = start_walk(processes, scenario, tmp_path / 'run', '--lock-step')
+    process = start_walk(processes, scenario, tmp_path / 'run', '--lock-step', '--composed')
     process.wait_for_output('walking', RUN_S)
     process.interrupt()
     process.wait_for_output('making the report, which a second Ctrl-C skips', RUN_S)

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -172,7 +173,8 @@ def read_odom(message: Odometry) -> BaseMotion:
     pose, twist = message.pose.pose, message.twist.twist
     q = pose.orientation
     quaternion = np.array((q.x, q.y, q.z, q.w))
-    if not abs(quaternion.dot(quaternion) - 1.0) < 0.01:
+    norm = hypot(q.x, q.y, q.z, q.w)
+    if not abs(norm * norm - 1.0) < 0.01:
         raise DataError(f'quaternion {quaternion} must have length 1')
     position, velocity, rate = (
         checked(np.array((vector.x, vector.y, vector.z)), what) for vector, what in (
