@@ -12,7 +12,6 @@ import argparse
 import json
 import queue
 import secrets
-import signal
 import sys
 import threading
 import time
@@ -27,14 +26,11 @@ import rclpy
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.callback_groups import CallbackGroup
-from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.commands.suite_client import SuiteClient
+from dmp_cpg_ros.commands.suite_client import SuiteClient, connected, prepared
 from dmp_cpg_ros.commands.view_server import Frames, ViewServer
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core import suite_parameters as core
@@ -47,7 +43,7 @@ from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.parameters import Parameters, shown
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware, schedule
+from dmp_cpg_ros.nodes.framework.execution import schedule
 from dmp_cpg_ros.nodes.framework.parameters import (
     BATCH,
     LockStepParameters,
@@ -366,13 +362,8 @@ def _rounded(values: Any) -> Any:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(remove_ros_args(arguments))
-    if options.namespace is not None:
-        arguments += ['--ros-args', '-r', f'__ns:=/{options.namespace.strip("/")}']
-    prepare_middleware()
+    options, words = prepared(_parser(), arguments)
     schedule(BATCH)  # the robot's ticks come first
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     scene, frames = [b''], Frames()
     views: list[LiveView] = []
 
@@ -386,9 +377,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                             options.port)
         threading.Thread(target=server.serve_forever, daemon=True).start()
         print(f'live view: {server.address}', flush=True)
-        rclpy.init(args=['live_view', *arguments], signal_handler_options=SignalHandlerOptions.NO)
-        node = Node('live_view', enable_rosout=False, start_parameter_services=False)
-        views.append(LiveView(SuiteClient(node, options.wait)))
+        views.append(LiveView(connected('live_view', words, options.wait)))
         scene[0] = views[0].scene
         views[0].run(frames)
     except (DmpCpgError, OSError, RuntimeError) as error:

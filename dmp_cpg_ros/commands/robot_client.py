@@ -22,17 +22,20 @@ import rclpy
 import yaml
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
-from rclpy.node import Node
 from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
-from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.commands.suite_client import ClientError, SuiteClient, deliver, velocity_command
+from dmp_cpg_ros.commands.suite_client import (
+    ClientError,
+    SuiteClient,
+    connected,
+    deliver,
+    prepared,
+    velocity_command,
+)
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
@@ -63,18 +66,9 @@ space: inhibit or resume; u: stand up, l: lie down, r: recover; q: quit
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(remove_ros_args(arguments))
-    if options.namespace is not None:
-        arguments += ['--ros-args', '-r', f'__ns:=/{options.namespace.strip("/")}']
-    prepare_middleware()
-    # Ends like Ctrl-C, so that the last command is zero and the terminal is as it was.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        rclpy.init(args=['robot_client', *arguments],
-                   signal_handler_options=SignalHandlerOptions.NO)
-        node = Node('robot_client', enable_rosout=False, start_parameter_services=False)
-        options.run(SuiteClient(node, options.wait), options)
+    options, words = prepared(_parser(), arguments)
+    try:  # the last command is zero and the terminal is as it was, whatever ends it
+        options.run(connected('robot_client', words, options.wait), options)
     except (DmpCpgError, RuntimeError) as error:
         print(f'robot_client: {error}', file=sys.stderr)
         return BAD_INPUT if isinstance(error, ParameterError) else FAILED

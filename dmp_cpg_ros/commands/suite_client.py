@@ -4,21 +4,28 @@
 
 from __future__ import annotations
 
+import argparse
 import math
+import signal
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import rclpy
 from rclpy.client import Client
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, Interface, interface
 
 ASK_AGAIN_S = 0.3
@@ -135,6 +142,26 @@ class SuiteClient:
         raise ClientError(
             f'no suite answers in ROS domain {node.context.get_domain_id()}{hint}: nobody offers '
             f'{service}; start one with walk, such as: walk stand_by.yaml')
+
+
+def prepared(parser: argparse.ArgumentParser, arguments: Sequence[str] | None
+             ) -> tuple[argparse.Namespace, list[str]]:
+    """Options of a client's command line, and its words for ROS with the option ``namespace``;
+    from now on SIGTERM ends as Ctrl-C does.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    options = parser.parse_args(remove_ros_args(words))
+    if options.namespace is not None:
+        words += ['--ros-args', '-r', f'__ns:=/{options.namespace.strip("/")}']
+    prepare_middleware()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    return options, words
+
+
+def connected(name: str, words: Sequence[str], wait_s: float) -> SuiteClient:
+    """Begin with ROS, as a node that looks for the suite so long [s]."""
+    rclpy.init(args=[name, *words], signal_handler_options=SignalHandlerOptions.NO)
+    return SuiteClient(Node(name, enable_rosout=False, start_parameter_services=False), wait_s)
 
 
 @contextmanager

@@ -112,6 +112,24 @@ class AcknowledgedTopic:
             then()
 
 
+def ask(client: Any, request: Any, done: Callable[[bool, str], None]) -> None:
+    """Call a service, of a node's parameters or another one; ``done`` is told whether it agrees,
+    and in which words.
+    """
+
+    def answered(future: Future) -> None:
+        answer = future.result()
+        result = getattr(answer, 'result', answer)
+        if result is None:
+            done(False, 'no answer')
+        elif result is answer:
+            done(result.success, result.message)
+        else:
+            done(result.successful, result.reason)
+
+    client.call_async(request).add_done_callback(answered)
+
+
 class ParameterSetter:
     """Calls the nodes' own parameter services, as ``ros2 param set`` does.
 
@@ -149,14 +167,13 @@ class ParameterSetter:
         request = SetParametersAtomically.Request(parameters=[
             Parameter(name, value=value).to_parameter_msg() for name, value in wanted.items()])
 
-        def answered(future: Future) -> None:
-            answer = future.result()
-            if answer is None or not answer.result.successful:
-                done('no answer' if answer is None else answer.result.reason)
-                return
-            self._await([node for node in CHANGEABLE if node != owner], wanted, done)
+        def answered(agreed: bool, reason: str) -> None:
+            if agreed:
+                self._await([node for node in CHANGEABLE if node != owner], wanted, done)
+            else:
+                done(reason)
 
-        self._setters[owner].call_async(request).add_done_callback(answered)
+        ask(self._setters[owner], request, answered)
 
     def _await(self, followers: list[str], wanted: Mapping[str, Any],
                done: Callable[[str], None]) -> None:
@@ -356,17 +373,19 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
     def _ask(self, service: str, stop: bool) -> None:
         request = SetBool.Request(data=stop) if service == 'inhibit' else Trigger.Request()
 
-        def answered(future: Future) -> None:
-            answer = future.result()
-            if answer is None or not answer.success:
-                reason = 'no answer' if answer is None else answer.message
-                if not self.finished.done():
-                    self.finished.set_exception(PlayerError(f'service {service}: {reason}'))
-                return
-            self._say(self.time_ns * 1e-9, f'  {service}: {answer.message}')
-            self._delivered()
+        def answered(agreed: bool, message: str) -> None:
+            if agreed:
+                self._say(self.time_ns * 1e-9, f'  {service}: {message}')
+            self._go_on(agreed, f'service {service}: {message}')
 
-        self._callees[service].call_async(request).add_done_callback(answered)
+        ask(self._callees[service], request, answered)
+
+    def _go_on(self, agreed: bool, why_not: str) -> None:
+        """Go on when a service has agreed, or end the run."""
+        if agreed:
+            self._delivered()
+        elif not self.finished.done():
+            self.finished.set_exception(PlayerError(why_not))
 
     def _on_body_mode(self, message: String) -> None:
         mode = read_body_mode(message)
@@ -397,16 +416,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         request = SetParametersAtomically.Request(parameters=[Parameter(
             'fail', value=json.dumps(fault.as_mapping())).to_parameter_msg()])
 
-        def answered(future: Future) -> None:
-            answer = future.result()
-            if answer is None or not answer.result.successful:
-                reason = 'no answer' if answer is None else answer.result.reason
-                if not self.finished.done():
-                    self.finished.set_exception(PlayerError(f'fail: {reason}'))
-                return
-            self._delivered()
-
-        self._robot.call_async(request).add_done_callback(answered)
+        ask(self._robot, request, lambda agreed, reason: self._go_on(agreed, f'fail: {reason}'))
 
     # Real time -----------------------------------------------------------------------------------
 
@@ -434,16 +444,15 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         lain = self._lain = Future()
         self._deadline_ns = self.time_ns + PATIENCE_NS
 
-        def answered(future: Future) -> None:
-            answer = future.result()
-            if answer is None or not answer.success:
-                self._end_lying(f'refused: {"no answer" if answer is None else answer.message}')
+        def answered(agreed: bool, message: str) -> None:
+            if agreed:
+                self._say(self.time_ns * 1e-9, f'  lie_down: {message}')
             else:
-                self._say(self.time_ns * 1e-9, f'  lie_down: {answer.message}')
+                self._end_lying(f'refused: {message}')
 
         self._watch_lying()
         if not lain.done():
-            self._callees['lie_down'].call_async(Trigger.Request()).add_done_callback(answered)
+            ask(self._callees['lie_down'], Trigger.Request(), answered)
         return lain
 
     def _watch_lying(self) -> None:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import http.client
 import json
 import signal
@@ -18,41 +17,20 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-import yaml
+import ros_processes
 from browser import Page, browser, find_browser
-from ros_processes import NodeProcess, Processes, Ros, reserved_domain
+from ros_processes import NodeProcess, Processes, Ros, composed_suite, reserved_domain
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
 from dmp_cpg_ros.nodes.messages.interfaces import interface
+
+shared_domain, suite, ros = (
+    ros_processes.shared_domain, ros_processes.shared_suite, ros_processes.shared_ros)
 
 ADDRESS = r'live view: (http://127\.0\.0\.1:\d+/\?token=\S+)'
 
 PATIENCE_S = 90.0
-
-
-@pytest.fixture(scope='module')
-def domain() -> Iterator[int]:
-    with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
-        patch.setenv('ROS_DOMAIN_ID', str(domain))
-        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        prepare_middleware()
-        yield domain
-
-
-@contextlib.contextmanager
-def running(domain: int, folder: Path, **parameters: Any) -> Iterator[Processes]:
-    """A suite in one process, with parameters of all its nodes."""
-    file, started = folder / 'parameters.yaml', Processes(domain)
-    file.write_text(yaml.safe_dump({'/**': {'ros__parameters': {'seed': 0, **parameters}}, **{
-        f'/**/leg_transformation_{leg}': {'ros__parameters': {'leg': leg}} for leg in LEGS}}))
-    try:
-        started.python('-m', 'dmp_cpg_ros.commands.composed_suite', '--ros-args',
-                       '--params-file', str(file))
-        yield started
-    finally:
-        started.end()
 
 
 class Client:
@@ -103,25 +81,10 @@ class Client:
 
 
 @pytest.fixture(scope='module')
-def suite(domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
-    with running(domain, tmp_path_factory.mktemp('suite')) as started:
-        yield started
-
-
-@pytest.fixture(scope='module')
 def client(suite: Processes) -> Client:
     client = Client(suite.python('-m', 'dmp_cpg_ros.commands.live_view'))
     client.scene()
     return client
-
-
-@pytest.fixture
-def ros(domain: int) -> Iterator[Ros]:
-    session = Ros(domain)
-    try:
-        yield session
-    finally:
-        session.end()
 
 
 def heard(ros: Ros, name: str) -> list[Any]:
@@ -254,7 +217,7 @@ def test_infinity_is_refused(client: Client) -> None:
 
 def lock_step_messages(folder: Path, *, looked_on: bool) -> list[bytes]:
     """Last messages of the oscillators and of the joints after a second in lock-step."""
-    with reserved_domain() as domain, running(
+    with reserved_domain() as domain, composed_suite(
             domain, folder, lock_step=True, gated=True, start_inhibited=False) as suite:
         view = Client(suite.python('-m', 'dmp_cpg_ros.commands.live_view')) if looked_on else None
         ros, opener = Ros(domain), interface('mujoco_robot/advance_until')

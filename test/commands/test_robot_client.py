@@ -6,7 +6,6 @@ terminal.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import pty
 import re
@@ -16,86 +15,42 @@ import subprocess
 import sys
 import termios
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 pytest.importorskip('rclpy')
 
+import ros_processes
 import yaml
-from ros_processes import NodeProcess, Processes, Ros, reserved_domain, wait_until
+from ros_processes import NodeProcess, Processes, Ros, composed_suite, reserved_domain, wait_until
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.suite_table import WALKING_NODES
 
+shared_domain, suite, ros = (
+    ros_processes.shared_domain, ros_processes.shared_suite, ros_processes.shared_ros)
+
 CLIENT = ('-m', 'dmp_cpg_ros.commands.robot_client', '--wait', '20')
 
 
-@pytest.fixture(scope='module')
-def domain() -> Iterator[int]:
-    with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
-        patch.setenv('ROS_DOMAIN_ID', str(domain))
-        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        prepare_middleware()
-        yield domain
-
-
-@pytest.fixture(scope='module')
-def legs(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Parameter file that tells the nodes of the legs which leg they are."""
-    path = tmp_path_factory.mktemp('parameters') / 'legs.yaml'
-    path.write_text(yaml.safe_dump({
-        f'/**/leg_transformation_{leg}': {'ros__parameters': {'leg': leg}} for leg in LEGS}))
-    return str(path)
-
-
-@contextlib.contextmanager
-def running(domain: int, legs: str, *arguments: str) -> Iterator[Processes]:
-    """A suite in one process."""
-    started = Processes(domain)
-    try:
-        started.python('-m', 'dmp_cpg_ros.commands.composed_suite', '--ros-args',
-                       '--params-file', legs, *arguments)
-        yield started
-    finally:
-        started.end()
-
-
-@pytest.fixture(scope='module')
-def suite(domain: int, legs: str) -> Iterator[Processes]:
-    with running(domain, legs) as started:
-        yield started
-
-
-@pytest.fixture
-def ros(domain: int) -> Iterator[Ros]:
-    session = Ros(domain)
-    try:
-        yield session
-    finally:
-        session.end()
-
-
-def ended(processes: Processes, *arguments: str) -> NodeProcess:
-    """The client at its end."""
-    process = processes.python(*CLIENT, *arguments)
-    process.wait(90.0)
-    return process
-
-
-def said(processes: Processes, *arguments: str) -> str:
-    """What the client prints when all goes well."""
-    process = ended(processes, *arguments)
-    assert process.wait() == 0, process
-    return process.output.strip()
+def said(processes: Processes, *arguments: str, status: int = 0) -> str:
+    """What the client prints, by default when all goes well."""
+    return told(processes.python(*CLIENT, *arguments), status)
 
 
 def refused(processes: Processes, *arguments: str, status: int = 1) -> str:
     """What the client prints when it does not go well."""
-    process = ended(processes, *arguments)
-    assert process.wait() == status, process
+    return said(processes, *arguments, status=status)
+
+
+def told(process: NodeProcess, status: int = 1) -> str:
+    """What a client has printed at its end; some look for what is not there for ten seconds, in
+    which others are asked.
+    """
+    assert process.wait(90.0) == status, process
     assert 'Traceback' not in process.output, process
     return process.output.strip()
 
@@ -127,17 +82,18 @@ def test_without_a_suite_it_says_where_it_looked() -> None:
 
 
 def test_a_suite_in_a_namespace_is_found_there_and_elsewhere_named(
-        domain: int, legs: str, ros: Ros) -> None:
+        shared_domain: int, tmp_path: Path, ros: Ros) -> None:
     references = ros.collect(interface('reference').type, 'robot1/reference',
                              interface('reference').reader_qos)
-    with running(domain, legs, '-r', '__ns:=/robot1') as suite:
+    with composed_suite(shared_domain, tmp_path, '-r', '__ns:=/robot1') as suite:
         await_stop(ros, 'at_rest', 'robot1/inhibition_state')
+        elsewhere = suite.python(*CLIENT, '--wait', '10', 'inhibit')
         answer = said(suite, 'resume', '--ros-args', '-r', '__ns:=/robot1')
         assert answer.startswith('walking in')
         suite.python(*CLIENT, '--namespace', 'robot1', 'cmd_vel', '0.3')
         ros.spin_until(lambda: any(entry.twist.linear.x > 0.2 for entry in references))
         assert 'ready' in said(suite, '--namespace', '/robot1', 'nodes')
-        assert '--namespace /robot1' in refused(suite, '--wait', '10', 'inhibit')
+        assert '--namespace /robot1' in told(elsewhere)
 
 
 def test_all_nodes_are_ready(suite: Processes) -> None:
@@ -211,6 +167,7 @@ def test_a_push_is_taken_once(suite: Processes, ros: Ros) -> None:
 
 def test_parameters_are_read_set_and_refused_with_the_reason(suite: Processes) -> None:
     owner = 'canonical_oscillators'
+    nobody = suite.python(*CLIENT, '--wait', '10', 'param', 'get', 'oscillators', 'rho')
     assert 'cadence_scale' in said(suite, 'param', 'list', owner).splitlines()
     assert said(suite, 'param', 'set', owner, 'rho', '9') == 'Set parameter successful'
     assert said(suite, 'param', 'get', f'/{owner}', 'rho') == '9.0'
@@ -218,14 +175,15 @@ def test_parameters_are_read_set_and_refused_with_the_reason(suite: Processes) -
     assert 'cadence_scale = 3.0 would lose the certificate' in answer
     assert said(suite, 'param', 'get', owner, 'cadence_scale') == '1.0'
     assert "has no parameter 'rhoo'" in refused(suite, 'param', 'get', owner, 'rhoo')
-    assert owner in refused(suite, '--wait', '10', 'param', 'get', 'oscillators', 'rho')
+    assert owner in told(nobody)
     assert 'param takes' in refused(suite, 'param', 'get', owner, status=2)
 
 
 def test_a_message_is_printed_as_yaml(suite: Processes) -> None:
+    nothing = suite.python(*CLIENT, '--wait', '10', 'echo', 'joint_stats', '--once')
     (message, _) = yaml.safe_load_all(said(suite, 'echo', 'joint_states', '--once'))
     assert len(message['name']) == len(message['position']) == 3 * len(LEGS)
-    assert 'joint_states' in refused(suite, '--wait', '10', 'echo', 'joint_stats', '--once')
+    assert 'joint_states' in told(nothing)
 
 
 def test_what_is_not_finite_is_bad_input(suite: Processes) -> None:

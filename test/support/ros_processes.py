@@ -26,6 +26,7 @@ from typing import Any
 
 import pytest
 import rclpy
+import yaml
 from lifecycle_msgs.srv import ChangeState, GetState
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -33,6 +34,7 @@ from rclpy.node import Node
 from rclpy.task import Future
 
 from dmp_cpg_ros import __file__ as package
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 
 TESTS, PACKAGES = (str(Path(file).resolve().parents[1]) for file in (__file__, package))
@@ -291,14 +293,51 @@ def reserved_domain() -> Iterator[int]:
     pytest.fail('all hundred ROS domains of the tests are in use')
 
 
-@pytest.fixture
-def ros_domain(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """Domain of one test; the environment of this process names it too."""
-    with reserved_domain() as domain:
-        monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
-        monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+@contextlib.contextmanager
+def own_domain() -> Iterator[int]:
+    """Reserve a domain; the environment of this process names it too."""
+    with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
+        patch.setenv('ROS_DOMAIN_ID', str(domain))
+        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
         prepare_middleware()
         yield domain
+
+
+@pytest.fixture
+def ros_domain() -> Iterator[int]:
+    """Domain of one test."""
+    with own_domain() as domain:
+        yield domain
+
+
+@pytest.fixture(scope='module')
+def shared_domain() -> Iterator[int]:
+    """Domain of all tests of a module."""
+    with own_domain() as domain:
+        yield domain
+
+
+@contextlib.contextmanager
+def composed_suite(domain: int, folder: Path, *ros_arguments: str, **parameters: Any
+                   ) -> Iterator[Processes]:
+    """A suite in one process, with parameters of all its nodes."""
+    file, started = folder / 'parameters.yaml', Processes(domain)
+    file.write_text(yaml.safe_dump({'/**': {'ros__parameters': {'seed': 0, **parameters}}, **{
+        f'/**/leg_transformation_{leg}': {'ros__parameters': {'leg': leg}} for leg in LEGS}}))
+    try:
+        started.python('-m', 'dmp_cpg_ros.commands.composed_suite', '--ros-args',
+                       '--params-file', str(file), *ros_arguments)
+        yield started
+    finally:
+        started.end()
+
+
+@pytest.fixture(scope='module')
+def shared_suite(shared_domain: int, tmp_path_factory: pytest.TempPathFactory
+                 ) -> Iterator[Processes]:
+    """A suite in one process that all tests of a module use."""
+    with composed_suite(shared_domain, tmp_path_factory.mktemp('suite')) as started:
+        yield started
 
 
 @pytest.fixture
@@ -311,11 +350,25 @@ def processes(ros_domain: int) -> Iterator[Processes]:
         started.end()
 
 
-@pytest.fixture
-def ros(ros_domain: int) -> Iterator[Ros]:
-    """A node of the test itself."""
-    session = Ros(ros_domain)
+@contextlib.contextmanager
+def joined(domain: int) -> Iterator[Ros]:
+    """A node of the test itself in a domain."""
+    session = Ros(domain)
     try:
         yield session
     finally:
         session.end()
+
+
+@pytest.fixture
+def ros(ros_domain: int) -> Iterator[Ros]:
+    """A node of the test itself."""
+    with joined(ros_domain) as session:
+        yield session
+
+
+@pytest.fixture
+def shared_ros(shared_domain: int) -> Iterator[Ros]:
+    """A node of the test itself beside a suite that others use too."""
+    with joined(shared_domain) as session:
+        yield session
