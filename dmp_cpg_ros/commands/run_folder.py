@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from dmp_cpg_ros.analysis.context import RunContext, find_parameter
-from dmp_cpg_ros.configuration import find_config, first_free
+from dmp_cpg_ros.configuration import find_config, first_free, load_yaml
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
@@ -85,9 +85,10 @@ def resolved_parameters(file: Path, overrides: Mapping[str, Any], namespace: str
     dict of node name → dict of parameter → value
     """
     resolved: dict[str, dict[str, Any]] = {}
+    content = load_yaml(file)
     for kind, name, own in instances():
         if kind.name != RECORDER:
-            sets = node_sets(file, kind.name, overrides, namespace, name)
+            sets = node_sets(file, kind.name, overrides, namespace, name, content)
             resolved[name] = {
                 key: list(value) if isinstance(value, tuple) else value
                 for part in reversed(sets.values())

@@ -31,6 +31,7 @@ from dmp_cpg_ros.studies.adversary_runs import Setting
 from dmp_cpg_ros.suite import load_gaits
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')
+GAITS = load_gaits()
 LARGEST_MISMATCH = 0.05
 TICK = 0.004
 SCALE, LEG, POSTURE = BodyScale(0.28, math.hypot(0.19, 0.11)), LegParameters(), PostureParameters()
@@ -70,7 +71,7 @@ def grid_case(graph: str, gait: str, gain: float, share: float, region: float, l
         coupling_graph='ring' if graph == 'directed' else graph,
         cadence_scale=float(rng.uniform(0.6, 1.6)))
     reference = ReferenceParameters(max_speed=float(rng.uniform(0.2, 1.5)))
-    network = GaitNetwork(canonical, load_gaits()[gait], SCALE)
+    network = GaitNetwork(canonical, GAITS[gait], SCALE)
     if graph == 'directed':
         rng.random(len(LEGS))                        # once phases; what is drawn next stays so
         _couple(network, graph_from_edges(len(LEGS), random_edges(len(LEGS), rng), gain,
@@ -105,7 +106,7 @@ def random_arguments(rng: np.random.Generator) -> Arguments:
         rho=growth / radius**2, radius=radius, coupling_gain=gain,
         coupling_graph='ring' if graph in ('directed', 'cascade') else graph,
         cadence_scale=some(0.25, 3.0))
-    network = GaitNetwork(canonical, load_gaits()[str(rng.choice(list(load_gaits())))], SCALE)
+    network = GaitNetwork(canonical, GAITS[str(rng.choice(list(GAITS)))], SCALE)
     edges: Edges = {'directed': random_edges(len(LEGS), rng),
                     'cascade': ((0, 1), (1, 0), (2, int(rng.integers(2))), (2, 3), (3, 2))}.get(
                         graph) or topology(graph, len(LEGS))

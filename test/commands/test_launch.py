@@ -110,7 +110,7 @@ def test_all_but_the_robot_come_back_where_that_is_asked_for(launch_file: Module
 
 
 @pytest.mark.parametrize(('lock_step', 'namespace', 'shared'), [
-    ('', '', 'each'), ('true', '', 'blocks'), ('true', 'robot1', 'each')])
+    ('', '', 'each'), ('true', 'robot1', 'blocks')])
 def test_what_is_launched_becomes_ready_and_ticks(
         launch_file: ModuleType, processes: Processes, ros: Ros, tmp_path: Path,
         lock_step: str, namespace: str, shared: str) -> None:

@@ -84,7 +84,7 @@ def test_without_respawn_the_robot_comes_to_a_stand_and_walk_names_who_died(
 
 def test_a_node_that_hangs_is_named_and_the_run_has_failed(
         processes: Processes, tmp_path: Path) -> None:
-    process = walk(processes, tmp_path, 2.0)
+    process = walk(processes, tmp_path, 2.0, '--composed')
     process.wait_for_output(r's +walking', RUN_S)
     send(process, 'bag_recorder', signal.SIGSTOP)
     assert process.wait(RUN_S) == 1, process

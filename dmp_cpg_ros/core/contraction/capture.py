@@ -187,8 +187,9 @@ def _radial_growth(system: CanonicalSystem, D: float, u: Array) -> Array:
     """Largest n·ρ(r² − |x|²)x over x = x_d + u n, ndarray (N,) [1/s]."""
     u = np.maximum(u, 1e-300)
     offset = system.radius**2 - D**2 - u**2
-    c = np.clip((offset - 2.0 * u**2) / (4.0 * u), -D, D)
-    return np.asarray(system.rho * (offset - 2.0 * u * c) * (c + u))
+    with np.errstate(invalid='ignore'):  # what is not bounded has a growth that is no number
+        c = np.clip((offset - 2.0 * u**2) / (4.0 * u), -D, D)
+        return np.asarray(system.rho * (offset - 2.0 * u * c) * (c + u))
 
 
 def _target_radius(system: CanonicalSystem, inhibited: Mask) -> float:
