@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import ast
+from functools import cache
 
 import pytest
 from checkout import PACKAGE, ROOT, modules
@@ -29,6 +30,7 @@ HOMES = {
 """Ideas by the name that defines them."""
 
 
+@cache
 def definitions() -> dict[str, set[str]]:
     """Modules that define a name at their top."""
     found: dict[str, set[str]] = {}

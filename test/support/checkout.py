@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,6 +33,7 @@ def setup_argument(name: str) -> object:
     raise AssertionError(f'setup() has no argument {name}')
 
 
+@cache
 def modules() -> dict[str, Path]:
     """Every module of the package with its file."""
     found = {}
@@ -41,6 +43,7 @@ def modules() -> dict[str, Path]:
     return found
 
 
+@cache
 def imports(module: str, path: Path, *, at_import_time: bool = False) -> set[str]:
     """Full names of all modules that a module imports.
 
