@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 from math import copysign
 
 from dmp_cpg_ros.core.balance.body_command import MODES, MOVING, BodyCommand
+from dmp_cpg_ros.core.balance.capture_point import EDGES
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.modes.motion_library import MOVEMENT_NAMES
@@ -31,15 +32,18 @@ CADENCE_ROW = 'cadence_scale'
 
 SHIFT_ROWS = tuple(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xyz')
 CORRECTION_ROWS = ('base_x', 'base_y', 'base_yaw')
+MARGIN_ROWS = tuple(f'margin/{edge}' for edge in EDGES)
 MODE_ROWS = tuple(f'mode/{mode}' for mode in MODES)
 MOVEMENT_ROWS = tuple(f'movement/{name}' for name in MOVEMENT_NAMES)
-POSTURE_ROWS = (*JOINT_NAMES, *SHIFT_ROWS, *CORRECTION_ROWS, *MODE_ROWS, *MOVEMENT_ROWS)
-"""Of ``posture_feedback``. A mode's position is 1 while it lasts, else 0; a movement's is the
+POSTURE_ROWS = (
+    *JOINT_NAMES, *SHIFT_ROWS, *CORRECTION_ROWS, *MARGIN_ROWS, *MODE_ROWS, *MOVEMENT_ROWS)
+"""Of ``posture_feedback``. A margin's position is that of the capture point to an edge of the
+support polygon [m]. A mode's position is 1 while it lasts, else 0; a movement's is the
 phase of its canonical system, 0 while it does not move the legs.
 """
 
-GAIN_ROWS = (*LEGS, 'region_radius', 'requested', 'at_rest', 'automatic')
-"""Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, and three flags that are 0 or 1."""
+GAIN_ROWS = (*LEGS, 'region_radius', 'requested', 'at_rest', 'automatic', 'opposite')
+"""Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, and four flags that are 0 or 1."""
 
 REFERENCE_ROWS = ('v_x', 'v_y', 'gamma')
 """Of ``gait_memory``, after those of ``canonical_state``."""

@@ -27,7 +27,8 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait, highest_speed
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState, predict
+from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.voters import vote_sensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting
@@ -161,7 +162,7 @@ class WalkingLoop:
             self.stop.state in ('walking', 'free'), self.inbox.take())
         self.stop = self.supervisor.step(
             self.stop, state.time_ns, network, x, x_dot, r, command, self.votes.tally,
-            self.mode.mode)
+            self.mode.mode, feedback.margins)
         self.inhibition = self.supervisor.inhibition(self.stop)
         targets = self._joint_targets(state, x_dot, feedback, dt)
         return Tick(state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait)

@@ -197,7 +197,8 @@ CHANGEABLE: dict[str, tuple[str, ...]] = {
         'auto_gait', 'auto_gaits', 'auto_speeds', 'auto_hysteresis'),
     INHIBITION: (
         'inhibition_gain', 'region_radius', 'inhibited_legs', 'capture_speed', 'auto_inhibit',
-        'auto_delay', 'vote_rule', 'vote_majority', 'vote_limit', *UNCERTIFIED_VOTES),
+        'auto_delay', 'push_recovery', 'vote_rule', 'vote_majority', 'vote_limit',
+        *UNCERTIFIED_VOTES),
 }
 """Parameters of the certified nodes that may change while they run, by the node that owns them;
 other nodes that declare them follow their owner.

@@ -164,6 +164,7 @@ class CanonicalOscillators(SuiteNode):
 
 def _differ(one: Inhibition, other: Inhibition) -> bool:
     return one is not other and (
-        (one.requested, one.at_rest, one.automatic, one.region_radius, one.gains.tobytes())
-        != (other.requested, other.at_rest, other.automatic, other.region_radius,
+        (one.requested, one.at_rest, one.automatic, one.opposite, one.region_radius,
+         one.gains.tobytes())
+        != (other.requested, other.at_rest, other.automatic, other.opposite, other.region_radius,
             other.gains.tobytes()))

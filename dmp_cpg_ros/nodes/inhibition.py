@@ -17,7 +17,8 @@ from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.inhibition.handover import adopted
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, predict
+from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting
@@ -90,13 +91,13 @@ class InhibitionNode(SuiteNode):
             self._memory = self.publisher('gait_memory')
         else:
             self.listen('/clock', lambda message: self._watch(stamp_ns(message.clock)))
-        body, sensors = conversions.CommandReader(), {}
+        body, sensors = conversions.BodyReader(), {}
         if self._voting.voting.voting:
             sensors = {'foot_contacts': stamped(FootContactsReader().read),
                        'imu': stamped(read_imu)}
             self.listen('votes', command=True, callback=lambda message: self._inbox.accept(
                 *conversions.read_votes(message)))
-        mode = {'posture_feedback': lambda message: body.read(message).mode}
+        mode = {'posture_feedback': body.read}
         self.match('canonical_state', {
             'canonical_state': conversions.CanonicalStateReader(gaits).read,
             'reference': conversions.read_reference,
@@ -136,13 +137,13 @@ class InhibitionNode(SuiteNode):
         if not self._joined and not self._join(stamp_ns):
             return
         before = self._state
-        self._body_mode = values['posture_feedback'] or self._body_mode
+        self._body_mode, margins = values['posture_feedback'] or (self._body_mode, None)
         self._votes = self._voting.step(
             self._votes, stamp_ns, network, _vote_sensors(stamp_ns, values), self._x, self._r,
             before.state in ('walking', 'free'), self._inbox.take())
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
-            self._votes.tally, self._barring)
+            self._votes.tally, self._barring, margins)
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
             self._predict()
@@ -196,7 +197,7 @@ class InhibitionNode(SuiteNode):
             self._stop_now()
 
     def _stop_now(self) -> None:
-        if not self._state.requested:
+        if not self._state.in_force:
             self._state = self._supervisor.request(self._state, True, True)
             self._acting = self._supervisor.inhibition(self._state)
             self._predict()
@@ -232,7 +233,8 @@ class InhibitionNode(SuiteNode):
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop."""
-        return {'inhibition': self._state.state, 'requested': self._state.requested,
+        return {'inhibition': self._state.state, 'requested': self._state.in_force,
+                'pushed': self._state.push.acts,
                 'command': self._gate.at(self._state.time_ns)}
 
     # The service -------------------------------------------------------------------------------
@@ -256,17 +258,20 @@ class InhibitionNode(SuiteNode):
             return False, (
                 f'{self._blind}: no time to rest can be promised' + (
                     '; the stop is requested and will be carried out' if stop else ''))
-        already = stop == self._state.requested
+        already, steps = stop == self._state.in_force, self._state.push.acts
         self._state = self._supervisor.request(self._state, stop)
-        if stop != self._state.requested:
+        if stop != self._state.in_force:
             return False, f'held by votes: {self._state.tally.cause}; ask again without them'
         if already:
-            return True, f'already {self._state.state}'
+            return True, ('stopped already, and steps to catch a push' if steps and stop
+                          else f'already {self._state.state}')
         self._predict()
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
         most = f'at most {self._bound:.3f} s' if isfinite(self._bound) else (
             'without a bound from this state')
-        way = f'; the reference goes on for at most {self._way:.3f} m' if stop else ''
+        way = (f'; the reference goes on for at most {self._way:.3f} m' + (
+            '; a push that makes it step begins the stop anew'
+            if self._supervisor.parameters.push_recovery else '')) if stop else ''
         return True, f'{"at rest" if stop else "walking"} {when}, {most}; {self._words()}{way}'
 
     def _predict(self) -> None:
@@ -282,7 +287,7 @@ class InhibitionNode(SuiteNode):
         running = self.certified.running_in(gait)
         self._way = running.stop_distance(
             self._r, self._gate.at(self._state.time_ns)) if self._state.requested else nan
-        if self._state.voted:
+        if self._state.requested and self._state.voted:
             self._bound = self._bound_by_votes()
         elif self._state.requested:
             self._bound = running.time_to_rest(self._network, self._x, self._r)
@@ -316,7 +321,8 @@ class InhibitionNode(SuiteNode):
 
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()
-        told = {'requested': state.requested, 'armed': state.armed, 'automatic': state.automatic,
+        told = {'requested': state.in_force, 'armed': state.armed, 'automatic': state.automatic,
+                'pushed': state.push.acts,
                 **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,
                 'request_stamp': state.request_ns * 1e-9, 'predicted_s': self._predicted,
                 'bound_s': self._bound, 'bound_m': self._way, 'measured_s': state.measured_s,

@@ -29,7 +29,7 @@ from dmp_cpg_ros.core.canonical.coupling import Edges, graph_from_edges, topolog
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
-from dmp_cpg_ros.core.inhibition.supervisor import predict
+from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.loop import Array, WalkingLoop
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.transformation.leg import LegFeedback

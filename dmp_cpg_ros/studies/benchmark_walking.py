@@ -3,7 +3,8 @@
 """Measures how the robot walks, from fixed seeds, and prints the tables of doc/results.md.
 
 speeds: steady velocities against the commanded ones. pushes: largest speed change survived, in
-eight directions at every phase. rough: share of seeds that cross 5 m of rough ground. contacts:
+eight directions at every phase. manoeuvres: falls by pushes at rest, while stopping, starting,
+changing gait and turning. rough: share of seeds that cross 5 m of rough ground. contacts:
 the same with and without the feedback of touchdown and the stumbling reflex. gaits: every ordered
 pair of gaits changed while moving. robots: other robots, with their files alone; those of the
 extra `robots` are left out where it is not installed.
@@ -77,6 +78,15 @@ OTHERS: tuple[tuple[str, trials.Velocity], ...] = (
 ROBOTS = tuple(f'robots/{name}.yaml' for name in
                ('mini_quadruped', 'mini_cheetah', 'go1', 'go2', 'aliengo'))
 """Robots by their files; all but the first need the extra ``robots``."""
+
+STOPPED = ('at rest', 'stopping')
+"""Manoeuvres in which a stop is in force, and steps may catch a push."""
+
+PUSHED_IN = (
+    ('at rest', (0.6, 0.8, 1.0, 1.2, 1.4, 1.6), (False, True)),
+    *((name, (0.8, 1.2, 1.6), (True,)) for name in trials.MANOEUVRES if 'stopping' in name),
+    *((name, (0.8, 1.2), (True,)) for name in trials.MANOEUVRES if not name.startswith(STOPPED)))
+"""Manoeuvres, speed changes by pushes [m/s], and whether the pushes are drawn."""
 
 SIDES = (0.5 * pi, 1.5 * pi)
 """Directions of the pushes of each robot [rad]."""
@@ -176,6 +186,27 @@ def pushes(pool: Processes, seeds: int, phases: int) -> Table:
     return Table(f'Pushes: speed change in m/s that is survived at every one of {phases} phases / '
                  'at half of them; times the mass it is the impulse in N s',
                  ('walking', *DIRECTIONS), rows, results)
+
+
+def manoeuvres(pool: Processes, seeds: int, phases: int) -> Table:
+    """Falls by pushes at rest and in manoeuvres, without and with the steps that catch them."""
+    cells = [(name, change, drawn, recovery)
+             for name, changes, draws in PUSHED_IN for change, drawn, recovery in product(
+                 changes, draws, (False, True)) if recovery or name.startswith(STOPPED)]
+    results = _run(pool, trials.pushed, [
+        {'manoeuvre': name, 'speed_change': change, 'case': case, 'cases': phases, 'drawn': drawn,
+         'recovery': recovery} for name, change, drawn, recovery in cells
+        for case in range(phases)])
+    rows = []
+    for k, (name, change, drawn, recovery) in enumerate(cells):
+        of = [outcome for _, outcome in results[k * phases:(k + 1) * phases]]
+        rows.append((name, 'drawn' if drawn else 'all around', f'{change:g}',
+                     'on' if recovery else 'off', f'{sum(one.fell for one in of)}/{phases}',
+                     str(sum(one.rests for one in of)), str(max(one.releases for one in of))))
+    return Table('Pushes at rest and in manoeuvres: direction, duration and time are drawn, or '
+                 '0.1 s from all around',
+                 ('while', 'direction', 'm/s', 'push_recovery', 'fell', 'rests after 3 s',
+                  'most releases'), rows, results)
 
 
 def rough(pool: Processes, seeds: int, phases: int) -> Table:
@@ -314,7 +345,8 @@ def _is_there(file: str) -> bool:
     return True
 
 
-TABLES = {make.__name__: make for make in (speeds, pushes, rough, contacts, gaits, robots)}
+TABLES = {make.__name__: make for make in (
+    speeds, pushes, manoeuvres, rough, contacts, gaits, robots)}
 """What can be measured."""
 
 

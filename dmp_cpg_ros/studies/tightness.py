@@ -31,7 +31,8 @@ from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import RunningGait
-from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, GaitSupervisor, predict
+from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, GaitSupervisor
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import phi_functions
 from dmp_cpg_ros.core.maths.roots import last_that_holds

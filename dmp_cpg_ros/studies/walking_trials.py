@@ -8,12 +8,12 @@ equal outcomes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from math import ceil, cos, hypot, isnan, log2, nan, pi, sin
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world import WORLDS, World
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.loop_recording import LoopRun, recording_of
+from dmp_cpg_ros.studies.loop_recording import PUSH_DURATION, LoopRun, recording_of
 from dmp_cpg_ros.suite import Suite, load_gaits, load_suite
 
 Velocity = tuple[float, float, float]
@@ -83,10 +83,12 @@ class Walk(LoopRun[WalkingLoop]):
         Seed of the joints' initial spread of ±0.03 rad; none with 0.
     values : tuple of (str, value)
         Parameters that differ from the package's own.
+    start : bool
+        Whether the gait is released; without it rests.
     """
 
     def __init__(self, gait: str, robot: str | None = None, world: World | None = None,
-                 seed: int = 0, values: Values = ()) -> None:
+                 seed: int = 0, values: Values = (), start: bool = True) -> None:
         suite = suite_of(robot, gait, values)
         body = MujocoRobot(suite.robot_file, suite.tick_ns, seed, 0.03 if seed else 0.0,
                            world=world or suite.world, sensors=suite.sensors)
@@ -94,7 +96,8 @@ class Walk(LoopRun[WalkingLoop]):
             body.description, suite.gait, suite.parameters, load_gaits()))
         self.asked: Velocity = (0.0, 0.0, 0.0)
         self.walk(STANDING)
-        self.loop.request(False)
+        if start:
+            self.loop.request(False)
 
     def reach(self, velocity: Velocity) -> bool:
         """Ramp the command to a velocity; return whether the robot is on its feet."""
@@ -215,6 +218,90 @@ def survives(run: Walk, angle: float, speed_change: float) -> bool:
     impulse = after.robot.description.mass * speed_change
     after.push(np.array((impulse * cos(yaw), impulse * sin(yaw), 0.0)))
     return after.walk(RECOVERY)
+
+
+class Manoeuvre(NamedTuple):
+    """What the robot does when it is pushed: from rest without a velocity; ``then`` begins the
+    manoeuvre, and the push comes within ``window`` [s] from there.
+    """
+
+    gait: str
+    velocity: Velocity | None
+    then: Callable[[WalkingLoop], object]
+    window: float
+
+
+def _start(loop: WalkingLoop) -> None:
+    loop.command(0.5)
+    loop.request(False)
+
+
+MANOEUVRES = {
+    'at rest': Manoeuvre('amble', None, lambda loop: None, 0.0),
+    'stopping from an amble at 0.5 m/s': Manoeuvre(
+        'amble', (0.5, 0.0, 0.0), lambda loop: loop.request(True), 1.2),
+    'stopping from a trot at 1.5 m/s': Manoeuvre(
+        'trot', (1.5, 0.0, 0.0), lambda loop: loop.request(True), 1.4),
+    'starting': Manoeuvre('amble', None, _start, 0.8),
+    'changing from amble to trot at 0.5 m/s': Manoeuvre(
+        'amble', (0.5, 0.0, 0.0), lambda loop: loop.change_gait('trot'), 2.0),
+    'turning, amble 0.5 m/s and 0.8 rad/s': Manoeuvre(
+        'amble', (0.5, 0.0, 0.8), lambda loop: None, 0.6),
+}
+"""What pushes meet."""
+
+PUSH_DURATIONS = (0.05, 0.4)
+"""Least and longest time of a push that is drawn [s]."""
+
+
+@dataclass(frozen=True)
+class PushedOutcome:
+    """Whether it fell, rests at the end, how often it was released, and the largest reference
+    speed after the push.
+    """
+
+    fell: bool
+    rests: bool = False
+    releases: int = 0
+    reference: float = nan
+
+
+@lru_cache(maxsize=2)
+def _before(manoeuvre: str, recovery: bool, robot: str | None) -> Walk:
+    gait, velocity, *_ = MANOEUVRES[manoeuvre]
+    run = Walk(gait, robot, values=(('push_recovery', recovery),), start=velocity is not None)
+    if velocity is not None:
+        run.settle(velocity)
+    return run
+
+
+def pushed(manoeuvre: str, speed_change: float, case: int, cases: int, drawn: bool = True,
+           recovery: bool = True, robot: str | None = None) -> PushedOutcome:
+    """Push the robot in one of ``MANOEUVRES``, begun at phase case/cases.
+
+    Direction, duration and time within the manoeuvre are drawn from the case as seed, or the push
+    lasts ``PUSH_DURATION`` and the cases are directions, evenly around.
+    """
+    run, draw = deepcopy(_before(manoeuvre, recovery, robot)), np.random.default_rng(1000 + case)
+    _, velocity, then, window = MANOEUVRES[manoeuvre]
+    angle, duration = 2.0 * pi * case / cases, PUSH_DURATION
+    if drawn:
+        angle, duration = draw.uniform(0.0, 2.0 * pi), draw.uniform(*PUSH_DURATIONS)
+    if velocity is not None:
+        run.walk(case / cases * run.period())
+    then(run.loop)
+    run.walk(draw.uniform(0.0, window))
+    angle += float(_attitude([run.state])[0, 2])
+    force = run.robot.description.mass * speed_change / duration
+    run.robot.apply_push(force * np.array((cos(angle), sin(angle), 0.0)), round(duration * 1e9))
+    releases, reference = 0, 0.0
+    for _ in range(ceil((RECOVERY + duration) / run.tick_s)):
+        was = run.loop.stop.push.acts
+        if not run.walk(run.tick_s):
+            return PushedOutcome(True, False, releases, reference)
+        releases += run.loop.stop.push.acts and not was
+        reference = max(reference, float(np.abs(run.loop.r).max()))
+    return PushedOutcome(False, run.loop.stop.state == 'at_rest', releases, reference)
 
 
 @dataclass(frozen=True)

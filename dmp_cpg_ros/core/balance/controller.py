@@ -19,6 +19,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.balance import virtual_model
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
+from dmp_cpg_ros.core.balance.capture_point import EDGES, support_margins
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
@@ -64,6 +65,8 @@ class PostureFeedback:
         Measured joint angles that the feedback was made of [rad].
     foot_force : ndarray (4,)
         Measured normal forces of the feet [N]; 0 where there is none to be believed.
+    margins : tuple of float
+        Of the capture point to the edges of the support polygon [m]; 0 while nothing balances.
     """
 
     torque: Array
@@ -73,6 +76,7 @@ class PostureFeedback:
     command: BodyCommand = STANDING
     measured: Array = field(default_factory=lambda: np.zeros(12))
     foot_force: Array = field(default_factory=lambda: np.zeros(4))
+    margins: tuple[float, ...] = (0.0,) * len(EDGES)
 
     def of_leg(self, i: int) -> LegFeedback:
         """What the path of leg ``i`` takes of it."""
@@ -179,6 +183,8 @@ class PostureController:
         self.model = VirtualModel(description, self.scale.leg_length)
         self.placement = FootPlacement(self.kinematics, footholds, self.scale.leg_length)
         self._across: list[float] = footholds[:, 1].tolist()
+        self._footholds = [
+            vec3.triple(foot) for foot in (footholds - description.com_in_base).tolist()]
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
         self._com_in_base = vec3.triple(description.com_in_base.tolist())
         self._torque_limit = [vec3.triple(leg.torque_limit.tolist()) for leg in description.legs]
@@ -249,7 +255,20 @@ class PostureController:
             self._torque(body, legs, feet, load, planned, bounce, sway.acceleration),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
             np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
-            np.array(correction), command, state.joint_position, believed(state.foot_force))
+            np.array(correction), command, state.joint_position, believed(state.foot_force),
+            self._margins(R_ground_base, feet, swings, (lean_x, lean_y), measured, planned))
+
+    def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
+                 under: tuple[float, float], measured: Triple, planned: Triple
+                 ) -> tuple[float, ...]:
+        """Margins of the capture point; legs that swing count at their footholds."""
+        p, places = self.parameters, []
+        for foot, foothold, swing in zip(feet, self._footholds, swings, strict=True):
+            place = vec3.times(R_ground_base, foothold)
+            places.append(vec3.moved(foot, vec3.minus(place, foot), swing))
+        return support_margins(
+            places, under, (measured[0] - planned[0], measured[1] - planned[1]),
+            self.model.height, p.friction, self.placement.room(p.reach))
 
     def _height(self, feet: list[Triple], load: list[float]) -> float:
         """Height of the centre of mass over the ground under the feet that carry [m]."""

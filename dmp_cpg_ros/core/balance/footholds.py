@@ -82,6 +82,11 @@ class FootPlacement:
         v_x, v_y, gamma = velocity
         return [(v_x - gamma * y, v_y + gamma * x) for x, y, _ in self._footholds]
 
+    def room(self, reach: float) -> float:
+        """Way that the body can make over standing feet with a share of the straight legs [m]."""
+        return min(sqrt(max((reach * straight) ** 2 - depth * depth, 0.0))
+                   for straight, depth in zip(self._straight, self._depth, strict=True))
+
     def within_reach(self, down: Sequence[Pair], reach: float) -> list[Pair]:
         """Shorten displacements from the neutral places to what the legs reach.
 

@@ -34,6 +34,9 @@ class InhibitionParameters(Parameters):
         True, 'whether a zero command stops the gait and a new command resumes it')
     auto_delay: float = parameter(
         1.0, 'time of zero command after which auto_inhibit stops the gait', 0.0, 60.0, unit='s')
+    push_recovery: bool = parameter(
+        True, 'whether a push that standing legs cannot bear releases the gait from a stop until '
+        'the robot stands again')
 
     def __post_init__(self) -> None:
         """Validate; at least one leg, none twice."""
@@ -66,6 +69,9 @@ class Inhibition:
         Whether oscillators, reference and swings have come to rest.
     automatic : bool
         Whether a command ends the stop, and not only the service.
+    opposite : bool
+        Whether oscillators at rest are turned by half a cycle before they run: on the spot the two
+        sides of the body swap, and no leg moves.
     """
 
     requested: bool
@@ -73,6 +79,7 @@ class Inhibition:
     region_radius: float
     at_rest: bool = False
     automatic: bool = True
+    opposite: bool = False
 
     def acting_gains(self, x: Array, target: Array) -> Array:
         """Gains that act at a state: α_i inside C_i and zero outside.

@@ -136,6 +136,9 @@ A foot in stance stands where its phase and the cadence put it: v Δc/f from its
 the cadence would be a jump of the feet.
 """
 
+AT_REST = 0.05
+"""Rates |ẋ| up to which oscillators rest and may be turned [1/s]."""
+
 HASTE = 1.1
 """Share of a gait's highest speed at which a change into it begins. Commands are within the limit
 of the gait that is wanted already, so the reference comes down to it; the blend's own limit is for
@@ -275,7 +278,9 @@ class RunningGait:
         if self.choice.auto_gait:
             wanted = self.gaits.named(chosen_gait(self.choice, wanted.name, r, self.scale))
         gait, cadence_scale = self._at_cadence(state, dt)
-        network, x = self._begin_change(self.network(gait), state.x, r, wanted, inhibition)
+        turns = inhibition.opposite and float(np.abs(state.x_dot).max()) <= AT_REST
+        network, x = self._begin_change(
+            self.network(gait), -state.x if turns else state.x, r, wanted, inhibition)
         contact = state.contact
         feedback: Array | float = 0.0
         if self.parameters.contact_feedback and foot_force is not None:

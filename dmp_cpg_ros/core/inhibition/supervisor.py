@@ -9,13 +9,16 @@
 - ``captured``: inhibition holds an oscillator and the others follow.
 - ``at_rest``: oscillators, reference and swings have come to rest.
 - ``releasing``: a start is requested; the oscillators run up until they are phase-locked.
+- ``stepping``: a push has released the gait from a stop, which stays in force; it is on the spot
+  (:mod:`~dmp_cpg_ros.core.inhibition.push_recovery`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import ceil, inf, isfinite
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +28,15 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.contraction.capture import place_tolerance, radius_tolerance
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.gait.running import CanonicalState, RunningGait
+from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, PushState, push_step
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
 from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
-from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import activities_step
 
-STATES = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing')
+STATES = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing', 'stepping')
 """What ``inhibition_state`` can say."""
 
 FALLEN_MODES = ('damped', 'recovering')
@@ -98,7 +100,7 @@ class SupervisorState:
     state : str
         One of ``STATES``.
     requested : bool
-        Whether a stop is requested: asked for, or voted.
+        Whether the gait is to stop: asked for, or voted, and no push keeps it from it.
     automatic : bool
         Whether the stop was asked for by ``auto_inhibit`` (or by starting at rest) and not by a
         service call.
@@ -120,6 +122,8 @@ class SupervisorState:
         Largest gains of the votes since then [1/s]: what holds the gait does not fade.
     tally : Tally
         Votes of this tick.
+    push : PushState
+        Whether a push has released the gait from a stop.
     """
 
     time_ns: int
@@ -135,6 +139,12 @@ class SupervisorState:
     voted: bool = False
     vote_gains: Array = field(default_factory=lambda: np.zeros(len(LEGS)))
     tally: Tally = NO_VOTES
+    push: PushState = NO_PUSH
+
+    @property
+    def in_force(self) -> bool:
+        """Whether a stop is in force, a push or not: the reference is zero."""
+        return self.requested or self.push.acts
 
 
 class GaitSupervisor:
@@ -168,12 +178,13 @@ class GaitSupervisor:
         Votes that do not stop the gait act weakly while it walks. In a stop the larger acts on
         each leg of what was asked for and what was voted, once the reference is slow.
         """
-        return Inhibition(state.requested, self._gains(state, state.armed),
-                          self.parameters.region_radius, state.state == 'at_rest', state.automatic)
+        return Inhibition(state.in_force, self._gains(state, state.armed),
+                          self.parameters.region_radius, state.state == 'at_rest', state.automatic,
+                          state.push.opposite)
 
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
         if not state.requested:
-            return state.tally.gains
+            return np.zeros(len(LEGS)) if state.push.acts else state.tally.gains
         gains = self.parameters.armed_gains if armed and state.asked else np.zeros(len(LEGS))
         return np.maximum(gains, state.vote_gains) if armed and state.voted else gains
 
@@ -185,11 +196,15 @@ class GaitSupervisor:
         A service call that asks for a start ends a stop by votes too, once nobody votes any more.
         """
         voted = state.voted and (stop or automatic or state.tally.alive)
-        return self._turned(replace_unchecked(state, asked=stop, automatic=automatic, voted=voted))
+        state = replace_unchecked(state, asked=stop, automatic=automatic, voted=voted)
+        if state.push.acts and not (stop or voted):
+            state = replace_unchecked(state, push=NO_PUSH, requested=True)
+        return self._turned(state)
 
     def step(self, state: SupervisorState, time_ns: int, network: GaitNetwork, x: Array,
              x_dot: Array, r: Array, command: tuple[float, float, float],
-             tally: Tally | None = None, body_mode: str = 'standing') -> SupervisorState:
+             tally: Tally | None = None, body_mode: str = 'standing',
+             margins: Sequence[float] | None = None) -> SupervisorState:
         """Advance by one tick.
 
         Parameters
@@ -208,6 +223,8 @@ class GaitSupervisor:
             Votes of this tick; those of the tick before without.
         body_mode : str
             What the body does; in every mode but ``standing`` the gait is stopped.
+        margins : sequence of four floats, optional
+            Of the capture point in the support polygon, where they are known [m].
         """
         dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
         gait, rates = network.gait, scalar_phase_rates(x, x_dot)
@@ -221,6 +238,7 @@ class GaitSupervisor:
         elif self.parameters.auto_inhibit:
             state = self._automatic(state, any(command))
         state = self._voted(state, tally or state.tally)
+        state = self._pushed(state, network, x, margins, body_mode)
         if state.requested:
             return self._stopping(state, network, x, rates, speed)
         return self._running(state, network.phase_errors(x), speed)
@@ -252,10 +270,21 @@ class GaitSupervisor:
             return replace_unchecked(state, vote_gains=np.maximum(tally.gains, state.vote_gains))
         return state
 
+    def _pushed(self, state: SupervisorState, network: GaitNetwork, x: Array,
+                margins: Sequence[float] | None, body_mode: str) -> SupervisorState:
+        """Release the gait for a push against a stop, and stop it again."""
+        push = NO_PUSH
+        if (self.parameters.push_recovery and (state.asked or state.voted)
+                and body_mode in ('standing', 'stopping')):
+            push = push_step(state.push, state.time_ns, state.state, network, x, margins)
+        if push is state.push:
+            return state
+        return self._turned(replace_unchecked(state, push=push))
+
     @staticmethod
     def _turned(state: SupervisorState) -> SupervisorState:
         """Begin a stop or a start when what is wanted has changed."""
-        stop = state.asked or state.voted
+        stop = (state.asked or state.voted) and not state.push.acts
         if stop == state.requested:
             return state
         return replace_unchecked(state, state='waiting' if stop else 'releasing', requested=stop,
@@ -293,6 +322,7 @@ class GaitSupervisor:
         if state.state == 'releasing' and not (in_step and swinging >= LOCKED_ACTIVITY):
             return state
         now, measured_s = 'walking' if in_step and speed > REST_SPEED else 'free', state.measured_s
+        now = 'stepping' if state.push.acts else now
         if now == state.state and isfinite(measured_s):
             return state
         return replace_unchecked(state, state=now, measured_s=self._measured(state))
@@ -303,47 +333,3 @@ class GaitSupervisor:
         if isfinite(state.measured_s):
             return state.measured_s
         return (state.time_ns - state.request_ns) * 1e-9
-
-
-def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: RunningGait,
-            state: SupervisorState, published: Inhibition, canon: CanonicalState, r: Array,
-            command: tuple[float, float, float], dt: float, horizon: float = 10.0,
-            body_mode: str = 'standing') -> float:
-    """Time from now to rest (of a requested stop) or to phase lock (of a start) by running ahead
-    [s]; infinite when it does not happen within the horizon.
-
-    Oscillators and reference form a closed hierarchy, into which nothing of the body enters: the
-    same code that drives the legs predicts to the tick.
-
-    Parameters
-    ----------
-    supervisor, reference, canonical
-        The blocks as they run.
-    state : SupervisorState
-        Present state, the request included.
-    published : Inhibition
-        What was published before the request; it still acts at the next tick.
-    canon : CanonicalState
-        Present state of the oscillators, gait and cadence perhaps on their way to others.
-    r : ndarray (3,)
-        Present reference.
-    command : tuple of float
-        External command that is assumed to stay (v_x, v_y, γ).
-    dt, horizon : float
-        Tick, and longest time that is looked ahead [s].
-    body_mode : str
-        What the body does, assumed to stay.
-    """
-    tick_ns = round(dt * 1e9)
-    start_ns, inhibition = state.time_ns, published
-    for k in range(1, ceil(horizon / dt) + 1):
-        r_ext = np.zeros(3) if inhibition.requested else np.array(command)
-        r = reference.step(r, r_ext, dt)
-        canon = canonical.step(canon, r, inhibition, dt)
-        state = supervisor.step(
-            state, start_ns + k * tick_ns, canonical.network(canon.gait), canon.x, canon.x_dot,
-            r, command, body_mode=body_mode)
-        inhibition = supervisor.inhibition(state)
-        if state.state in ('at_rest', 'walking', 'free'):
-            return k * dt
-    return inf

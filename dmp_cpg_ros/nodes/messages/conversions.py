@@ -45,7 +45,8 @@ _GAITS = slice(_OSCILLATORS.stop, None)
 _JOINTS = slice(0, len(JOINT_NAMES))
 _FEET = slice(_JOINTS.stop, _JOINTS.stop + len(layouts.SHIFT_ROWS))
 _BASE = slice(_FEET.stop, _FEET.stop + len(layouts.CORRECTION_ROWS))
-_COMMAND = slice(_BASE.stop, None)
+_MARGINS = slice(_BASE.stop, _BASE.stop + len(layouts.MARGIN_ROWS))
+_COMMAND = slice(_MARGINS.stop, None)
 
 
 def read_twist(message: Twist) -> tuple[float, float, float]:
@@ -254,6 +255,7 @@ class PostureFeedbackWriter:
         self._position[_FEET] = feedback.shift_in_base.reshape(-1)
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
+        self._position[_MARGINS] = feedback.margins
         self._effort[_JOINTS] = feedback.torque
         self._effort[_FEET].reshape(len(LEGS), 3)[:, 2] = feedback.foot_force
         self._position[_COMMAND], self._velocity[_COMMAND] = layouts.command_rows(feedback.command)
@@ -274,7 +276,7 @@ class PostureFeedbackReader:
             effort[_JOINTS], position[_FEET].reshape(len(LEGS), 3),
             velocity[_FEET].reshape(len(LEGS), 3)[:, :2], velocity[_BASE],
             self._command.of(position[_COMMAND], velocity[_COMMAND]), position[_JOINTS],
-            effort[_FEET].reshape(len(LEGS), 3)[:, 2])
+            effort[_FEET].reshape(len(LEGS), 3)[:, 2], tuple(position[_MARGINS].tolist()))
 
 
 class CommandReader:
@@ -297,6 +299,20 @@ class CommandReader:
         return self._last[1]
 
 
+class BodyReader:
+    """Reads what the inhibition needs of ``posture_feedback``."""
+
+    def __init__(self) -> None:
+        """Prepare the order."""
+        self._command = CommandReader()
+        self._margins = JointStateReader(layouts.MARGIN_ROWS, cdr.FIELDS[:1])
+
+    def read(self, message: AnyJointState) -> tuple[str, tuple[float, ...]]:
+        """Mode of the body, and margins of the capture point [m]; raises DataError."""
+        (margins,) = self._margins.read(message)
+        return self._command.read(message).mode, tuple(margins.tolist())
+
+
 class InhibitionGainsWriter:
     """Writes ``inhibition_gains``."""
 
@@ -308,7 +324,7 @@ class InhibitionGainsWriter:
         """Refill; raises DataError when a number is not finite."""
         return self._writer.fill(time_ns, np.array((
             *inhibition.gains, inhibition.region_radius, inhibition.requested,
-            inhibition.at_rest, inhibition.automatic)))
+            inhibition.at_rest, inhibition.automatic, inhibition.opposite)))
 
 
 _LARGEST_GAIN = (range_of(InhibitionParameters, 'inhibition_gain')[1]
@@ -333,8 +349,8 @@ class InhibitionGainsReader:
         if not low <= radius <= high:
             raise DataError(f'region_radius = {radius} must be from {low:g} to {high:g}')
         if not {0.0, 1.0}.issuperset(flags):
-            raise DataError(f'requested, at_rest and automatic must be 0 or 1, not {flags}')
-        return Inhibition(bool(flags[0]), gains, radius, bool(flags[1]), bool(flags[2]))
+            raise DataError(f'{", ".join(layouts.GAIN_ROWS[-4:])} must be 0 or 1, not {flags}')
+        return Inhibition(bool(flags[0]), gains, radius, *map(bool, flags[1:]))
 
 
 def read_votes(message: JointState) -> tuple[dict[str, float], str]:

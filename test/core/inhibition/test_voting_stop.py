@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.suggest import suggest_gains
 from dmp_cpg_ros.core.certificates.votes import vote_bound, votes_needed
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
-from dmp_cpg_ros.core.inhibition.supervisor import predict
+from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
