@@ -286,7 +286,7 @@ def pushed(manoeuvre: str, speed_change: float, case: int, cases: int, drawn: bo
     _, velocity, then, window = MANOEUVRES[manoeuvre]
     angle, duration = 2.0 * pi * case / cases, PUSH_DURATION
     if drawn:
-        angle, duration = draw.uniform(0.0, 2.0 * pi), draw.uniform(*PUSH_DURATIONS)
+        angle, duration = draw.uniform(0.0, 2.0 * pi), round(draw.uniform(*PUSH_DURATIONS), 3)
     if velocity is not None:
         run.walk(case / cases * run.period())
     then(run.loop)
