@@ -4,10 +4,10 @@
 
 speeds: steady velocities against the commanded ones. pushes: largest speed change survived, in
 eight directions at every phase. manoeuvres: falls by pushes at rest, while stopping, starting,
-changing gait and turning. rough: share of seeds that cross 5 m of rough ground. contacts:
-the same with and without the feedback of touchdown and the stumbling reflex. gaits: every ordered
-pair of gaits changed while moving. robots: other robots, with their files alone; those of the
-extra `robots` are left out where it is not installed.
+changing gait and turning. unpushed: stops that nobody pushes against. rough: share of seeds that
+cross 5 m of rough ground. contacts: the same with and without the feedback of touchdown and the
+stumbling reflex. gaits: every ordered pair of gaits changed while moving. robots: other robots,
+with their files alone; those of the extra `robots` are left out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """
@@ -87,6 +87,17 @@ PUSHED_IN = (
     *((name, (0.8, 1.2, 1.6), (True,)) for name in trials.MANOEUVRES if 'stopping' in name),
     *((name, (0.8, 1.2), (True,)) for name in trials.MANOEUVRES if not name.startswith(STOPPED)))
 """Manoeuvres, speed changes by pushes [m/s], and whether the pushes are drawn."""
+
+UNPUSHED: tuple[tuple[str, tuple[float, float], str, dict[str, float], float], ...] = (
+    *((gait, span, 'flat', {}, 0.0) for gait, span in (
+        ('amble', (0.3, 1.2)), ('trot', (0.3, 1.5)), ('walk', (0.2, 0.8)), ('pace', (0.2, 0.8)),
+        ('bound', (0.2, 0.8)))),
+    *(('amble', (0.3, 0.6), 'slope', {'degrees': degrees}, 0.0)
+      for degrees in (-12.0, -6.0, 6.0, 12.0)),
+    ('trot', (0.3, 1.0), 'low_friction', {}, 0.0), ('amble', (0.3, 0.8), 'low_friction', {}, 0.0),
+    ('amble', (0.3, 0.8), 'flat', {}, 0.3), ('trot', (0.3, 1.5), 'flat', {}, 0.3),
+    ('amble', (0.3, 0.5), 'blocks', {'height': 0.05}, 0.0))
+"""Gaits, speeds [m/s], grounds and payloads of stops that nobody pushes against."""
 
 SIDES = (0.5 * pi, 1.5 * pi)
 """Directions of the pushes of each robot [rad]."""
@@ -207,6 +218,24 @@ def manoeuvres(pool: Processes, seeds: int, phases: int) -> Table:
                  '0.1 s from all around',
                  ('while', 'direction', 'm/s', 'push_recovery', 'fell', 'rests after 3 s',
                   'most releases'), rows, results)
+
+
+def unpushed(pool: Processes, seeds: int, phases: int) -> Table:
+    """Releases by stops without a push; half as many seeds as ``phases`` on each ground."""
+    results = _run(pool, trials.unpushed, [
+        {'gait': gait, 'speed': low + (high - low) * seed / max(phases // 2 - 1, 1),
+         'seed': seed + 1, 'kind': kind, 'numbers': numbers, 'payload': payload}
+        for gait, (low, high), kind, numbers, payload in UNPUSHED for seed in range(phases // 2)])
+    rows = []
+    for k, (gait, speeds_, kind, numbers, payload) in enumerate(UNPUSHED):
+        of = [outcome for _, outcome in results[k * (phases // 2):(k + 1) * (phases // 2)]]
+        words = ', '.join((kind, *(f'{value:g}' for value in numbers.values()),
+                           *([f'payload {payload:g}'] if payload else [])))
+        rows.append((gait, '{:g} to {:g}'.format(*speeds_), words, str(len(of)),
+                     *(str(sum(bool(getattr(one, name)) for one in of))
+                       for name in ('releases', 'fell', 'rests'))))
+    return Table('Stops without a push', (
+        'gait', 'm/s', 'ground', 'stops', 'released', 'fell', 'rest after 3 s'), rows, results)
 
 
 def rough(pool: Processes, seeds: int, phases: int) -> Table:
@@ -346,7 +375,7 @@ def _is_there(file: str) -> bool:
 
 
 TABLES = {make.__name__: make for make in (
-    speeds, pushes, manoeuvres, rough, contacts, gaits, robots)}
+    speeds, pushes, manoeuvres, unpushed, rough, contacts, gaits, robots)}
 """What can be measured."""
 
 

@@ -304,6 +304,22 @@ def pushed(manoeuvre: str, speed_change: float, case: int, cases: int, drawn: bo
     return PushedOutcome(False, run.loop.stop.state == 'at_rest', releases, reference)
 
 
+def unpushed(gait: str, speed: float, seed: int, kind: str, numbers: Mapping[str, float],
+             payload: float = 0.0) -> PushedOutcome:
+    """Stop from a speed [m/s] at a drawn time without a push, with a payload as share of the
+    robot's mass.
+    """
+    run, draw = Walk(gait, None, WORLDS[kind](**numbers), seed), np.random.default_rng(seed)
+    run.robot.model.body_mass[run.robot.base] += payload * run.robot.description.mass
+    upright = run.settle((speed, 0.0, 0.0)) and run.walk(draw.uniform(0.0, 1.0))
+    run.loop.request(True)
+    releases = 0
+    for _ in range(ceil(RECOVERY / run.tick_s)):
+        upright = upright and run.walk(run.tick_s)
+        releases = max(releases, run.loop.stop.push.releases)
+    return PushedOutcome(not upright, run.loop.stop.state == 'at_rest', releases)
+
+
 @dataclass(frozen=True)
 class CrossingOutcome:
     """Whether the robot crossed, how far and in what time it came [m], [s], and the root mean

@@ -56,6 +56,14 @@ events:
   - {at: 0.1, command: {v_x: 0.5}}
 """
 
+PUSHED = """\
+name: pushed
+duration: 3.0
+events:
+  - {at: 0.4, push: {impulse: [0, -10.7, 0]}}
+  - {at: 2.2, push: {impulse: [0, 8, 0], duration: 0.2}}
+"""
+
 WITH_CONTACTS = {'contact_feedback': True}
 """All that listens to the feet."""
 
@@ -168,6 +176,27 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
     assert metrics['robot']['fell'] is False
     assert metrics['robot']['cost_of_transport_from'] == 'joint_work'
     assert metrics['stop']['measured_s'] == pytest.approx(metrics['stop']['predicted_s'], abs=1e-6)
+
+
+def test_nodes_step_out_of_a_push_as_the_plain_loop_does(
+    processes: Processes, tmp_path: Path
+) -> None:
+    scenario = tmp_path / 'pushed.yaml'
+    scenario.write_text(PUSHED, encoding='utf-8')
+    run = walked(processes, scenario, tmp_path / 'run', '--lock-step', '--composed')
+    recording, (states, ticks) = load_recording(run / 'bag'), plain_run(scenario)
+    np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
+    np.testing.assert_array_equal(
+        recording.joints.position, [state.joint_position for state in states[:-1]])
+    assert recording.counts['/inhibition_gains'] == recording.counts['/canonical_state']
+    words = [(event.message, event.values['pushed']) for event in recording.inhibition]
+    assert {('releasing', 'true'), ('stepping', 'true'), ('waiting', 'false')} <= set(words)
+    assert all(event.values['requested'] == 'true' for event in recording.inhibition)
+    for event in recording.inhibition:
+        measured, bound = event.number('measured_s'), event.number('bound_s')
+        if event.message == 'stepping' or (event.message == 'at_rest' and measured):
+            assert measured == pytest.approx(event.number('predicted_s'), abs=1e-6)
+            assert measured <= bound
 
 
 def test_contacts_reach_the_nodes_at_the_tick_at_which_they_are_measured(

@@ -30,6 +30,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 EDGES = {'front': ('fl', 'fr'), 'right': ('fr', 'rr'), 'rear': ('rr', 'rl'), 'left': ('rl', 'fl')}
 """Edges of the support polygon by the legs at their ends, clockwise seen from above."""
 
+WIDE = (1e3,) * len(EDGES)
+"""Margins of a body of which nothing is known: no push [m]."""
+
 _ENDS = tuple((LEGS.index(a), LEGS.index(b)) for a, b in EDGES.values())
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.balance import virtual_model
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
-from dmp_cpg_ros.core.balance.capture_point import EDGES, support_margins
+from dmp_cpg_ros.core.balance.capture_point import WIDE, support_margins
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
@@ -66,7 +66,7 @@ class PostureFeedback:
     foot_force : ndarray (4,)
         Measured normal forces of the feet [N]; 0 where there is none to be believed.
     margins : tuple of float
-        Of the capture point to the edges of the support polygon [m]; 0 while nothing balances.
+        Of the capture point to the edges of the support polygon [m]; ``WIDE`` while nobody asks.
     """
 
     torque: Array
@@ -76,7 +76,7 @@ class PostureFeedback:
     command: BodyCommand = STANDING
     measured: Array = field(default_factory=lambda: np.zeros(12))
     foot_force: Array = field(default_factory=lambda: np.zeros(4))
-    margins: tuple[float, ...] = (0.0,) * len(EDGES)
+    margins: tuple[float, ...] = WIDE
 
     def of_leg(self, i: int) -> LegFeedback:
         """What the path of leg ``i`` takes of it."""
