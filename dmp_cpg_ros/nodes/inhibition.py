@@ -270,7 +270,7 @@ class InhibitionNode(SuiteNode):
         most = f'at most {self._bound:.3f} s' if isfinite(self._bound) else (
             'without a bound from this state')
         way = (f'; the reference goes on for at most {self._way:.3f} m' + (
-            '; a push that makes it step begins the stop anew'
+            '; a push may begin it anew'
             if self._supervisor.parameters.push_recovery else '')) if stop else ''
         return True, f'{"at rest" if stop else "walking"} {when}, {most}; {self._words()}{way}'
 
