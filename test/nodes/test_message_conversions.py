@@ -29,6 +29,7 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets, RobotState
 from dmp_cpg_ros.nodes.messages.cdr import Serialized
 from dmp_cpg_ros.nodes.messages.conversions import (
+    BodyReader,
     CanonicalStateReader,
     CommandReader,
     InhibitionGainsReader,
@@ -125,18 +126,20 @@ def test_joint_targets(leg: str, values: np.ndarray) -> None:
     assert bits(*dataclasses.astuple(targets)) == bits(*dataclasses.astuple(sent))
 
 
-@given(numbers(12), numbers(4, 3), numbers(4, 2), numbers(3), numbers(12), numbers(4))
+@given(numbers(12), numbers(4, 3), numbers(4, 2), numbers(3), numbers(12), numbers(4), numbers(4))
 def test_posture_feedback(torque: np.ndarray, shift: np.ndarray, drift: np.ndarray,
                           correction: np.ndarray, measured: np.ndarray,
-                          force: np.ndarray) -> None:
+                          force: np.ndarray, margins: np.ndarray) -> None:
     command = BodyCommand('rising', 'rise', 1.0 / 3.0, -0.1)
-    sent = PostureFeedback(torque, shift, drift, correction, command, measured, force)
+    sent = PostureFeedback(torque, shift, drift, correction, command, measured, force,
+                           tuple(margins.tolist()))
     message = wire(PostureFeedbackWriter().fill(0, sent))
     read = PostureFeedbackReader().read(message)
     assert bits(read.torque, read.shift_in_base, read.drift_in_base, read.correction,
                 read.measured, read.foot_force) == bits(
                     torque, shift, drift, correction, measured, force)
     assert read.command == command == CommandReader().read(message)
+    assert read.margins == sent.margins and BodyReader().read(message) == ('rising', sent.margins)
     assert not message.header.frame_id
 
 
@@ -310,14 +313,16 @@ def test_inhibition_state(time_ns: int, number: float, flag: bool) -> None:
         read_state_word(message)
 
 
-@given(STAMPS, numbers(4), st.booleans(), st.booleans())
-def test_inhibition_gains(time_ns: int, values: np.ndarray, requested: bool, rests: bool) -> None:
+@given(STAMPS, numbers(4), st.booleans(), st.booleans(), st.booleans())
+def test_inhibition_gains(time_ns: int, values: np.ndarray, requested: bool, rests: bool,
+                          opposite: bool) -> None:
     gains = np.minimum(np.abs(values), 1000.0)
-    sent = Inhibition(requested, gains, 0.25, rests)
+    sent = Inhibition(requested, gains, 0.25, rests, opposite=opposite)
     message = wire(InhibitionGainsWriter().fill(time_ns, sent))
     read = InhibitionGainsReader().read(message)
     assert bits(read.gains, read.region_radius) == bits(gains, 0.25)
-    assert (read.requested, read.at_rest, header_ns(message)) == (requested, rests, time_ns)
+    assert (read.requested, read.at_rest, read.opposite) == (requested, rests, opposite)
+    assert header_ns(message) == time_ns
 
 
 @pytest.mark.parametrize('word', ['', 'flying', 'rising rise 3 0.5'])
