@@ -265,8 +265,8 @@ def _transverse_rate(x: Array, f: Array, A: Array, metric: Matrix) -> float:
     return -0.5 * float(np.linalg.eigvalsh(half @ W @ half.T)[-1])
 
 
-def coupling_measure(L: Array, size: int, norm: float = 2, Theta: Array | None = None) -> float:
-    """μ(−V L Vᵀ), how fast the coupling alone makes disagreement grow (negative: shrink) [1/s].
+def coupling_measure(L: Array, size: int) -> float:
+    """μ₂(−V L Vᵀ), how fast the coupling alone makes disagreement grow (negative: shrink) [1/s].
 
     Parameters
     ----------
@@ -274,17 +274,13 @@ def coupling_measure(L: Array, size: int, norm: float = 2, Theta: Array | None =
         Block Laplacian.
     size : int
         Number N of nodes.
-    norm : {1, 2, numpy.inf}
-        Norm of V x.
-    Theta : ndarray, optional
-        Change of coordinates of V x, or weights.
     """
     V = synchronisation_complement(size, len(L) // size)
-    return float(matrix_measure(-V @ L @ V.T, norm, Theta))
+    return float(matrix_measure(-V @ L @ V.T))
 
 
-def disagreement_measure(L: Array, size: int, jacobians: Sequence[Array], norm: float = 2,
-                         Theta: Array | None = None) -> float:
+def disagreement_measure(L: Array, size: int, jacobians: Sequence[Array], norm: float = 2
+                         ) -> float:
     """Largest μ(V(Ā − L)Vᵀ) over all Ā whose blocks are in the hull of the given Jacobians.
 
     Parameters
@@ -297,8 +293,6 @@ def disagreement_measure(L: Array, size: int, jacobians: Sequence[Array], norm: 
         Matrices whose convex hull contains the Jacobian of one oscillator on the region.
     norm : {1, 2, numpy.inf}
         Norm of V x.
-    Theta : ndarray, optional
-        Change of coordinates of V x, or weights.
 
     Returns
     -------
@@ -319,7 +313,7 @@ def disagreement_measure(L: Array, size: int, jacobians: Sequence[Array], norm: 
     terms = np.array([[column @ A @ column.T for A in jacobians] for column in columns])
     choices = np.array(list(product(range(len(jacobians)), repeat=size)))    # (cases, N)
     cases = sum(terms[i][choices[:, i]] for i in range(size))
-    return float(matrix_measure(cases - V @ L @ V.T, norm, Theta).max())
+    return float(matrix_measure(cases - V @ L @ V.T, norm).max())
 
 
 def hopf_jacobian_vertices(rho: float, radius: float, omega: float, directions: int = 8

@@ -183,19 +183,17 @@ def pose_pictures(robot_file: RobotFile | Path | str | None, base_positions_in_w
         return [camera.drawn(*pose) for pose in poses if camera.reason is None]
 
 
-def leg_picture(file: RobotFile, width: int = 1280, height: int = 800) -> Picture:
+def leg_picture(file: RobotFile) -> Picture:
     """Draw a robot that stands, legs coloured as in ``COLOURS`` and named at their hips.
 
     Parameters
     ----------
     file : RobotFile
         The robot.
-    width, height : int
-        Size of the picture [pixels].
 
     Returns
     -------
-    ndarray (height, width, 3) of uint8
+    ndarray (800, 1280, 3) of uint8
 
     Raises
     ------
@@ -204,7 +202,7 @@ def leg_picture(file: RobotFile, width: int = 1280, height: int = 800) -> Pictur
     MissingFileError, ParameterError
         If the robot's files cannot be used.
     """
-    with Camera(file, width, height) as camera:
+    with Camera(file, height=800) as camera:
         model, ids, description = camera.model, camera.ids, camera.description
         for leg, abduction in zip(LEGS, ids.joints[::3], strict=True):
             geoms = np.isin(model.geom_bodyid, list(subtree(model, model.jnt_bodyid[abduction])))

@@ -62,21 +62,14 @@ class Outcome(NamedTuple):
 
 
 class FailingWalk:
-    """The robot, its watchdog and the suite, with an injector between them.
+    """The robot, its watchdog and the suite in a gait, with an injector between them."""
 
-    Parameters
-    ----------
-    gait : str
-    seed : int
-        Of sensors and failures.
-    """
-
-    def __init__(self, gait: str, seed: int = 0) -> None:
+    def __init__(self, gait: str) -> None:
         suite = load_suite(overrides={'gait': gait})
-        self.robot = MujocoRobot(suite.robot_file, suite.tick_ns, seed, world=suite.world,
+        self.robot = MujocoRobot(suite.robot_file, suite.tick_ns, world=suite.world,
                                  sensors=suite.sensors)
         self.loop = WalkingLoop(self.robot.description, suite.gait, suite.parameters, load_gaits())
-        self.injector = FaultInjector(seed)
+        self.injector = FaultInjector(0)
         self.watchdog = CommandWatchdog(
             self.robot.description, round(suite.robot.target_timeout * 1e9))
         self.state, self.named = self.robot.reset(), set[str]()
