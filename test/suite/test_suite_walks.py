@@ -67,6 +67,8 @@ events:
 WITH_CONTACTS = {'contact_feedback': True}
 """All that listens to the feet."""
 
+TICK_NS = 4_000_000
+
 RUN_S = 240.0
 """How long a run may take on a loaded machine before the test gives up [s]."""
 
@@ -229,7 +231,8 @@ def test_real_time_run_stops_and_starts(
     run = walked(processes, scenario, tmp_path / 'run', '--composed')
     _, end = load_recording(run / 'bag').span
     with opened(run / 'bag') as reader:
-        assert reader.start_time >= 0 and reader.end_time <= end * 1e9 + 1
+        # When the recorder ends, another topic of the robot may be a tick ahead of the joints.
+        assert reader.start_time >= 0 and reader.end_time <= end * 1e9 + TICK_NS + 1
     metrics = json.loads((run / 'metrics.json').read_text(encoding='utf-8'))
     assert metrics['robot']['fell'] is False
     assert metrics['stop']['completed'] == 1
