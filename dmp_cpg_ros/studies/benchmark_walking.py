@@ -83,9 +83,9 @@ STOPPED = ('at rest', 'stopping')
 """Manoeuvres in which a stop is in force, and steps may catch a push."""
 
 PUSHED_IN = (
-    ('at rest', (0.6, 0.8, 1.0, 1.2, 1.4, 1.6), (False, True)),
+    ('at rest', (1.2, 1.4, 1.6), (False,)), ('at rest', (0.6, 0.8, 1.0, 1.2, 1.4, 1.6), (True,)),
     *((name, (0.8, 1.2, 1.6), (True,)) for name in trials.MANOEUVRES if 'stopping' in name),
-    *((name, (0.8, 1.2), (True,)) for name in trials.MANOEUVRES if not name.startswith(STOPPED)))
+    *((name, (1.2,), (True,)) for name in trials.MANOEUVRES if not name.startswith(STOPPED)))
 """Manoeuvres, speed changes by pushes [m/s], and whether the pushes are drawn."""
 
 UNPUSHED: tuple[tuple[str, tuple[float, float], str, dict[str, float], float], ...] = (

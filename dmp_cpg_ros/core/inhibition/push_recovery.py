@@ -7,7 +7,7 @@ The measure is the least margin of the capture point in the support polygon
 (:mod:`~dmp_cpg_ros.core.balance.capture_point`), in lengths of the leg.
 
 - Below ``PUSHED`` for ``CERTAIN_NS`` standing legs will soon not bear it: the gait is released.
-- Once it has started and the margin has been above ``CALM`` for a cycle, or after
+- Once it has started and the margin has been above ``CALM`` for ``CALM_CYCLES``, or after
   ``LONGEST_CYCLES``, the stop is taken up again.
 
 It ends. One release lasts ``LONGEST_CYCLES`` at most and the stop after it is bounded; after
@@ -40,6 +40,11 @@ CERTAIN_NS = 8_000_000
 
 CALM = 0.2
 """Margin above which the body can come to rest on standing legs, in lengths of the leg."""
+
+CALM_CYCLES = 2
+"""Cycles for which it must be above: one brings the feet under the body, one more the body to rest
+over them, so that they end where they stand widest.
+"""
 
 LONGEST_CYCLES = 10
 """Length of a release, in cycles of the gait on the spot."""
@@ -114,7 +119,7 @@ def push_step(state: PushState, time_ns: int, word: str, network: GaitNetwork, x
     calm_ns = -1 if least <= CALM else time_ns if state.calm_ns < 0 else state.calm_ns
     cycle_ns = 2e9 * pi / network.omega(np.zeros(3))
     over = time_ns - state.since_ns >= LONGEST_CYCLES * cycle_ns or (
-        word == 'stepping' and 0 <= calm_ns <= time_ns - cycle_ns)
+        word == 'stepping' and 0 <= calm_ns <= time_ns - CALM_CYCLES * cycle_ns)
     return state._replace(acts=not over, opposite=state.opposite and not over, calm_ns=calm_ns)
 
 
