@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from dmp_cpg_ros.configuration import parse_yaml
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.scenario.fault import COMPONENTS, KINDS, Fault
@@ -89,3 +90,8 @@ def test_a_failure_reads_back_as_it_was_written() -> None:
             fault = Fault(component, kind, 0.25)
             assert Fault.from_mapping(fault.as_mapping()) == fault
             assert str(fault) == f'{component} {kind} for 0.25 s'
+
+
+def test_a_bare_off_of_a_yaml_file_is_off() -> None:
+    written = parse_yaml('{component: imu, kind: off}', 'fail')
+    assert Fault.from_mapping(written) == Fault('imu', 'off')

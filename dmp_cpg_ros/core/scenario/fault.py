@@ -93,6 +93,8 @@ class Fault:
                 'component', 'kind'} <= set(value):
             raise DataError(f'{where} must be a mapping with component, kind, for_s, leg, the '
                             f'last two as needed, not {shown(value)}')
+        if value['kind'] is False:  # what YAML 1.1 makes of a bare off
+            value = {**value, 'kind': 'off'}
         for name, words in valid.items():
             if name in value and value[name] not in words:
                 raise DataError(f'{where}: {name} {shown(value[name])} is not known; valid are '
