@@ -42,8 +42,11 @@ support polygon [m]. A mode's position is 1 while it lasts, else 0; a movement's
 phase of its canonical system, 0 while it does not move the legs.
 """
 
-GAIN_ROWS = (*LEGS, 'region_radius', 'requested', 'at_rest', 'automatic', 'opposite')
-"""Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, and four flags that are 0 or 1."""
+GAIN_ROWS = (*LEGS, 'region_radius', 'rest_phase', 'requested', 'at_rest', 'automatic',
+             'opposite')
+"""Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, the phase of fl at rest [rad], and four
+flags that are 0 or 1.
+"""
 
 REFERENCE_ROWS = ('v_x', 'v_y', 'gamma')
 """Of ``gait_memory``, after those of ``canonical_state``."""

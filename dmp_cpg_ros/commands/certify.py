@@ -103,6 +103,10 @@ def _report(suite: Suite, certificate: Certificate, needed: votes.VotesNeeded) -
     voting = 'on' if suite.parameters.voting.voting else 'off'
     enough, too_weak = (', '.join(f'{gain:.4g}' for gain in gains)
                         for gains in (needed.enough, needed.too_weak))
+    if suite.parameters.inhibition.auto:
+        others = [leg for leg in LEGS if leg not in certificate.legs]
+        lines += ['', f"auto takes one of {', '.join(certificate.legs)}, each of them certified"
+                  + (f"; {', '.join(others)} cannot hold the gait alone" if others else '')]
     return [*lines, '', f'from a request on the reference goes at most '
             f'{certificate.distance_to_rest:.4g} m, at its largest speed', '',
             f'voting is {voting}; {_votes(needed)}',

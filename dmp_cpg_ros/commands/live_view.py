@@ -327,8 +327,9 @@ class LiveView:
             'speed': _rounded(np.append(motion.velocity_in_base[:2], motion.rate_in_base[2]))}
         if 'canonical_state' in values:
             x, _, gait = values['canonical_state']
+            rest = values['inhibition_gains'].rest_phase if 'inhibition_gains' in values else 0.0
             frame |= {'x': _rounded(x), 'gait': gait.name,
-                      'places': _rounded(state_at(gait.phases, self._radius))}
+                      'places': _rounded(state_at(gait.phases + rest, self._radius))}
         if 'inhibition_gains' in values:
             acting = values['inhibition_gains']
             frame |= {'gains': acting.gains.tolist(), 'region': acting.region_radius,

@@ -119,7 +119,7 @@ class WalkingLoop:
         self._clock, self._dt = TickClock(), 0.004
         self.r = np.zeros(3)
         self.canon = self.canonical.initial_state(gait, p.inhibition)
-        self.stop = self.supervisor.initial_state()
+        self.stop = self.supervisor.initial_state(leg=p.canonical.first_leg)
         self.inhibition = self.supervisor.inhibition(self.stop)
         self.votes = self.voting.initial_state(self.network)
         self.estimator_state: EstimatorState | None = None

@@ -63,7 +63,8 @@ class CanonicalOscillators(SuiteNode):
         self._canonical = self.certified.running_gait(quarter_weight(description_of(self)))
         gaits = self.certified.gaits
         self._state = self._canonical.initial_state(gaits.named(gait_name(self)), inhibition)
-        self._inhibition = initial_inhibition(inhibition)
+        self._inhibition = initial_inhibition(
+            inhibition, self.parameters_of(CanonicalParameters).first_leg)
         self._echoed: Inhibition | None = None
         self._silent: SilentStop | None = None
         self._gains_writer = conversions.InhibitionGainsWriter()
@@ -141,8 +142,8 @@ class CanonicalOscillators(SuiteNode):
 
     def _watch_phases(self, network: GaitNetwork, r: Any, dt: float) -> None:
         """Compare the phases with their bound; an alarm is published at once."""
-        acting = self._inhibition.gains.any() and self._inhibition.acting_gains(
-            self._state.x, network.target).any()
+        acting = self._inhibition.gains.any() and network.acting_gains(
+            self._inhibition, self._state.x).any()
         former = LOCKED if self._lock is None else self._lock.level
         limits = self.certified.certificate.contact
         own = 0.0 if limits is None else limits.own
@@ -165,6 +166,6 @@ class CanonicalOscillators(SuiteNode):
 def _differ(one: Inhibition, other: Inhibition) -> bool:
     return one is not other and (
         (one.requested, one.at_rest, one.automatic, one.opposite, one.region_radius,
-         one.gains.tobytes())
+         one.rest_phase, one.gains.tobytes())
         != (other.requested, other.at_rest, other.automatic, other.opposite, other.region_radius,
-            other.gains.tobytes()))
+            other.rest_phase, other.gains.tobytes()))

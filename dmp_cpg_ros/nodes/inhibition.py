@@ -15,6 +15,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
+from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.inhibition.prediction import predict
@@ -70,7 +71,8 @@ class InhibitionNode(SuiteNode):
         self._build()
         self._network = self._running_gait.network(gaits.named(gait_name(self)))
         self._votes = self._voting.initial_state(self._network)
-        self._state = self._supervisor.initial_state()
+        self._state = self._supervisor.initial_state(
+            leg=self.parameters_of(CanonicalParameters).first_leg)
         self._acting = self._supervisor.inhibition(self._state)
         self._x: Any = None
         self._x_dot: Any = None
@@ -313,7 +315,7 @@ class InhibitionNode(SuiteNode):
         """What is told when it changes."""
         now = self._state
         return (now.state, now.requested, now.armed, now.automatic, now.request_ns, now.voted,
-                now.tally.causes, now.tally.weights.tobytes())
+                now.tally.causes, now.tally.weights.tobytes(), now.leg, now.rest_phase)
 
     def _publish_gains(self) -> None:
         self._told_ns = self._state.time_ns
@@ -324,6 +326,7 @@ class InhibitionNode(SuiteNode):
         told = {'requested': state.in_force, 'armed': state.armed, 'automatic': state.automatic,
                 'pushed': state.push.acts,
                 **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,
+                'rest_phase': acting.rest_phase,
                 'request_stamp': state.request_ns * 1e-9, 'predicted_s': self._predicted,
                 'bound_s': self._bound, 'bound_m': self._way, 'measured_s': state.measured_s,
                 'certified': self.certified.certificate_in(self._network.gait).holds,

@@ -22,6 +22,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.studies import adversary_networks
@@ -41,7 +42,7 @@ WEAKENED = tuple(dict.fromkeys((*adversary_networks.WEAKENED, *CONDITIONS)))
 """Inequalities and conditions that can be left out, to see whether the search notices."""
 
 
-def search(seed: int, seconds: float, weaken: str = '', most: int = 3
+def search(seed: int, seconds: float, weaken: str = '', most: int = 3, auto: bool = False
            ) -> tuple[Counter[str], list[Case]]:
     """Attack until the time is over or enough was found.
 
@@ -55,6 +56,8 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3
         What is left out; empty for an honest search.
     most : int
         Failures that are enough.
+    auto : bool
+        Whether to attack the suite only, with the leg chosen at each stop.
 
     Returns
     -------
@@ -71,7 +74,7 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3
     close: list[tuple[float, Case]] = []
     counts, failures = Counter[str](), list[Case]()
     while time.monotonic() < end and len(failures) < most:
-        if weaken in ('', *adversary_networks.WEAKENED):
+        if weaken in ('', *adversary_networks.WEAKENED) and not auto:
             size = int(rng.choice(sizes, p=1.0 / sizes / np.sum(1.0 / sizes)))
             _, met = adversary_networks.attack(rng, size, 250, weaken, close, counts)
             failures += [_smallest(one, weaken) for one in met[:1]] + met[1:]
@@ -79,6 +82,8 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3
             case = varied(rng, guided[rng.integers(len(guided))][1]) if (
                 guided and rng.random() < 0.5) else setting(rng)
             if not case['events']:
+                if auto:
+                    case['parameters']['inhibited_legs'] = (AUTO,)
                 if not _is_certified(description, case):
                     continue
                 counts['suites'] += 1
@@ -124,8 +129,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--weaken', choices=WEAKENED, default='', help='leave this out')
     parser.add_argument('--failures', type=int, default=3, help='stop after this many')
     parser.add_argument('--record', type=Path, help='Markdown file to add the counts to')
+    parser.add_argument('--auto', action='store_true',
+                        help='attack the suite only, with inhibited_legs: [auto]')
     options = parser.parse_args(arguments)
-    jobs = [(1000 * options.seed + k, options.seconds, options.weaken, options.failures)
+    jobs = [(1000 * options.seed + k, options.seconds, options.weaken, options.failures,
+             options.auto)
             for k in range(options.workers)]
     if options.workers == 1:
         results = [search(*jobs[0])]
@@ -150,7 +158,8 @@ def _row(total: Counter[str], options: argparse.Namespace, failures: int) -> str
     requests = sum(total[name] for name in ('stop', 'start', 'request', 'release', 'edge', 'box'))
     changes = sum(total[name] for name in ('set', 'gait', 'change', 'cadence'))
     return (f'| {options.seed} | {options.workers} x {options.seconds:g} s '
-            f'| {options.weaken or "nothing"} | {total["networks"]} ({total["settings"]}) '
+            f'| {options.weaken or ("nothing, auto" if options.auto else "nothing")} '
+            f'| {total["networks"]} ({total["settings"]}) '
             f'| {total["networks"] * adversary_networks.STARTS} | {total["suites"]} '
             f'| {requests} | {changes} ({total["accepted"]}) | {failures} |')
 

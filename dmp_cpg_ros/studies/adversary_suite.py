@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.inhibition import AUTO, Inhibition
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.errors import DmpCpgError
@@ -107,7 +107,7 @@ class Oscillators(WalkingLoop):
     def held(self) -> bool:
         """Whether a stop is in force and inhibition acts."""
         now = self.inhibition
-        return bool(now.requested and now.acting_gains(self.x, self.network.target).any())
+        return bool(now.requested and self.network.acting_gains(now, self.x).any())
 
 
 class _Unheld(Running):
@@ -238,6 +238,8 @@ def _change(rng: np.random.Generator, names: Sequence[str]) -> Case:
     """A random value of one of some parameters."""
     name = str(rng.choice(names))
     if name == 'inhibited_legs':
+        if rng.random() < 0.3:
+            return {name: (AUTO,)}
         count = 1 + rng.choice(4, p=(0.5, 0.3, 0.15, 0.05))
         return {name: tuple(rng.permutation(LEGS)[:count].tolist())}
     if name == 'coupling_graph':

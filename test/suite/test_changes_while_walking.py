@@ -49,17 +49,18 @@ events:
 {refused}\
   - {{at: 1.6, set: {{cadence_scale: 1.1, rho: 10, coupling_graph: ring}}}}
   - {{at: 1.8, set: {{max_speed: 0.3, alpha_r: 4.0}}}}
-  - {{at: 2.0, set: {{inhibition_gain: 600, inhibited_legs: [rr]}}}}
+  - {{at: 2.0, set: {{inhibition_gain: 600, inhibited_legs: [{leg}]}}}}
   - {{at: 2.4, inhibit: true}}
 """
 
 
+@pytest.mark.parametrize('leg', ['rr', 'auto'])
 def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
-    processes: Processes, tmp_path: Path
+    processes: Processes, tmp_path: Path, leg: str
 ) -> None:
     asked, plain = tmp_path / 'asked.yaml', tmp_path / 'plain.yaml'
-    asked.write_text(SCENARIO.format(refused=REFUSED), encoding='utf-8')
-    plain.write_text(SCENARIO.format(refused=''), encoding='utf-8')
+    asked.write_text(SCENARIO.format(refused=REFUSED, leg=leg), encoding='utf-8')
+    plain.write_text(SCENARIO.format(refused='', leg=leg), encoding='utf-8')
     settings = [item for name, value in OVERRIDES.items()
                 for item in ('--set', f'{name}:={value}')]
     process = processes.python('-m', 'dmp_cpg_ros.commands.walk', str(asked), '--lock-step',

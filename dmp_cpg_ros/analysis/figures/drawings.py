@@ -23,7 +23,7 @@ from dmp_cpg_ros.analysis.episodes import Episode, phase_offsets, requested_stop
 from dmp_cpg_ros.analysis.figures import style
 from dmp_cpg_ros.analysis.metrics.robot import body_motion, estimate_errors
 from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent, taken
-from dmp_cpg_ros.core.canonical.phase import state_at
+from dmp_cpg_ros.core.canonical.phase import phase, state_at, turned
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
 from dmp_cpg_ros.suite_table import ROBOT
 
@@ -370,10 +370,15 @@ def phase_portrait(recording: Recording, context: RunContext) -> Figure | None:
     if not recording.canonical.time.size or not stops:
         return None
     inhibited, radius = context.inhibition, context.radius
-    held = LEGS.index(inhibited.inhibited_legs[0])
     figure, [panels] = style.new_figure(2.85, 1, 3)
     whole, close_up, all_legs = panels
     places = _places(recording, context, stops[0].end)
+    if inhibited.auto:                                       # the one that is held is nearest
+        x = recording.canonical.x[recording.canonical.time <= stops[0].end][-1]
+        held = int(np.hypot(*(x - (radius, 0.0)).T).argmin())
+        places = turned(places, np.full(len(LEGS), -phase(places[held])))
+    else:
+        held = LEGS.index(inhibited.inhibited_legs[0])
     reach = radius + inhibited.region_radius + 0.1
     titles = (style.LEG_NAMES[LEGS[held]], 'close-up of C', 'all legs')
     for panel, title in zip(panels, titles, strict=True):

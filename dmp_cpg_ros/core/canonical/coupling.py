@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -124,6 +125,15 @@ def graph_from_edges(size: int, edges: Edges, gain: float | Array,
     gains = np.broadcast_to(K, (len(edges), 2, 2)).copy()
     return CouplingGraph(
         size, edges, gains, np.zeros(size) if phases is None else np.asarray(phases, float))
+
+
+@lru_cache
+def degrees(name: str, size: int) -> tuple[int, ...]:
+    """How many nodes act on each node of a named graph. Those on which as many act are alike:
+    some renumbering that leaves the graph as it is takes one to the other.
+    """
+    edges = topology(name, size)
+    return tuple(sum(i == node for i, _ in edges) for node in range(size))
 
 
 def topology(name: str, size: int) -> Edges:

@@ -16,6 +16,9 @@ from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
+AUTO = 'auto'
+"""In place of legs: at each stop the one whose oscillator is the first to come to [1, 0]."""
+
 
 @dataclass(frozen=True)
 class InhibitionParameters(Parameters):
@@ -25,7 +28,8 @@ class InhibitionParameters(Parameters):
     region_radius: float = parameter(
         0.3, 'radius r0 of the region C in which inhibition is switched on', 1e-3, 2.0)
     inhibited_legs: tuple[str, ...] = parameter(
-        ('fl',), 'legs whose oscillators are inhibited', choices=LEGS)
+        ('fl',), 'legs whose oscillators are inhibited; auto: at each stop the leg that is the '
+        'first to come to its phase 0', choices=(*LEGS, AUTO))
     capture_speed: float = parameter(
         0.1, 'reference foot speed below which inhibition is armed', 0.0, 10.0, unit='m/s')
     start_inhibited: bool = parameter(
@@ -41,16 +45,32 @@ class InhibitionParameters(Parameters):
     def __post_init__(self) -> None:
         """Validate; at least one leg, none twice."""
         super().__post_init__()
-        if not self.inhibited_legs or len(set(self.inhibited_legs)) != len(self.inhibited_legs):
+        legs = self.inhibited_legs
+        if not legs or len(set(legs)) != len(legs) or (self.auto and len(legs) > 1):
             raise ParameterError(
-                f'inhibited_legs = {list(self.inhibited_legs)} must name one or more of '
-                f'{", ".join(LEGS)}, none twice')
+                f'inhibited_legs = {list(legs)} must name one or more of '
+                f'{", ".join(LEGS)}, none twice, or be [{AUTO}]')
+
+    @property
+    def auto(self) -> bool:
+        """Whether the leg is chosen at each stop."""
+        return AUTO in self.inhibited_legs
 
     @cached_property
     def armed_gains(self) -> Array:
-        """Gains α_i of the four legs when inhibition is armed, ndarray (4,) [1/s]."""
+        """Gains α_i of the four legs when inhibition is armed, ndarray (4,) [1/s]; with ``auto``
+        none, see :meth:`gains_on`.
+        """
         return np.array(
             [self.inhibition_gain if leg in self.inhibited_legs else 0.0 for leg in LEGS])
+
+    def gains_on(self, leg: int) -> Array:
+        """Gains when inhibition is armed and, with ``auto``, a leg is chosen, ndarray (4,)
+        [1/s].
+        """
+        if not self.auto:
+            return self.armed_gains
+        return np.where(np.arange(len(LEGS)) == leg, self.inhibition_gain, 0.0)
 
 
 @dataclass(frozen=True)
@@ -72,6 +92,9 @@ class Inhibition:
     opposite : bool
         Whether oscillators at rest are turned by half a cycle before they run: on the spot the two
         sides of the body swap, and no leg moves.
+    rest_phase : float
+        Phase of fl at rest [rad]: every x_{i,d} is the place of leg i then. The field is the same
+        in all directions, so that what holds for one phase holds for each.
     """
 
     requested: bool
@@ -80,6 +103,7 @@ class Inhibition:
     at_rest: bool = False
     automatic: bool = True
     opposite: bool = False
+    rest_phase: float = 0.0
 
     def acting_gains(self, x: Array, target: Array) -> Array:
         """Gains that act at a state: α_i inside C_i and zero outside.
@@ -108,8 +132,10 @@ class Inhibition:
         return np.where(inside, self.gains, 0.0)
 
 
-def initial_inhibition(parameters: InhibitionParameters) -> Inhibition:
-    """Inhibition before the first request: armed when the gait starts at rest."""
+def initial_inhibition(parameters: InhibitionParameters, leg: int = 0) -> Inhibition:
+    """Inhibition before the first request: armed when the gait starts at rest, on a leg where it
+    is chosen.
+    """
     stopped = parameters.start_inhibited
     return Inhibition(
-        stopped, parameters.armed_gains * float(stopped), parameters.region_radius, stopped)
+        stopped, parameters.gains_on(leg) * float(stopped), parameters.region_radius, stopped)

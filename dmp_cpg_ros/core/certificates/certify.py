@@ -13,11 +13,13 @@ legs can vote, a majority stops the gait and fewer do not, (j) capture bears del
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
+from dmp_cpg_ros.core.canonical.coupling import degrees
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
@@ -31,17 +33,20 @@ from dmp_cpg_ros.core.contraction import hierarchy
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.finding import PROVED, weakest
 from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_contraction
+from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, REGIONAL
 from dmp_cpg_ros.core.contraction.region import Annulus
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.entry import SMALLEST_RADIUS, eligible_legs
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, REST_ACTIVITY
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.reference.stop_distance import stop_distance
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.leg import LegParameters
@@ -71,6 +76,8 @@ class Certificate:
         What contact feedback may do; None where it is off.
     distance_to_rest : float
         Bound on the way of the reference after a request at the largest speed [m].
+    legs : tuple of str
+        Legs that are inhibited, or of which one is chosen.
     """
 
     inequalities: tuple[Inequality, ...]
@@ -82,6 +89,7 @@ class Certificate:
     rest_radius: tuple[float, ...]
     contact: ContactLimits | None = None
     distance_to_rest: float = math.inf
+    legs: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Inequality:
         """Return the inequality of a name; raises ParameterError with the names that exist."""
@@ -117,7 +125,7 @@ class Certificate:
             'holds': self.holds, 'grade': self.grade, 'contraction_grade': self.contraction_grade,
             'omega_max': self.omega_max, 'time_to_rest_s': finite(self.time_to_rest),
             'time_to_walking_s': finite(self.time_to_walking),
-            'distance_to_rest_m': finite(self.distance_to_rest),
+            'distance_to_rest_m': finite(self.distance_to_rest), 'legs': list(self.legs),
             'rest_phase_rad': list(self.rest_phase), 'rest_radius': list(self.rest_radius),
             'sampled': list(self.sampled), 'failing': [entry.name for entry in self.failing],
             'inequalities': {entry.name: entry.as_mapping() for entry in self.inequalities}}
@@ -166,8 +174,32 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     return certificate_of(Setting.of(network, parts, tick_s, span))
 
 
-def certificate_of(s: Setting) -> Certificate:
-    """Compute the certificate of a setting."""
+def certificate_of(s: Setting, legs: Collection[int] = ()) -> Certificate:
+    """Compute the certificate of a setting. Where the leg is chosen, of each inequality the worst
+    over those that may be: some that are given, or the eligible ones.
+    """
+    p = s.parameters.inhibition
+    if not p.auto:
+        return _certificate(s)
+    legs = legs or eligible_legs(s.network, p)
+    number = degrees(s.network.parameters.coupling_graph, len(LEGS))
+    found = [_certificate(replace(s, parameters=replace(
+        s.parameters, inhibition=replace(p, inhibited_legs=(LEGS[leg],)))))
+        for leg in {number[leg]: leg for leg in legs}.values()]   # others are alike
+    rows = [min(same, key=lambda row: (row.holds, row.margin))
+            for same in zip(*(each.inequalities for each in found), strict=True)]
+    clearance = s.parameters.leg.clearance * REST_ACTIVITY
+    rows = [row if row.name != 'rest_posture' or math.isinf(row.left) else replace(
+        row, left=max(row.left, clearance)) for row in rows]
+    slowest = max(found, key=lambda each: each.time_to_walking)
+    return replace(
+        slowest, inequalities=tuple(rows), time_to_rest=max(each.time_to_rest for each in found),
+        contraction_grade=max((each.contraction_grade for each in found),
+                              key=(GLOBAL, REGIONAL, NONE).index),
+        legs=tuple(LEGS[leg] for leg in sorted(legs)))
+
+
+def _certificate(s: Setting) -> Certificate:
     p, network = s.network.parameters, s.network
     analysis = of_network.analyse_network(network, s.parameters.inhibition, s.span)
     found, contraction, rest = analysis.found, analysis.contraction, analysis.rest
@@ -198,15 +230,12 @@ def certificate_of(s: Setting) -> Certificate:
         tuple(rows), contraction.reach, s.span.omega[1], stop, start,
         () if rest is None else tuple(rest.phase_ahead.tolist()),
         () if rest is None else tuple(rest.radius.tolist()), contact,
-        stop_distance(reference, fastest, fastest, s.tick_s))
+        stop_distance(reference, fastest, fastest, s.tick_s),
+        s.parameters.inhibition.inhibited_legs)
 
 
 GROUND = 0.01
 """Height of a foot that counts as on the ground, as a fraction of the standing height."""
-
-SMALLEST_RADIUS = 0.5
-"""Radius that every oscillator must keep at rest for its phase to be sound, as a fraction of r."""
-
 
 def rest_inequalities(s: Setting, rest: InhibitedEquilibrium | None) -> list[Inequality]:
     """Inequalities (f): feet on the ground and sound phases at the inhibited equilibrium.

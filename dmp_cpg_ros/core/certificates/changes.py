@@ -25,6 +25,7 @@ from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import CADENCE_RATE
 from dmp_cpg_ros.core.gait.transition import SETTLING_RATE, STANDING, GaitTransition
+from dmp_cpg_ros.core.inhibition.entry import eligible_legs, farthest_way
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
@@ -66,7 +67,11 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     share = max((way.fastest(rate) for way in ways), default=0.0)
     span = _widened(p, networks, share)
     unvoted = replace(p, voting=VotingParameters())
-    whole = certificate_of(Setting.of(networks[0], unvoted, tick_s, span))
+    setting = replace(Setting.of(networks[0], unvoted, tick_s, span), way=2.0 * math.pi if ways
+                      else max(farthest_way(network, p.inhibition) for network in networks))
+    # A gait that changes at rest keeps the leg that holds it.
+    legs = set[int]().union(*(eligible_legs(network, p.inhibition) for network in networks))
+    whole = certificate_of(setting, legs)
     pause = 0.0 if not ways else (
         math.log(span.omega[1] / (STANDING * span.omega[0])) / SETTLING_RATE + tick_s)
     bound = whole.time_to_rest + pause + arriving

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.inhibition import Inhibition
+from dmp_cpg_ros.core.canonical.inhibition import AUTO, Inhibition
 from dmp_cpg_ros.core.certificates.certify import Certificate, certificate_of
 from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes
 from dmp_cpg_ros.core.certificates.network import Setting
@@ -28,6 +28,7 @@ from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, inhibited_contraction
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.entry import eligible_legs
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -128,22 +129,28 @@ class Running:
         """
         names = sorted(_CAPTURING.intersection(before.differences(self)))
         if not (names and inhibition.requested
-                and inhibition.acting_gains(x, network.target).any()):
+                and network.acting_gains(inhibition, x).any()):
             return ''
         if not inhibition.at_rest:
             return (f'{", ".join(names)} cannot change while the legs are being captured; ask '
                     'again when they are at rest')
-        outside = self._outside(x, np.linalg.norm(x - network.target, axis=1))
+        target = network.target_at(inhibition.rest_phase)
+        outside = self._outside(x, np.linalg.norm(x - target, axis=1), inhibition.gains)
         return outside and (f'{", ".join(names)} cannot change in this rest: {outside}; ask again '
                             'while the gait runs')
 
-    def _outside(self, x: Array, distance: Array) -> str:
-        """What lies outside of the invariant set of these parameters; empty when nothing does."""
-        p = self.parameters
+    def _outside(self, x: Array, distance: Array, gains: Array) -> str:
+        """What lies outside of the invariant set of these parameters, when a leg that is chosen
+        is the one on which gains act; empty when nothing does.
+        """
+        p, held_by = self.parameters, int(gains.argmax())
         networks = all_networks(p, (self.gait, *self.others), self.scale, self.acting_cadence)
         fastest = max(Setting.of(network, p, self.tick_s).span.omega[1] for network in networks)
         system = networks[0].system
-        capture = capture_set(system, fastest, p.inhibition.armed_gains,
+        if p.inhibition.auto and (np.count_nonzero(gains) != 1 or any(
+                held_by not in eligible_legs(network, p.inhibition) for network in networks)):
+            return f'{AUTO} would not take what holds the legs now'
+        capture = capture_set(system, fastest, p.inhibition.gains_on(held_by),
                               p.inhibition.region_radius)
         for leg, far, most in zip(LEGS, distance, capture.distance, strict=True):
             if far > most:
@@ -283,7 +290,9 @@ def _alternatives(running: Running, name: str) -> list[Any]:
     choices = entry.metadata['choices']
     if not isinstance(entry.default, tuple):
         return list(choices)
-    return [some for size in range(1, len(choices) + 1) for some in combinations(choices, size)]
+    several = [choice for choice in choices if choice != AUTO]
+    return [*((choice,) for choice in choices), *(
+        some for size in range(2, len(several) + 1) for some in combinations(several, size))]
 
 
 def _rounded(value: float, towards: float) -> float:

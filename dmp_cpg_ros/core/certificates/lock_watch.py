@@ -21,7 +21,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.certificates.network import EXPECTED_MISMATCH, free_synchronisation
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.inhibition.supervisor import locked
+from dmp_cpg_ros.core.inhibition.entry import locked
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 

@@ -26,7 +26,8 @@ from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, synchr
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, entry_tolerances
+from dmp_cpg_ros.core.inhibition.entry import entry_tolerances, farthest_way, half_arc
+from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
@@ -49,12 +50,15 @@ class Setting:
         Control tick [s].
     span : OperatingRange
         Speeds and cadences to hold for.
+    way : float
+        Largest way of the oscillators to where one can be caught, its arc included [rad].
     """
 
     network: GaitNetwork
     parameters: SuiteParameters
     tick_s: float
     span: OperatingRange
+    way: float = 2.0 * math.pi
 
     @classmethod
     def of(cls, network: GaitNetwork, parameters: SuiteParameters, tick_s: float,
@@ -69,13 +73,14 @@ class Setting:
         if not (np.isfinite(tick_s) and tick_s > 0.0):
             raise ParameterError(f'tick = {tick_s!r} s must be positive and finite')
         return cls(network, parameters, tick_s, span or operating_range(
-            network, parameters.inhibition, parameters.reference))
+            network, parameters.inhibition, parameters.reference),
+            farthest_way(network, parameters.inhibition))
 
     @property
     def arc(self) -> float:
         """Arc of the limit cycle that lies in C [rad]."""
-        r0, radius = self.parameters.inhibition.region_radius, self.network.parameters.radius
-        return 4.0 * math.asin(min(1.0, r0 / (2.0 * radius)))
+        return 2.0 * half_arc(self.parameters.inhibition.region_radius,
+                              self.network.parameters.radius)
 
 
 @dataclass(frozen=True)

@@ -61,6 +61,8 @@ def proof_of(network: GaitNetwork, inhibition: InhibitionParameters,
     ParameterError
         If an inequality fails, or holds too narrowly for these witnesses.
     """
+    if inhibition.auto:
+        raise ParameterError('a proof is for inhibited_legs that are named, not for auto')
     span = operating_range(network, inhibition, reference)
     analysis = analyse_network(network, inhibition, span)
     p = _parameters(network, inhibition, reference, leg, posture, tick_s, span, analysis)

@@ -24,7 +24,7 @@ from dmp_cpg_ros.core.contraction.capture import CaptureSet
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, comparison_laplacian
-from dmp_cpg_ros.core.inhibition import supervisor
+from dmp_cpg_ros.core.inhibition import entry, supervisor
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import phi_functions
@@ -63,7 +63,7 @@ def time_to_rest(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium | N
         arming = 0.0 if span.foot_speed == 0.0 else math.inf
     else:
         arming = math.log(span.foot_speed / span.armed_speed) / alpha_r
-    arriving = (2.0 * math.pi - s.arc) / span.omega_armed[0]
+    arriving = max(0.0, s.way - s.arc) / span.omega_armed[0]
     settling = _settling(s, capture, rest, span.armed_speed * math.exp(-alpha_r * arriving))
     return arming + arriving + settling + DELAY_TICKS * s.tick_s
 
@@ -141,10 +141,10 @@ def time_to_places(s: Setting, x: Array) -> float:
     found = free_synchronisation(network)
     if not found.synchronises or found.weights is None or not found.free_mean:
         return math.inf
-    if supervisor.in_places(network, x, r0):
+    if entry.in_places(network, x, r0):
         return 0.0
-    places, radii = supervisor.entry_tolerances(network, r0)
-    mean, epsilon, pair, single = _disagreement(found.weights, supervisor.locked(network, x))
+    places, radii = entry.entry_tolerances(network, r0)
+    mean, epsilon, pair, single = _disagreement(found.weights, entry.locked(network, x))
     R, step = abs(mean), min(_STEP, 0.1 / (p.rho * p.radius**2))
     for k in range(round(_HORIZON / _STEP)):
         if epsilon * pair <= places and R - epsilon * single >= p.radius - radii:
@@ -170,7 +170,7 @@ def later_arming(s: Setting, x: Array, r: Array) -> float:
     span, radius = s.span, s.network.parameters.radius
     locking = time_to_places(s, x)
     if locking > 0.0:
-        places, _ = supervisor.entry_tolerances(s.network, s.parameters.inhibition.region_radius)
+        places, _ = entry.entry_tolerances(s.network, s.parameters.inhibition.region_radius)
         locking += places / (radius * span.omega_armed[0])
     speed, limit = s.network.scale.foot_speed(*r.tolist()), max(span.foot_speed, span.armed_speed)
     if not speed > limit:

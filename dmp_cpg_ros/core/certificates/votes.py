@@ -11,7 +11,7 @@ must be no rest inside the regions at any cadence.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,7 +100,7 @@ def vote_bound(s: Setting, gains: Array) -> float:
 
 def _under(s: Setting, gains: Array) -> tuple[float, inhibited.InhibitedContraction, float]:
     """Gain that capture needs, contraction, and bound on the time to rest under some votes."""
-    system = s.network.system
+    system, s = s.network.system, replace(s, way=2.0 * math.pi)   # votes wait for fl's phase 0
     capture = capture_set(system, s.span.omega_armed[1], gains,
                           s.parameters.inhibition.region_radius)
     found = inhibited.inhibited_contraction(system, capture)

@@ -19,7 +19,7 @@ from math import atan2, ceil, cos, pi, sin
 
 import numpy as np
 
-from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
+from dmp_cpg_ros.core.canonical.coupling import degrees, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf, Oscillators
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, state_at, turned
@@ -62,6 +62,12 @@ class CanonicalParameters(Parameters):
     def oscillators(self) -> Oscillators:
         """Family of the uncoupled oscillators; that of a derived class may be another one."""
         return AndronovHopf(self.rho, self.radius)
+
+    @property
+    def first_leg(self) -> int:
+        """The first of the legs on which most others act: what one alone can hold, it can."""
+        number = degrees(self.coupling_graph, len(LEGS))
+        return number.index(max(number))
 
 
 def network_system(parameters: CanonicalParameters, phases: Array) -> CanonicalSystem:
@@ -115,7 +121,7 @@ class GaitNetwork:
             return self
         other = copy(self)
         other.gait = gait
-        for name in ('system', 'target', '_frame'):
+        for name in ('system', 'target'):
             other.__dict__.pop(name, None)
         return other
 
@@ -136,17 +142,26 @@ class GaitNetwork:
             known[key] = network_system(self.parameters, phases)
         return known[key]
 
-    @cached_property
-    def _frame(self) -> tuple[CanonicalSystem, Array | None]:
+    def _frame(self, rest_phase: float) -> tuple[CanonicalSystem, Array | None]:
         """System that is stepped, and the offsets by which its states are turned."""
         moving = self.gait.moving_phases
-        return self.system if moving is None else self._system(np.zeros(len(LEGS))), moving
+        if moving is not None:
+            return self._system(np.full(len(LEGS), rest_phase)), moving
+        return self._system(self.gait.phases + rest_phase) if rest_phase else self.system, None
 
     @cached_property
     def target(self) -> Array:
-        """x_d of every leg, ndarray (4, 2)."""
-        system, moving = self._frame
+        """x_d of every leg for rest at phase 0, ndarray (4, 2)."""
+        return self.target_at(0.0)
+
+    def target_at(self, rest_phase: float) -> Array:
+        """x_d of every leg when fl is to rest at a phase [rad], ndarray (4, 2)."""
+        system, moving = self._frame(rest_phase)
         return _turned(system.target, moving)
+
+    def acting_gains(self, inhibition: Inhibition, x: Array) -> Array:
+        """Gains that act at states (4, 2), ndarray (4,) [1/s]."""
+        return inhibition.acting_gains(x, self.target_at(inhibition.rest_phase))
 
     @property
     def highest_speed(self) -> float:
@@ -190,7 +205,7 @@ class GaitNetwork:
 
     def _part(self, x: Array, r: Array, inhibition: Inhibition, dt: float,
               feedback: Array | float) -> tuple[GaitNetwork, Array]:
-        omega, (system, moving) = self.omega(r), self._frame
+        omega, (system, moving) = self.omega(r), self._frame(inhibition.rest_phase)
         gait, gained = self.gait.following(omega, self.change_rate, inhibition.requested, dt)
         y = _turned(x, None if moving is None else -moving)
         gains = inhibition.acting_gains(y, system.target)
@@ -207,7 +222,7 @@ class GaitNetwork:
         """Rate of the states, ẋ (4, 2) [1/s], with feedback as in :meth:`advance`: that of the
         held blend and what moves its offsets.
         """
-        system, moving = self._frame
+        system, moving = self._frame(inhibition.rest_phase)
         y = _turned(x, None if moving is None else -moving)
         omega = self.gait.oscillator_omegas(self.omega(r)) + feedback
         field = system.field(y, omega, inhibition.acting_gains(y, system.target))
@@ -244,9 +259,10 @@ class GaitNetwork:
         inhibition : Inhibition
             That acts at x.
         """
-        omega, gains = self.omega(r), inhibition.acting_gains(x, self.target)
+        system, _ = self._frame(inhibition.rest_phase)
+        omega, gains = self.omega(r), inhibition.acting_gains(x, system.target)
         for _ in range(6):
-            x = self.system.newton_step(x, omega, gains)
+            x = system.newton_step(x, omega, gains)
         return x
 
     def phase_errors(self, x: Array) -> Array:

@@ -235,7 +235,8 @@ class RunningGait:
         inhibition : InhibitionParameters
             Whether the gait starts inhibited, and by what.
         """
-        factor, acting = self.parameters.cadence_scale, initial_inhibition(inhibition)
+        factor, acting = self.parameters.cadence_scale, initial_inhibition(
+            inhibition, self.parameters.first_leg)
         network = self.network(gait.scaled(factor))
         x = network.rest_state(acting) if inhibition.start_inhibited else network.locked_state()
         return CanonicalState(network.gait, gait, factor, x, np.zeros_like(x),

@@ -17,17 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical.coupling import topology
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
-from dmp_cpg_ros.core.contraction.capture import place_tolerance, radius_tolerance
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, PushState, push_step
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
 from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
@@ -56,37 +53,6 @@ LOCKED_PHASE_ERROR = 0.05
 
 LOCKED_ACTIVITY = 0.95
 """Swing activity above which a leg swings at its height."""
-
-
-def entry_tolerances(network: GaitNetwork, region_radius: float) -> tuple[float, float]:
-    """Distance of legs from each other's places, and of radii from r, at which C may be entered.
-
-    With :func:`~dmp_cpg_ros.core.contraction.capture.place_tolerance` at the cadence of rest, not
-    above the one that capture is certified for.
-    """
-    p = network.parameters
-    degree = p.coupling_gain * largest_degree(p.coupling_graph)
-    return (place_tolerance(network.omega(np.zeros(3)), degree, p.radius),
-            radius_tolerance(p.radius, region_radius))
-
-
-def locked(network: GaitNetwork, x: Array) -> NDArray[np.complex128]:
-    """States (4, 2) in the places' own frames, as complex numbers (4,): alike in the gait."""
-    return np.exp(1j * network.gait.phases) * (x[:, 0] + 1j * x[:, 1])
-
-
-def in_places(network: GaitNetwork, x: Array, region_radius: float) -> bool:
-    """Whether legs and radii are within :func:`entry_tolerances`."""
-    (places, radii), z = entry_tolerances(network, region_radius), locked(network, x)
-    return bool(np.abs(np.abs(z) - network.parameters.radius).max() <= radii
-                and np.abs(z[:, None] - z).max() <= places)
-
-
-@lru_cache
-def largest_degree(graph: str) -> int:
-    """Largest number of legs that act on one."""
-    edges = topology(graph, len(LEGS))
-    return max(sum(i == node for i, _ in edges) for node in range(len(LEGS)))
 
 
 @dataclass(frozen=True)
@@ -124,6 +90,10 @@ class SupervisorState:
         Votes of this tick.
     push : PushState
         Whether a push has released the gait from a stop.
+    leg : int
+        Leg that is inhibited where it is chosen.
+    rest_phase : float
+        Phase of fl at which the gait is brought to rest [rad].
     """
 
     time_ns: int
@@ -140,6 +110,8 @@ class SupervisorState:
     vote_gains: Array = field(default_factory=lambda: np.zeros(len(LEGS)))
     tally: Tally = NO_VOTES
     push: PushState = NO_PUSH
+    leg: int = 0
+    rest_phase: float = 0.0
 
     @property
     def in_force(self) -> bool:
@@ -165,12 +137,14 @@ class GaitSupervisor:
         """Keep the parts."""
         self.parameters, self.voting, self.activity_rate = parameters, voting, activity_rate
 
-    def initial_state(self, time_ns: int = 0) -> SupervisorState:
-        """At rest, or free when ``start_inhibited`` is false."""
+    def initial_state(self, time_ns: int = 0, leg: int = 0) -> SupervisorState:
+        """At rest, with a leg inhibited where it is chosen, or free when ``start_inhibited`` is
+        false.
+        """
         stopped = self.parameters.start_inhibited
         return SupervisorState(time_ns, 'at_rest' if stopped else 'free', stopped, True, time_ns,
                                stopped, np.full(len(LEGS), 0.0 if stopped else 1.0),
-                               measured_s=0.0, asked=stopped)
+                               measured_s=0.0, asked=stopped, leg=leg)
 
     def inhibition(self, state: SupervisorState) -> Inhibition:
         """Inhibition that the canonical system applies at the tick after ``state``.
@@ -180,12 +154,13 @@ class GaitSupervisor:
         """
         return Inhibition(state.in_force, self._gains(state, state.armed),
                           self.parameters.region_radius, state.state == 'at_rest', state.automatic,
-                          state.push.opposite)
+                          state.push.opposite, state.rest_phase)
 
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
         if not state.requested:
             return np.zeros(len(LEGS)) if state.push.acts else state.tally.gains
-        gains = self.parameters.armed_gains if armed and state.asked else np.zeros(len(LEGS))
+        gains = (self.parameters.gains_on(state.leg) if armed and state.asked
+                 else np.zeros(len(LEGS)))
         return np.maximum(gains, state.vote_gains) if armed and state.voted else gains
 
     def request(self, state: SupervisorState, stop: bool, automatic: bool = False
@@ -288,7 +263,8 @@ class GaitSupervisor:
         if stop == state.requested:
             return state
         return replace_unchecked(state, state='waiting' if stop else 'releasing', requested=stop,
-                       request_ns=state.time_ns, armed=False, measured_s=float('nan'), idle_ns=-1)
+                       request_ns=state.time_ns, armed=False, measured_s=float('nan'), idle_ns=-1,
+                       rest_phase=0.0)
 
     def _barred(self, state: SupervisorState, body_mode: str) -> SupervisorState:
         """Stop because the robot does not stand; after a fall no command starts it again."""
@@ -299,11 +275,11 @@ class GaitSupervisor:
 
     def _stopping(self, state: SupervisorState, network: GaitNetwork, x: Array,
                   rates: list[float], speed: float) -> SupervisorState:
-        # whether inhibition acts here once it is armed
-        once_armed = Inhibition(True, self._gains(state, True), self.parameters.region_radius)
-        inside = bool(once_armed.acting_gains(x, network.target).any())
-        armed = (state.armed and inside) or (
-            speed <= self.parameters.capture_speed and self.in_places(network, x))
+        armed = inside = state.armed and self._inside(state, network, x)
+        if not inside:
+            armed = speed <= self.parameters.capture_speed and self.in_places(network, x)
+            state = self._aimed(state, network, x, armed)
+            inside = self._inside(state, network, x)
         if not (armed and inside):
             return replace_unchecked(state, armed=armed, state='waiting')
         if (max(map(abs, rates)) > REST_PHASE_RATE or speed > REST_SPEED
@@ -311,6 +287,22 @@ class GaitSupervisor:
             return replace_unchecked(state, armed=armed, state='captured')
         return replace_unchecked(state, armed=armed, state='at_rest',
                                  measured_s=self._measured(state))
+
+    def _inside(self, state: SupervisorState, network: GaitNetwork, x: Array) -> bool:
+        """Whether inhibition acts here once it is armed."""
+        once_armed = Inhibition(True, self._gains(state, True), self.parameters.region_radius,
+                                rest_phase=state.rest_phase)
+        return bool(network.acting_gains(once_armed, x).any())
+
+    def _aimed(self, state: SupervisorState, network: GaitNetwork, x: Array, armed: bool
+               ) -> SupervisorState:
+        """State with the leg that is to be caught; once it is, it is kept."""
+        leg, rest_phase = state.leg, 0.0
+        if armed and state.asked and self.parameters.auto:
+            leg, rest_phase = next_leg(network, self.parameters, x)
+        if (leg, rest_phase) == (state.leg, state.rest_phase):
+            return state
+        return replace_unchecked(state, leg=leg, rest_phase=rest_phase)
 
     def in_places(self, network: GaitNetwork, x: Array) -> bool:
         """Whether legs and radii are as close to their places as capture takes for granted."""

@@ -10,6 +10,7 @@ in :mod:`~dmp_cpg_ros.nodes.messages.robot_state`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import pi
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -323,8 +324,8 @@ class InhibitionGainsWriter:
     def fill(self, time_ns: int, inhibition: Inhibition) -> cdr.SerializedJointState:
         """Refill; raises DataError when a number is not finite."""
         return self._writer.fill(time_ns, np.array((
-            *inhibition.gains, inhibition.region_radius, inhibition.requested,
-            inhibition.at_rest, inhibition.automatic, inhibition.opposite)))
+            *inhibition.gains, inhibition.region_radius, inhibition.rest_phase,
+            inhibition.requested, inhibition.at_rest, inhibition.automatic, inhibition.opposite)))
 
 
 _LARGEST_GAIN = (range_of(InhibitionParameters, 'inhibition_gain')[1]
@@ -342,7 +343,7 @@ class InhibitionGainsReader:
     def read(self, message: AnyJointState) -> Inhibition:
         """Inhibition that is announced; raises DataError for numbers that no parameters allow."""
         (values,) = self._reader.read(message)
-        gains, (radius, *flags) = values[:len(LEGS)], values[len(LEGS):].tolist()
+        gains, (radius, rest, *flags) = values[:len(LEGS)], values[len(LEGS):].tolist()
         if not (0.0 <= gains.min() and gains.max() <= _LARGEST_GAIN):
             raise DataError(f'gains {gains} must be from 0 to {_LARGEST_GAIN:g}')
         low, high = _RADII
@@ -350,7 +351,10 @@ class InhibitionGainsReader:
             raise DataError(f'region_radius = {radius} must be from {low:g} to {high:g}')
         if not {0.0, 1.0}.issuperset(flags):
             raise DataError(f'{", ".join(layouts.GAIN_ROWS[-4:])} must be 0 or 1, not {flags}')
-        return Inhibition(bool(flags[0]), gains, radius, *map(bool, flags[1:]))
+        if not 0.0 <= rest <= 2.0 * pi:
+            raise DataError(f'rest_phase = {rest} must be from 0 to 2 pi')
+        return Inhibition(
+            bool(flags[0]), gains, radius, *map(bool, flags[1:]), rest_phase=rest)
 
 
 def read_votes(message: JointState) -> tuple[dict[str, float], str]:
