@@ -130,7 +130,8 @@ class WalkingLoop:
 
     def _take(self, p: SuiteParameters) -> None:
         """Make the parts anew that may get other parameters and hold nothing else."""
-        self.parameters, self.reference = p, ReferenceSystem(p.reference)
+        self.parameters, self.reference = p, ReferenceSystem(
+            p.reference, self.canonical.scale.hip_radius)
         self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
         self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
 
@@ -149,8 +150,7 @@ class WalkingLoop:
         dt = self._clock.step(state.time_ns)
         self._dt = dt or self._dt
         command, inhibition = self.gate.at(state.time_ns), self.inhibition
-        r_ext = np.array((0.0, 0.0, 0.0) if inhibition.requested else command)
-        self.r = r = self.reference.step(self.r, r_ext, dt)
+        self.r = r = self.reference.towards(self.r, command, inhibition.requested, dt)
         self.canon = canon = self.canonical.step(
             self.canon, r, inhibition, dt, state.foot_force, self._contact_limits(dt))
         gait, x, x_dot, network = canon.gait, canon.x, canon.x_dot, self.network

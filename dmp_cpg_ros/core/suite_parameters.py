@@ -190,7 +190,7 @@ VOTE_SOURCES = (
 
 CHANGEABLE: dict[str, tuple[str, ...]] = {
     REFERENCE: (
-        'alpha_r', 'max_speed', 'max_lateral_speed', 'max_turn_rate', 'max_curve',
+        'alpha_r', 'max_speed', 'max_lateral_speed', 'max_turn_rate', 'max_curve', 'braking',
         'cmd_vel_timeout'),
     CANONICAL: (
         'rho', 'coupling_gain', 'coupling_graph', 'cadence_scale', 'gait', 'gait_change_rate',

@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting
 from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import (
     INHIBITION,
@@ -128,7 +128,7 @@ class InhibitionNode(SuiteNode):
             of(InhibitionParameters), of(VotingParameters), of(LegParameters).activity_rate)
         self._voting = Voting(of(InhibitionParameters), of(VotingParameters),
                               of(VoteSourceParameters), of(ReferenceParameters), self._weight)
-        self._reference = ReferenceSystem(of(ReferenceParameters))
+        self._reference = self.certified.reference()
         self._running_gait = self.certified.running_gait()
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:

@@ -11,7 +11,6 @@ import numpy as np
 
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import approached
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -32,7 +31,7 @@ class ReferenceFilter(SuiteNode):
     def configure(self) -> None:
         """Build the filter and its topics."""
         self.certified = Certified(self, lambda: Acting(self._cadence))
-        self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
+        self._system = self.certified.reference()
         self._r, self._requested = np.zeros(3), False
         self._cadence = self.parameters_of(CanonicalParameters).cadence_scale
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
@@ -45,7 +44,7 @@ class ReferenceFilter(SuiteNode):
     def on_parameters(self) -> None:
         """Take over limits and rates."""
         self.certified.limit(self._gate)
-        self._system = ReferenceSystem(self.parameters_of(ReferenceParameters))
+        self._system = self.certified.reference()
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the filter to the stamp of the robot's state."""
@@ -56,8 +55,7 @@ class ReferenceFilter(SuiteNode):
         command, gains = self._gate.at(stamp_ns), values['inhibition_gains']
         silent = not self.lock_step and gains is not None and stamp_ns - gains[0] > SILENT_NS
         self._requested = silent or gains is not None and gains[1].requested
-        r_ext = np.zeros(3) if self._requested else np.array(command)
-        self._r = self._system.step(self._r, r_ext, dt)
+        self._r = self._system.towards(self._r, command, self._requested, dt)
         self._publisher.publish(self._writer.fill(stamp_ns, self._r))
 
     def diagnostic_values(self) -> Mapping[str, Any]:

@@ -90,8 +90,7 @@ class Oscillators(WalkingLoop):
         self.now_ns += self.tick_ns
         dt, inhibition = self._dt, self.inhibition
         command = self.gate.at(self.now_ns)
-        self.r = self.reference.step(
-            self.r, np.zeros(3) if inhibition.requested else np.array(command), dt)
+        self.r = self.reference.towards(self.r, command, inhibition.requested, dt)
         if self._weaken == 'places':
             inhibition = _Separate(**vars(inhibition))
         self.canon = canon = self.canonical.step(self.canon, self.r, inhibition, dt)
@@ -230,7 +229,7 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, fl
 _GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 _NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain': (60.0, 4000.0),
             'region_radius': (0.03, 1.2), 'cadence_scale': (0.25, 4.0), 'alpha_r': (0.7, 20.0),
-            'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0)}
+            'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0), 'braking': (0.2, 20.0)}
 _DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': False}
 
 

@@ -132,6 +132,9 @@ def _changes(time: Array, states: Sequence[tuple[str, dict[str, str]]]
 STANDING_WINDOW = 0.5
 """Time at the end of the hold in which the robot must stand still [s]."""
 
+STANDING_SPEED = 0.02
+"""Speed below which a body with four feet down stands [m/s]."""
+
 DECELERATION_WINDOW = 0.04
 """Time over which the deceleration is averaged [s]."""
 
@@ -155,6 +158,8 @@ class StopOutcome:
         Time to rest of the oscillators: predicted, bounded, measured [s]; NaN where there is none.
     body_rest_s : float
         Time after which the body stays below 1 cm/s [s].
+    still_s : float
+        Time after which all feet stay loaded and the body below 2 cm/s [s].
     slip_m : float
         Distance slid under load before the body was at rest, the mean over the feet [m].
     displacement_m : float
@@ -174,6 +179,7 @@ class StopOutcome:
     bound_s: float = np.nan
     measured_s: float = np.nan
     body_rest_s: float = np.nan
+    still_s: float = np.nan
     slip_m: float = np.nan
     displacement_m: float = np.nan
     tilt: float = np.nan
@@ -220,6 +226,9 @@ def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float)
     still, loaded = speed[last] < STILL_SPEED, hold.feet.force[last] > contact_force
     moving = np.flatnonzero(speed >= STILL_SPEED)
     rest = min(moving[-1] + 1, len(time) - 1) if moving.size else 0
+    loaded_feet = (hold.feet.force > contact_force).all(axis=1)
+    unsteady = np.flatnonzero((speed >= STANDING_SPEED) | ~loaded_feet)
+    still_s = time[min(unsteady[-1] + 1, len(time) - 1)] if unsteady.size else 0.0
     until_rest = Recording(**{name: taken(getattr(hold, name), slice(rest + 1))
                               for name in ('joints', 'odometry', 'feet')})
     slip = motion.foot_slip(until_rest, robot, contact_force)
@@ -228,6 +237,7 @@ def body_at_rest(hold: Recording, robot: RobotDescription, contact_force: float)
     change = np.hypot(*(velocity[rows:] - velocity[:-rows]).T)
     return StopOutcome(
         fell=False, standing=bool(still.all() and loaded.all()), body_rest_s=float(time[rest]),
+        still_s=float(still_s),
         slip_m=0.0 if slip is None else float(slip.mean()),
         displacement_m=float(np.hypot(*(path[rest] - path[0]))),
         tilt=float(motion.tilt(odometry.quaternion).max()),

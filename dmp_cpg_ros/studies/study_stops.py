@@ -37,6 +37,7 @@ from numpy.typing import NDArray
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
+from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.errors import ParameterError
@@ -64,8 +65,9 @@ SHORTEST_HOLD, LONGEST_HOLD, HOLD_AT_REST = 2.5, 12.0, 1.0
 SPEED_WINDOW = 2.0
 """Time at the end over which the resumed speed is averaged [s]."""
 
-COLUMNS = ('gait', 'm/s', 'leg', 'cadence', 'stopped by', 'cases', 'fell', 'stood', 'walked on',
-           'prediction error %', 'over bound', 'bound s', 'rest s', 'body rest s', 'slip mm',
+COLUMNS = ('gait', 'm/s', 'leg', 'cadence', 'braking', 'stopped by', 'cases', 'fell', 'stood',
+           'walked on', 'prediction error %', 'over bound', 'bound s', 'rest s', 'body rest s',
+           'still s', 'slip mm',
            'moved m', 'tilt deg', 'm/s^2')
 
 
@@ -84,11 +86,15 @@ class StopCase:
     cadence : float
         Factor on the gait's cadence.
     leg : str
-        Leg whose oscillator is inhibited.
+        Leg whose oscillator is inhibited, or ``auto``.
     push : float
         Lateral impulse in the instant of the request [N s].
     method : str
         One of ``METHODS``.
+    braking : float
+        Least deceleration of the reference [m/s^2].
+    resumes : bool
+        Whether it walks on after the hold.
     """
 
     gait: str
@@ -98,6 +104,8 @@ class StopCase:
     leg: str = 'fl'
     push: float = 0.0
     method: str = METHODS[0]
+    braking: float = 0.0
+    resumes: bool = True
 
 
 Results = list[tuple[StopCase, StopOutcome]]
@@ -113,8 +121,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         help='commanded speeds [m/s] (default: 0.2 0.5 0.8)')
     parser.add_argument('--gaits', nargs='+', default=['amble', 'walk', 'trot'], metavar='GAIT',
                         help='gaits by name (default: amble walk trot)')
-    parser.add_argument('--legs', nargs='+', default=[LEGS[0]], choices=LEGS,
-                        help='legs whose oscillator is inhibited, one at a time (default: fl)')
+    parser.add_argument('--legs', nargs='+', default=[LEGS[0]], choices=(*LEGS, AUTO),
+                        help='legs whose oscillator is inhibited, one at a time; auto: whichever '
+                        'comes first (default: fl)')
+    parser.add_argument('--braking', type=float, nargs='+', default=[0.0], metavar='A',
+                        help='least decelerations of the reference in a stop [m/s^2] (default: 0)')
+    parser.add_argument('--no-resume', action='store_true', help='do not walk on after the hold')
     parser.add_argument('--cadences', type=float, nargs='+', default=[1.0], metavar='FACTOR',
                         help='factors on the cadence of the gait (default: 1)')
     parser.add_argument('--push', type=float, default=0.0, metavar='IMPULSE',
@@ -127,7 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
     cases = cases_of(options)
-    suite = suite_of(options.file, cases[0].leg)
+    suite = suite_of(options.file, cases[0].leg, cases[0].braking)
     for gait in options.gaits:
         load_gait(gait)
     results = run_cases(cases, options.file, options.jobs, quiet=options.quiet)
@@ -150,22 +162,25 @@ def cases_of(options: argparse.Namespace) -> list[StopCase]:
         raise ParameterError(f'--phases {options.phases} must be at least 1')
     methods = METHODS if options.baselines else METHODS[:1]
     phases = [i / options.phases for i in range(options.phases)]
-    return [StopCase(gait, speed, phase, cadence, leg, options.push, method)
-            for gait, speed, cadence, leg, method, phase in product(
-                options.gaits, options.speeds, options.cadences, options.legs, methods, phases)]
+    return [StopCase(gait, speed, phase, cadence, leg, options.push, method, braking,
+                     not options.no_resume)
+            for gait, speed, cadence, leg, braking, method, phase in product(
+                options.gaits, options.speeds, options.cadences, options.legs, options.braking,
+                methods, phases)]
 
 
 @lru_cache
-def suite_of(file: str | None, leg: str) -> Suite:
+def suite_of(file: str | None, leg: str, braking: float = 0.0) -> Suite:
     """Parameter file with one inhibited leg, and a command that needs no repetition."""
-    return load_suite(file, {'inhibited_legs': [leg], 'cmd_vel_timeout': 0.0})
+    return load_suite(file, {'inhibited_legs': [leg], 'braking': braking, 'cmd_vel_timeout': 0.0})
 
 
 def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     """Run the cases of one walk with the robot and the parameters of a parameter file, and the
     certified time to rest, which holds for every phase and is infinite without a certificate.
     """
-    suite, gait = suite_of(file, cases[0].leg), load_gait(cases[0].gait).scaled(cases[0].cadence)
+    suite = suite_of(file, cases[0].leg, cases[0].braking)
+    gait = load_gait(cases[0].gait).scaled(cases[0].cadence)
     robot, p = MujocoRobot(suite.robot_file, suite.tick_ns), suite.parameters
     certificate = certify(
         GaitNetwork(p.canonical, gait, body_scale(robot.description)), p.inhibition, p.reference,
@@ -213,7 +228,7 @@ class FreezingLoop(WalkingLoop):
             return super().tick(state)
         dt = self._clock.step(state.time_ns)
         self.stop = replace(self.stop, time_ns=state.time_ns)
-        self.r = self.reference.step(self.r, np.zeros(3), dt)
+        self.r = self.reference.towards(self.r, (0.0, 0.0, 0.0), True, dt)
         self._frozen = self._frozen | ~(self._finish_swing & self._swinging())
         omega = np.where(self._frozen, 0.0, self.network.omega(self.r))
         x = state_at(phase(self.x) + omega * dt, np.hypot(self.x[:, 0], self.x[:, 1]))
@@ -294,8 +309,8 @@ def _outcome(run: LoopRun[FreezingLoop], case: StopCase, bound_s: float) -> Stop
     robot = run.robot.description
     at_rest = runs.body_at_rest(
         runs.recording_of(run.states), robot, RunContext(robot=robot).contact_force)
-    if case.method != METHODS[0]:
-        return at_rest
+    if case.method != METHODS[0] or not case.resumes:
+        return replace(at_rest, **times)
     run.loop.request(False)
     run.walk(WALKING_AFTER)
     last = run.states[-round(SPEED_WINDOW / run.tick_s):]
@@ -320,15 +335,15 @@ def table(results: Results) -> str:
     """Markdown table: a row per gait, speed, cadence, leg and method, and one for each method."""
     rows = [([f'{part:g}' if isinstance(part, float) else part for part in key], list(group))
             for key, group in groupby(results, lambda result: _key(result[0]))]
-    rows += [(['all', '', '', '', method], [result for result in results
+    rows += [(['all', '', '', '', '', method], [result for result in results
                                             if result[0].method == method]) for method in METHODS]
     return markdown_table(COLUMNS, [
         (*labels, *_cells([outcome for _, outcome in group], labels[-1]))
         for labels, group in rows if group])
 
 
-def _key(case: StopCase) -> tuple[str, float, str, float, str]:
-    return case.gait, case.speed, case.leg, case.cadence, case.method
+def _key(case: StopCase) -> tuple[str, float, str, float, float, str]:
+    return case.gait, case.speed, case.leg, case.cadence, case.braking, case.method
 
 
 def _cells(outcomes: Sequence[StopOutcome], method: str) -> tuple[str, ...]:
@@ -340,7 +355,8 @@ def _cells(outcomes: Sequence[StopOutcome], method: str) -> tuple[str, ...]:
         else ' / '.join(f'{scale * value:.{digits}f}' for value in of.spread(name))
         for name, scale, digits in (
             ('prediction_error', 100.0, 1), ('bound_s', 1.0, 2), ('measured_s', 1.0, 2),
-            ('body_rest_s', 1.0, 2), ('slip_m', 1e3, 1), ('displacement_m', 1.0, 2),
+            ('body_rest_s', 1.0, 2), ('still_s', 1.0, 2), ('slip_m', 1e3, 1),
+            ('displacement_m', 1.0, 2),
             ('tilt', 180.0 / pi, 1), ('deceleration', 1.0, 1)))
     count = len(outcomes)
     return (str(count), str(fell), percent(stood, count),

@@ -48,7 +48,7 @@ events:
   - {{at: 0.1, command: {{v_x: 0.4}}}}
 {refused}\
   - {{at: 1.6, set: {{cadence_scale: 1.1, rho: 10, coupling_graph: ring}}}}
-  - {{at: 1.8, set: {{max_speed: 0.3, alpha_r: 4.0}}}}
+  - {{at: 1.8, set: {{max_speed: 0.3, alpha_r: 4.0, braking: 2.0}}}}
   - {{at: 2.0, set: {{inhibition_gain: 600, inhibited_legs: [{leg}]}}}}
   - {{at: 2.4, inhibit: true}}
 """

@@ -230,7 +230,8 @@ def _certificate(s: Setting) -> Certificate:
         tuple(rows), contraction.reach, s.span.omega[1], stop, start,
         () if rest is None else tuple(rest.phase_ahead.tolist()),
         () if rest is None else tuple(rest.radius.tolist()), contact,
-        stop_distance(reference, fastest, fastest, s.tick_s),
+        stop_distance(reference, fastest, fastest, s.tick_s,
+                      reference.max_turn_rate * network.scale.hip_radius),
         s.parameters.inhibition.inhibited_legs)
 
 

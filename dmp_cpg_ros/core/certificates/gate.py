@@ -105,8 +105,9 @@ class Running:
         """Bound on the way of the reference r, ndarray (3,), after a stop is requested while a
         command acts [m].
         """
+        turning = max(abs(float(r[2])), abs(command[2])) * self.scale.hip_radius
         return stop_distance(self.parameters.reference, math.hypot(*r[:2]),
-                             math.hypot(*command[:2]), self.tick_s)
+                             math.hypot(*command[:2]), self.tick_s, turning)
 
     def refused_now(self, before: Running, network: GaitNetwork, inhibition: Inhibition,
                     x: Array) -> str:

@@ -63,6 +63,8 @@ def proof_of(network: GaitNetwork, inhibition: InhibitionParameters,
     """
     if inhibition.auto:
         raise ParameterError('a proof is for inhibited_legs that are named, not for auto')
+    if reference.braking:
+        raise ParameterError('a proof is for a reference without braking')
     span = operating_range(network, inhibition, reference)
     analysis = analyse_network(network, inhibition, span)
     p = _parameters(network, inhibition, reference, leg, posture, tick_s, span, analysis)

@@ -28,6 +28,7 @@ from dmp_cpg_ros.core.inhibition import entry, supervisor
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import phi_functions
+from dmp_cpg_ros.core.reference.stop_distance import slowing_time
 
 DELAY_TICKS = 6
 """Ticks that requests, arming and sampling may add to the continuous bound."""
@@ -62,9 +63,11 @@ def time_to_rest(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium | N
     if not span.armed_speed > 0.0 < span.foot_speed:
         arming = 0.0 if span.foot_speed == 0.0 else math.inf
     else:
-        arming = math.log(span.foot_speed / span.armed_speed) / alpha_r
+        arming = slowing_time(s.parameters.reference, span.foot_speed, span.armed_speed, s.tick_s)
     arriving = max(0.0, s.way - s.arc) / span.omega_armed[0]
-    settling = _settling(s, capture, rest, span.armed_speed * math.exp(-alpha_r * arriving))
+    slowed = min(span.armed_speed * math.exp(-alpha_r * arriving), max(
+        0.0, span.armed_speed - s.parameters.reference.braking * arriving))
+    settling = _settling(s, capture, rest, slowed)
     return arming + arriving + settling + DELAY_TICKS * s.tick_s
 
 
@@ -175,20 +178,21 @@ def later_arming(s: Setting, x: Array, r: Array) -> float:
     speed, limit = s.network.scale.foot_speed(*r.tolist()), max(span.foot_speed, span.armed_speed)
     if not speed > limit:
         return locking
-    slowing = math.log(speed / limit) / s.parameters.reference.alpha_r if limit > 0.0 else math.inf
-    return max(locking, slowing)
+    return max(locking, slowing_time(s.parameters.reference, speed, limit, s.tick_s))
 
 
 def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed: float) -> float:
     """Time from any state in the capture set to the thresholds of rest [s]."""
     system, r, span = s.network.system, s.network.parameters.radius, s.span
     alpha_r, L = s.parameters.reference.alpha_r, comparison_laplacian(system.graph)
+    a_b = s.parameters.reference.braking
     K = L + np.diag(capture.gains) - np.diag(growth(system.rho, system.radius,
                                                     capture.smallest_radius))
     phi = phi_functions(-K * _STEP, 1)
     carry, feed = phi[0], _STEP * phi[1].sum(axis=1)
     shape = np.linalg.solve(K, np.ones(len(K)))              # K shape = 1: bounds above it fall
-    turning = span.omega_slope * alpha_r * speed * r         # |∂f/∂ω| |ω̇| at first
+    # |∂f/∂ω| |ω̇| at first: sideways and turning count twice in the speed that sets the cadence
+    turning = span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r
     away = span.omega_slope * speed * r                      # |∂f/∂ω| |ω − ω_rest| at first
     u = capture.distance
     fastest = (span.omega_armed[1] * r + 0.385 * system.rho * r**3 + capture.gains * u
@@ -207,5 +211,10 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
         wanted = np.minimum(1.0, phase_rate / span.omega_armed[0])
         activity = wanted + (activity - wanted) * swing_fade
         v, e = carry @ v + feed * turning, carry @ e + feed * away
-        speed, turning, away = speed * fade, turning * fade, away * fade
+        if a_b > 0.0:
+            speed = max(0.0, min(speed * fade, speed - a_b * _STEP))
+            turning = span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r
+            away = span.omega_slope * speed * r
+        else:
+            speed, turning, away = speed * fade, turning * fade, away * fade
     return math.inf

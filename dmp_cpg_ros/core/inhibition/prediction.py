@@ -6,8 +6,6 @@ from __future__ import annotations
 
 from math import ceil, inf
 
-import numpy as np
-
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.gait.running import CanonicalState, RunningGait
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
@@ -47,8 +45,7 @@ def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: R
     tick_ns = round(dt * 1e9)
     start_ns, inhibition = state.time_ns, published
     for k in range(1, ceil(horizon / dt) + 1):
-        r_ext = np.zeros(3) if inhibition.requested else np.array(command)
-        r = reference.step(r, r_ext, dt)
+        r = reference.towards(r, command, inhibition.requested, dt)
         canon = canonical.step(canon, r, inhibition, dt)
         state = supervisor.step(
             state, start_ns + k * tick_ns, canonical.network(canon.gait), canon.x, canon.x_dot,

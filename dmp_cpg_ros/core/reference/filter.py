@@ -7,6 +7,10 @@ v̇ = α_r (v_ext − v),   γ̇ = α_r (γ_ext − γ)
 
 |v̇| is limited, for no foot can push the body harder; but not where the filter brakes no harder
 than it would for v_ext = 0, so that stops are those of the plain filter.
+
+While a stop is requested, r goes to zero along its own direction, ṙ = −max(α_r, a_b/s) r with
+s = |v| + |γ| l the largest speed of a foot: as fast as the filter or with the constant
+deceleration a_b, whichever is faster, so that it is zero after a finite time and never overshoots.
 """
 
 from __future__ import annotations
@@ -40,6 +44,9 @@ class ReferenceParameters(Parameters):
     max_acceleration: float = parameter(
         4.0, 'largest acceleration of the reference, except when braking to rest', 0.1, 1e3,
         unit='m/s^2')
+    braking: float = parameter(
+        0.0, 'least deceleration of the reference while a stop is requested; 0: as alpha_r has it',
+        0.0, 20.0, unit='m/s^2')
     cmd_vel_timeout: float = parameter(
         0.5, 'time without cmd_vel after which the command is zero; 0: never', 0.0, 3600.0,
         unit='s')
@@ -109,11 +116,32 @@ class CommandGate:
 
 
 class ReferenceSystem:
-    """First-order filters on v_x, v_y and γ with a limit on the acceleration."""
+    """First-order filters on v_x, v_y and γ with a limit on the acceleration.
 
-    def __init__(self, parameters: ReferenceParameters) -> None:
+    Parameters
+    ----------
+    parameters : ReferenceParameters
+        Rate and limits.
+    foot_distance : float
+        l, distance of a foot from the base's origin, for braking while it turns [m].
+    """
+
+    def __init__(self, parameters: ReferenceParameters, foot_distance: float = 0.0) -> None:
         """Keep the parameters."""
         self.parameters, self._filter = parameters, FirstOrderFilter(parameters.alpha_r)
+        self._foot_distance = foot_distance
+
+    def towards(self, r: Array, command: tuple[float, float, float], stopping: bool, dt: float
+                ) -> Array:
+        """Advance towards a command, or to zero while a stop is requested; ndarray (3,)."""
+        if not stopping:
+            return self.step(r, np.array(command), dt)
+        v_x, v_y, gamma = r.tolist()
+        speed = (v_x * v_x + v_y * v_y) ** 0.5 + abs(gamma) * self._foot_distance
+        kept, lost = self._filter.kept(dt), self.parameters.braking * dt
+        if lost <= (1.0 - kept) * speed:
+            return self.step(r, np.zeros(3), dt)
+        return r * max(0.0, 1.0 - lost / speed) if speed > 0.0 else np.zeros(3)
 
     def step(self, r: Array, r_ext: Array, dt: float) -> Array:
         """Advance: r(t + dt) = r_ext + (r − r_ext) exp(−α_r dt), less where v changes too fast.

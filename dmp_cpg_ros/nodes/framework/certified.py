@@ -31,7 +31,7 @@ from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import GaitChoiceParameters, RunningGait, highest_speed
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
-from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
+from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
 from dmp_cpg_ros.nodes.framework.parameters import plain
@@ -318,6 +318,11 @@ class Certified:
         of = self._node.parameters_of
         return RunningGait(of(CanonicalParameters), self._scale, self.gaits,
                            of(GaitChangeParameters), of(GaitChoiceParameters), quarter)
+
+    def reference(self) -> ReferenceSystem:
+        """Reference system of the robot."""
+        return ReferenceSystem(
+            self._node.parameters_of(ReferenceParameters), self._scale.hip_radius)
 
     def commands(self) -> CommandGate:
         """What comes on ``cmd_vel``, limited."""

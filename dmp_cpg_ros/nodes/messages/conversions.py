@@ -353,8 +353,8 @@ class InhibitionGainsReader:
             raise DataError(f'{", ".join(layouts.GAIN_ROWS[-4:])} must be 0 or 1, not {flags}')
         if not 0.0 <= rest <= 2.0 * pi:
             raise DataError(f'rest_phase = {rest} must be from 0 to 2 pi')
-        return Inhibition(
-            bool(flags[0]), gains, radius, *map(bool, flags[1:]), rest_phase=rest)
+        requested, at_rest, automatic, opposite = map(bool, flags)
+        return Inhibition(requested, gains, radius, at_rest, automatic, opposite, rest)
 
 
 def read_votes(message: JointState) -> tuple[dict[str, float], str]:

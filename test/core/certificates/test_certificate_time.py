@@ -17,7 +17,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
-from dmp_cpg_ros.core.reference.stop_distance import stop_distance
+from dmp_cpg_ros.core.reference.stop_distance import slowing_time, stop_distance
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
 LEG, POSTURE = LegParameters(), PostureParameters()
@@ -29,7 +29,8 @@ class Gait:
     def __init__(self, gait: GaitNetwork, inhibition: InhibitionParameters,
                  reference: ReferenceParameters, x: np.ndarray, r: np.ndarray,
                  stop: SupervisorState | None = None) -> None:
-        self.network, self.reference = gait, ReferenceSystem(reference)
+        self.network, self.reference = gait, ReferenceSystem(
+            reference, gait.scale.hip_radius)
         self.supervisor = GaitSupervisor(inhibition, VotingParameters(), LEG.activity_rate)
         self.stop = stop or replace(self.supervisor.initial_state(), state='walking',
                                     requested=False, armed=False, activity=np.ones(4))
@@ -39,8 +40,7 @@ class Gait:
 
     def tick(self) -> SupervisorState:
         self.tick_count += 1
-        r_ext = np.zeros(3) if self.published.requested else np.array(self.command)
-        self.r = self.reference.step(self.r, r_ext, TICK)
+        self.r = self.reference.towards(self.r, self.command, self.published.requested, TICK)
         self.x = self.network.step(self.x, self.r, self.published, TICK)
         rate = self.network.rate(self.x, self.r, self.published)
         self.stop = self.supervisor.step(
@@ -70,10 +70,14 @@ def settings() -> list[tuple[str, dict[str, object], InhibitionParameters, Refer
          InhibitionParameters(auto_inhibit=False, inhibition_gain=320.0, region_radius=0.4), slow),
         ('amble', {'coupling_graph': 'directed_ring', 'radius': 0.5, 'rho': 30.0},
          InhibitionParameters(auto_inhibit=False, region_radius=0.15,
-                              inhibited_legs=('fr', 'rl')), slow)]
+                              inhibited_legs=('fr', 'rl')), slow),
+        ('amble', {}, InhibitionParameters(auto_inhibit=False, inhibited_legs=('auto',)),
+         replace(plain, braking=3.0)),
+        ('trot', {'coupling_graph': 'ring'}, InhibitionParameters(auto_inhibit=False),
+         replace(slow, braking=1.0))]
 
 
-@pytest.mark.parametrize('case', range(5))
+@pytest.mark.parametrize('case', range(7))
 def test_no_stop_takes_longer_than_its_bound_from_any_phase_and_speed(case: int) -> None:
     gait, canonical, inhibition, reference = settings()[case]
     oscillators = network(gait, **canonical)
@@ -90,7 +94,7 @@ def test_no_stop_takes_longer_than_its_bound_from_any_phase_and_speed(case: int)
     assert found.time_to_rest < 1.6 * longest            # a bound, and not a platitude
 
 
-@pytest.mark.parametrize('case', range(5))
+@pytest.mark.parametrize('case', range(7))
 def test_no_start_takes_longer_than_its_bound_and_stops_within_starts_keep_theirs(
         case: int) -> None:
     gait, canonical, inhibition, reference = settings()[case]
@@ -130,6 +134,25 @@ def test_the_reference_does_not_go_farther_than_its_bound_and_nearly_as_far(
     bound = stop_distance(reference, *[float(np.hypot(*case.r[:2]))] * 2, TICK)
     way = _way_to_rest(case)
     assert way <= bound <= 1.25 * way
+
+
+@pytest.mark.parametrize(('speed', 'braking'), [(0.2, 1.0), (1.0, 3.0), (3.0, 6.0)])
+@pytest.mark.parametrize('turn', [0.0, 1.5])
+def test_braking_is_as_fast_as_is_asked_and_within_its_bounds(
+        speed: float, braking: float, turn: float) -> None:
+    reference, r = ReferenceParameters(braking=braking), np.array([speed, 0.2 * speed, turn])
+    of, scale = ReferenceSystem(reference, network().scale.hip_radius), network().scale
+    start, feet, way, ticks = r, scale.foot_speed(*r), 0.0, 0
+    while r.any():
+        way += TICK * float(np.hypot(*r[:2]))
+        before, r = r, of.towards(r, (9.0, 9.0, 9.0), True, TICK)
+        ticks += 1
+        assert np.all(np.abs(r) <= np.abs(before)) and np.all(r * start >= 0.0)  # no overshoot
+        assert np.allclose(np.cross(r, start), 0.0)                       # along the same curve
+    assert ticks * TICK <= slowing_time(reference, feet, 0.0, TICK) + TICK
+    most = float(np.hypot(*start[:2]))
+    bound = stop_distance(reference, most, most, TICK, turn * scale.hip_radius)
+    assert way + 2 * TICK * most <= bound + 1e-12 and bound <= 1.1 * (way + 2 * TICK * most)
 
 
 def test_a_reference_that_speeds_up_when_a_stop_is_requested_keeps_the_bound() -> None:
