@@ -45,12 +45,19 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
 from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import loop_recording as runs
 from dmp_cpg_ros.studies.loop_recording import LoopRun, StopOutcome
-from dmp_cpg_ros.studies.output import markdown_table, parser_of, percent, write_results
+from dmp_cpg_ros.studies.output import (
+    at_least_one,
+    markdown_table,
+    parser_of,
+    percent,
+    write_results,
+)
 from dmp_cpg_ros.suite import Suite, load_gait, load_suite
 
 METHODS = ('inhibition', 'freeze', 'finish_swing')
@@ -95,6 +102,10 @@ class StopCase:
         Least deceleration of the reference [m/s^2].
     resumes : bool
         Whether it walks on after the hold.
+    friction : float
+        Of the ground; 0: that of the model.
+    payload : float
+        Carried at the base's centre of mass, as a share of the robot's mass.
     """
 
     gait: str
@@ -106,6 +117,8 @@ class StopCase:
     method: str = METHODS[0]
     braking: float = 0.0
     resumes: bool = True
+    friction: float = 0.0
+    payload: float = 0.0
 
 
 Results = list[tuple[StopCase, StopOutcome]]
@@ -133,18 +146,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         help='lateral impulse in the instant of the request [N s] (default: 0)')
     parser.add_argument('--baselines', action='store_true',
                         help='also stop by freezing all phases, and by finishing every swing')
+    parser.add_argument('--random', type=at_least_one, metavar='N',
+                        help='instead of the phases N stops at random: gait, speed between the '
+                        'extremes of --speeds, phase, friction 0.4 to 1, payload up to 30 %%; '
+                        'says within which time the body stands with 95 %% confidence')
+    parser.add_argument('--seed', type=int, default=0, help='of --random (default: 0)')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
     return run_command(parser, arguments, _study)
 
 
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
-    cases = cases_of(options)
+    cases = random_cases(options) if options.random else cases_of(options)
     suite = suite_of(options.file, cases[0].leg, cases[0].braking)
     for gait in options.gaits:
         load_gait(gait)
     results = run_cases(cases, options.file, options.jobs, quiet=options.quiet)
     print(f'{suite.file}: {len(cases)} stops; columns with two numbers are median / worst\n')
-    print(table(results))
+    print(table(results, by_case=not options.random))
+    if options.random:
+        print(f'\n{scenario_bound([outcome for _, outcome in results])}')
     print(*(f'fell: {case}' for case, outcome in results if outcome.fell), sep='\n')
     write_results(options.json, [vars(case) | vars(outcome) for case, outcome in results])
     return int(any(outcome.fell for case, outcome in results if case.method == METHODS[0]))
@@ -169,6 +189,30 @@ def cases_of(options: argparse.Namespace) -> list[StopCase]:
                 methods, phases)]
 
 
+def random_cases(options: argparse.Namespace) -> list[StopCase]:
+    """Independent stops of one leg, or of any, with one braking."""
+    rng, speeds = np.random.default_rng(options.seed), options.speeds
+    return [StopCase(str(rng.choice(options.gaits)), float(rng.uniform(min(speeds), max(speeds))),
+                     float(rng.random()), leg=options.legs[0], braking=options.braking[0],
+                     resumes=not options.no_resume, friction=float(rng.uniform(0.4, 1.0)),
+                     payload=float(rng.uniform(0.0, 0.3))) for _ in range(options.random)]
+
+
+def scenario_bound(outcomes: Sequence[StopOutcome], doubt: float = 0.05) -> str:
+    """What N independent stops say of the next one: the largest of N numbers is exceeded with a
+    probability below ε unless something of probability (1 − ε)^N = β has happened (Wilks 1941).
+    """
+    share = 1.0 - doubt ** (1.0 / len(outcomes))
+    if any(outcome.fell or not outcome.standing for outcome in outcomes):
+        return 'not every body stood: nothing is said of the next one'
+    still, way = (max(getattr(outcome, name) for outcome in outcomes)
+                  for name in ('still_s', 'displacement_m'))
+    return (f'{len(outcomes)} stops: the body of another one drawn alike stands later than '
+            f'{still:.3f} s, or, apart from that, goes farther than {way:.3f} m, with a '
+            f'probability below {100.0 * share:.1f} % each, at {100.0 * (1.0 - doubt):.0f} % '
+            'confidence')
+
+
 @lru_cache
 def suite_of(file: str | None, leg: str, braking: float = 0.0) -> Suite:
     """Parameter file with one inhibited leg, and a command that needs no repetition."""
@@ -181,7 +225,9 @@ def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     """
     suite = suite_of(file, cases[0].leg, cases[0].braking)
     gait = load_gait(cases[0].gait).scaled(cases[0].cadence)
-    robot, p = MujocoRobot(suite.robot_file, suite.tick_ns), suite.parameters
+    robot, p = MujocoRobot(suite.robot_file, suite.tick_ns,
+                           world=World(friction=cases[0].friction)), suite.parameters
+    robot.model.body_mass[robot.base] += cases[0].payload * robot.description.mass
     certificate = certify(
         GaitNetwork(p.canonical, gait, body_scale(robot.description)), p.inhibition, p.reference,
         p.leg, p.posture, suite.tick_ns * 1e-9, voting=p.voting)
@@ -192,7 +238,8 @@ def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
               quiet: bool = True) -> Results:
     """Run cases on several processes; the results do not depend on how many."""
     outcomes: list[StopOutcome] = []
-    walks = [list(group) for _, group in groupby(cases, _key)]
+    walks = [list(group) for _, group in groupby(
+        cases, lambda case: (*_key(case), case.friction, case.payload))]
     with Pool(jobs) as pool:
         for of_walk in pool.imap(partial(run_walk, file=file), walks):
             outcomes += of_walk
@@ -331,10 +378,12 @@ def _held(run: LoopRun[FreezingLoop]) -> tuple[float, float]:
     return predicted, np.nan if run.fell() and measured == np.inf else measured
 
 
-def table(results: Results) -> str:
-    """Markdown table: a row per gait, speed, cadence, leg and method, and one for each method."""
+def table(results: Results, by_case: bool = True) -> str:
+    """Markdown table: a row per gait, speed, cadence, leg and method unless there is to be none,
+    and one for each method.
+    """
     rows = [([f'{part:g}' if isinstance(part, float) else part for part in key], list(group))
-            for key, group in groupby(results, lambda result: _key(result[0]))]
+            for key, group in groupby(results, lambda result: _key(result[0])) if by_case]
     rows += [(['all', '', '', '', '', method], [result for result in results
                                             if result[0].method == method]) for method in METHODS]
     return markdown_table(COLUMNS, [

@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import json
+import re
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ from dmp_cpg_ros.analysis.recording import (
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest
+from dmp_cpg_ros.studies.study_stops import random_cases, scenario_bound
 
 ROBOT = quadruped()
 
@@ -48,6 +51,35 @@ def test_the_body_is_at_rest_when_it_stays_slower_than_a_centimetre_per_second()
     assert outcome.slip_m == pytest.approx(outcome.displacement_m)  # the feet go with the body
     assert outcome.deceleration == pytest.approx(0.195 / 0.04)
     assert outcome.tilt == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_body_stands_when_it_stays_below_two_centimetres_per_second_on_four_feet() -> None:
+    speed = np.repeat([0.2, 0.015, 0.0], [100, 100, 300])
+    assert body_at_rest(hold(speed), ROBOT, 2.0).still_s == pytest.approx(100 * TICK)
+    lifted = hold(speed)
+    lifted.feet.force[:150, 2] = 0.0
+    assert body_at_rest(lifted, ROBOT, 2.0).still_s == pytest.approx(150 * TICK)
+
+
+def test_random_stops_bound_the_next_one_as_often_as_is_said() -> None:
+    rng, misses = np.random.default_rng(3), 0
+    for _ in range(200):
+        times = rng.exponential(size=30)
+        told = scenario_bound([StopOutcome(False, True, still_s=t, displacement_m=t)
+                               for t in times])
+        assert f'{times.max():.3f} s' in told
+        share = float(re.search(r'below ([0-9.]+) %', told)[1]) / 100.0  # type: ignore[index]
+        misses += np.exp(-times.max()) > share         # the true probability of exceeding it
+    assert misses <= 20                                # 5 % of 200 are 10
+    assert 'nothing is said' in scenario_bound([StopOutcome(True)])
+
+
+def test_random_stops_depend_on_the_seed_only() -> None:
+    options = Namespace(random=5, seed=2, gaits=['amble', 'trot'], speeds=[0.5, 1.5],
+                        legs=['auto'], braking=[3.0], no_resume=True)
+    cases = random_cases(options)
+    assert cases == random_cases(options) and len(set(cases)) == 5
+    assert all(0.5 <= case.speed <= 1.5 and 0.4 <= case.friction <= 1.0 for case in cases)
 
 
 @pytest.mark.parametrize(('speed', 'force'), [(0.02, 20.0), (0.0, 1.0)])
