@@ -275,6 +275,9 @@ class GaitSupervisor:
 
     def _stopping(self, state: SupervisorState, network: GaitNetwork, x: Array,
                   rates: list[float], speed: float) -> SupervisorState:
+        if not self.parameters.auto and self.parameters.armed_gains[state.leg] == 0.0:
+            # auto keeps what holds when it takes over in this stop
+            state = replace_unchecked(state, leg=int(self.parameters.armed_gains.argmax()))
         armed = inside = state.armed and self._inside(state, network, x)
         if not inside:
             armed = speed <= self.parameters.capture_speed and self.in_places(network, x)

@@ -151,9 +151,14 @@ def test_at_rest_auto_takes_over_and_hands_over_the_leg_that_holds() -> None:
     # a graph in which the leg that holds could not: refused in this rest
     if loop.stop.leg != 0:
         assert AUTO in loop.change({'coupling_graph': 'star', 'coupling_gain': 30.0})
-    assert loop.change({'inhibited_legs': (other,)}) == ''
+    for legs in ((other,), (AUTO,)):
+        assert loop.change({'inhibited_legs': legs}) == ''
+        go(loop, 1.0)
+        assert loop.stop.state == 'at_rest'
+        assert np.flatnonzero(loop.inhibition.gains).tolist() == [LEGS.index(other)]
+    assert loop.change({'inhibited_legs': LEGS}) == ''
     go(loop, 1.0)
-    assert loop.stop.state == 'at_rest'
+    assert AUTO in loop.change({'inhibited_legs': (AUTO,)})       # one of four that hold
 
 
 def test_auto_stands_alone() -> None:
