@@ -52,7 +52,7 @@ def watching(ros: Ros, acting: Inhibition | None) -> tuple[InhibitionNode, int]:
         node._find(acting)
     for _ in range(30):
         node.on_tick(state.time_ns, {'canonical_state': (tick.x, tick.x_dot, tick.gait),
-                                     'reference': tick.r, 'posture_feedback': 'standing'})
+                                     'reference': tick.r, 'posture_feedback': ('standing', None)})
     return node, state.time_ns
 
 
