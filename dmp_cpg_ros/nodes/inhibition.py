@@ -286,6 +286,8 @@ class InhibitionNode(SuiteNode):
             self._supervisor, self._reference, self._running_gait, self._state, self._acting,
             canon, self._r, self._gate.at(self._state.time_ns),
             self.parameters_of(TickParameters).tick_ns * 1e-9, body_mode=self._body_mode)
+        if isfinite(self._state.measured_s):  # released by a push in full swing: it runs already
+            self._predicted = self._state.measured_s
         running = self.certified.running_in(gait)
         self._way = running.stop_distance(
             self._r, self._gate.at(self._state.time_ns)) if self._state.requested else nan
