@@ -51,6 +51,7 @@ from std_msgs.msg import String
 
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.errors import DmpCpgError
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.layouts import GAIN_ROWS
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.messages.interfaces import TOPICS, Interface, interface
@@ -292,10 +293,12 @@ def _huge(node: Intruder) -> None:
 
 
 def _gains(node: Intruder) -> None:
-    for values in ([-1e6] * 4 + [0.3, 1.0, 0.0], [1e300] * 4 + [0.3, 1.0, 0.0],
-                   [400.0] * 4 + [0.3, 1.0, 1.0], [0.0] * 4 + [0.3, 0.0, 0.0]):
+    for gain, requested, at_rest in ((-1e6, 1.0, 0.0), (1e300, 1.0, 0.0), (400.0, 1.0, 1.0),
+                                     (0.0, 0.0, 0.0)):
+        values = {**dict.fromkeys(GAIN_ROWS, 0.0), **dict.fromkeys(LEGS, gain),
+                  'region_radius': 0.3, 'requested': requested, 'at_rest': at_rest}
         for stamp_ns in (0, node.stamp_ns()):
-            message = JointState(name=list(GAIN_ROWS), position=values)
+            message = JointState(name=list(values), position=list(values.values()))
             set_stamp(message.header.stamp, stamp_ns)
             node.publish('inhibition_gains', message)
             node.spin(0.2)
