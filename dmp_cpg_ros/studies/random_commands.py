@@ -1,0 +1,182 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Walks under random commands: velocities that jump every 0.5 to 3 s over all that may be asked,
+gaits that change every 2 to 8 s, stops every 4 to 14 s that are held for 0.2 to 4.5 s.
+
+Prints the falls with what was asked when, the stops that took longer than their bound or another
+time than predicted, and the share of what was asked that was granted. The MuJoCo robot in the
+plain loop, with the state estimated from noisy sensors. Equal seeds give equal walks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from multiprocessing import Pool
+from typing import Any
+
+import numpy as np
+
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.studies import output
+from dmp_cpg_ros.studies.walking_trials import Velocity, Walk, suite_of
+from dmp_cpg_ros.suite import load_gaits
+
+JUMPS, CHANGES, STOPS, HOLDS = (0.5, 3.0), (2.0, 8.0), (4.0, 14.0), (0.2, 4.5)
+"""Times between jumps of the command, changes of the gait and stops, and of holding one [s]."""
+
+GAITS = ('amble', 'walk', 'trot', 'pace', 'bound', 'pronk')
+
+
+@dataclass
+class Outcome:
+    """What became of one walk.
+
+    Attributes
+    ----------
+    seed : int
+        Of commands, start and noise.
+    seconds : float
+        Time until the end or the fall [s].
+    fell : str
+        What went on at the fall; empty without.
+    asked, granted : float
+        Foot speed of the command and of what is left of it within the limits, over the time at
+        which no stop held it [m].
+    stops : list of (str, float, float, float)
+        Gait; time to rest as predicted, bounded, and measured of those that came to rest [s].
+    """
+
+    seed: int
+    seconds: float = 0.0
+    fell: str = ''
+    asked: float = 0.0
+    granted: float = 0.0
+    stops: list[tuple[str, float, float, float]] = field(default_factory=list)
+
+    @property
+    def late(self) -> list[tuple[str, float, float, float]]:
+        """Stops beyond their bound, or at another time than was predicted."""
+        return [stop for stop in self.stops
+                if stop[3] > stop[2] + 1e-9 or abs(stop[3] - stop[1]) > 1e-9]
+
+
+def course(seed: int, seconds: float, limits: Velocity, gaits: Sequence[str] = GAITS
+           ) -> list[tuple[float, str, Any]]:
+    """Events of one walk in order of time: ``command``, ``gait``, ``stop`` (whether)."""
+    rng = np.random.default_rng(seed)
+
+    def times(between: tuple[float, float]) -> Iterator[float]:
+        at = 0.0
+        while (at := at + float(rng.uniform(*between))) < seconds:
+            yield at
+
+    events: list[tuple[float, str, Any]] = [
+        (at, 'command', tuple((rng.uniform(-1.0, 1.0, 3) * limits).tolist()))
+        for at in (0.0, *times(JUMPS))]
+    events += [(at, 'gait', str(rng.choice(gaits))) for at in times(CHANGES)]
+    begin = 0.0
+    for at in times(STOPS):
+        if at > begin:  # not while the stop before is held
+            begin = at + float(rng.uniform(*HOLDS))
+            events += [(at, 'stop', True), (begin, 'stop', False)]
+    return sorted(events, key=lambda event: event[0])
+
+
+def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[str] = GAITS
+          ) -> Outcome:
+    """Walk one course, from a gait that its seed draws.
+
+    Parameters
+    ----------
+    seed : int
+        Of commands, start and noise.
+    seconds : float
+        Length [s].
+    robot : str, optional
+        Robot file; the suite's own without.
+    gaits : sequence of str
+        Gaits to change among.
+    """
+    first = gaits[seed % len(gaits)]
+    p = suite_of(robot, first).parameters.reference
+    limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
+    run, outcome = Walk(first, robot, seed=seed + 1), Outcome(seed)
+    loop, asked, open_stop = run.loop, (0.0, 0.0, 0.0), None
+    events = course(seed, seconds, limits, gaits)
+    foot_speed = loop.canonical.scale.foot_speed
+    for k in range(round(seconds / run.tick_s)):
+        while events and events[0][0] <= k * run.tick_s:
+            _, what, value = events.pop(0)
+            if what == 'command':
+                asked = value
+                loop.command(*asked)
+            elif what == 'gait':
+                loop.change_gait(value)
+            elif value:
+                bound = loop.time_to_rest()
+                open_stop = loop.canon.gait.name, loop.request(True), bound
+            else:
+                open_stop = None
+                loop.request(False)
+        run.tick(run.tick_s)
+        run.states.clear()
+        outcome.seconds += run.tick_s
+        if not loop.inhibition.requested:
+            outcome.asked += foot_speed(*asked) * run.tick_s
+            outcome.granted += foot_speed(*loop.gate.at(run.state.time_ns)) * run.tick_s
+        if open_stop is not None and loop.stop.state == 'at_rest':
+            outcome.stops.append((*open_stop, loop.stop.measured_s))
+            open_stop = None
+        if run.fell():
+            v_x, v_y, gamma = asked
+            outcome.fell = (
+                f'{outcome.seconds:.1f} s, {loop.canon.gait.name}, {loop.stop.state}, asked '
+                f'({v_x:.2f}, {v_y:.2f}) m/s, {gamma:.2f} rad/s')
+            break
+    return outcome
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the walks and print what became of them; returns 1 if one fell or a stop was late."""
+    parser = output.parser_of('random_commands', __doc__, 'every outcome', jobs=False)
+    parser.add_argument('--runs', type=output.at_least_one, default=20, metavar='N')
+    parser.add_argument('--seconds', type=float, default=60.0, help='of each walk (default: 60)')
+    parser.add_argument('--workers', type=output.at_least_one, default=2, metavar='N',
+                        help='processes, on which the outcomes do not depend (default: 2)')
+    parser.add_argument('--robot', metavar='FILE', help="robot file (default: the suite's own)")
+    parser.add_argument('--gaits', nargs='+', choices=sorted(load_gaits()), default=GAITS,
+                        metavar='GAIT', help='gaits to change among (default: all six)')
+    parser.add_argument('--seed', type=int, default=0, help='of the first walk (default: 0)')
+    return run_command(parser, arguments, _study)
+
+
+def _study(options: argparse.Namespace, _: RosArguments) -> int:
+    walk = partial(trial, seconds=options.seconds, robot=options.robot, gaits=options.gaits)
+    outcomes = []
+    with Pool(options.workers) as pool:
+        for outcome in pool.imap(walk, range(options.seed, options.seed + options.runs)):
+            outcomes.append(outcome)
+            for line in ([f'fell: {outcome.fell}'] if outcome.fell else []) + [
+                    f'stop in {gait}: predicted {predicted:.3f} s, bound {bound:.3f} s, '
+                    f'took {took:.3f} s' for gait, predicted, bound, took in outcome.late]:
+                print(f'seed {outcome.seed}: {line}', flush=True)
+    fallen, late = (sum(map(bool, values)) for values in (
+        [outcome.fell for outcome in outcomes], [late for each in outcomes for late in each.late]))
+    stops = sum(len(outcome.stops) for outcome in outcomes)
+    asked, granted = (sum(getattr(each, name) for each in outcomes)
+                      for name in ('asked', 'granted'))
+    walked = sum(outcome.seconds for outcome in outcomes)
+    print('\n' + output.markdown_table(
+        ('walks', 'time s', 'fell', 'stops to rest', 'late', 'granted'),
+        [(str(len(outcomes)), f'{walked:.0f}', str(fallen), str(stops), str(late),
+          output.percent(granted, asked))]))
+    output.write_results(options.json, [vars(outcome) for outcome in outcomes])
+    return int(fallen > 0 or late > 0)
+
+
+if __name__ == '__main__':
+    sys.exit(main())
