@@ -20,7 +20,8 @@ import numpy as np
 from dmp_cpg_ros.core.balance import virtual_model
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.capture_point import WIDE, support_margins
-from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, lean
+from dmp_cpg_ros.core.balance.footholds import FootPlacement, Pair, ground_from_base, lean
+from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
@@ -120,7 +121,7 @@ class VelocityCorrection(NamedTuple):
         velocity : tuple of float
             Of the base in the levelled frame [m/s].
         r : tuple of float
-            Reference v_x, v_y [m/s], γ [rad/s].
+            Velocity that the body can have by now, v_x, v_y [m/s], and the reference γ [rad/s].
         dt : float
             [s]
         """
@@ -153,10 +154,13 @@ class PostureState(NamedTuple):
         Swing activity of the legs.
     integral : VelocityCorrection
         State of the slow loop.
+    plan : MotionPlan
+        What the reference has the body do.
     """
 
     activity: Array
     integral: VelocityCorrection
+    plan: MotionPlan = MotionPlan()
 
 
 class PostureController:
@@ -236,23 +240,30 @@ class PostureController:
         velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))
         rate = vec3.times(R_ground_base, vec3.triple(state.base_rate_in_base.tolist()))
         moving = sum(swings) / len(swings)
+        plan = memory.plan.followed(reference, moving, self.model.push_rate(p),
+                                    p.friction * GRAVITY, dt)
         integral = memory.integral.integrated(
-            p, leg_length, moving, state.base_quaternion.tolist(), velocity, reference, dt)
+            p, leg_length, moving, state.base_quaternion.tolist(), velocity,
+            (*plan.expected, reference[2]), dt)
         correction = integral.acting(p, leg_length, moving)
         sway = self._sway(positions, duty, omega, reference, moving)
         measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
         planned = vec3.plus(reference, correction)
         lean_x, lean_y = lean(upward, self.model.height)
+        outside = -self.model.height / GRAVITY
+        beside = (p.slope_lean * lean_x + outside * plan.curve[0],
+                  p.slope_lean * lean_y + outside * plan.curve[1])
         shift = [
-            (along + p.slope_lean * lean_x, across + p.slope_lean * lean_y)
-            for along, across in self.placement.shift(p, measured, planned, pi * duty / omega)]
+            (along + beside[0], across + beside[1]) for along, across in self.placement.shift(
+                p, _caught(measured, planned, gait.catching), planned, pi * duty / omega)]
         raised = self.placement.raised(p, shift, R_ground_base)
         legs = self.legs.at(state.joint_position.tolist())
         feet = [vec3.times(R_ground_base, vec3.minus(foot, self._com_in_base)) for foot, _ in legs]
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
-        return PostureState(activity, integral), PostureFeedback(
-            self._torque(body, legs, feet, load, planned, bounce, sway.acceleration),
+        acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
+        return PostureState(activity, integral, plan), PostureFeedback(
+            self._torque(body, legs, feet, load, planned, bounce, acceleration),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
             np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
             np.array(correction), command, state.joint_position, believed(state.foot_force),
@@ -298,9 +309,9 @@ class PostureController:
         return virtual_model.LateralPlan(*(share * value for value in sway))
 
     def _torque(self, body: BodyMotion, legs: Sequence[tuple[Triple, Matrix]], feet: list[Triple],
-                load: list[float], r: Triple, bounce: Bounce, sway_acceleration: float) -> Array:
+                load: list[float], r: Triple, bounce: Bounce, acceleration: Pair) -> Array:
         """Torques τ_fb by which the stance feet make the virtual model's wrench, ndarray (12,)."""
-        force, moment = self.model.wrench(self.parameters, body, r, bounce, sway_acceleration)
+        force, moment = self.model.wrench(self.parameters, body, r, bounce, acceleration)
         forces = distribute(
             force, moment, feet, load, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
@@ -312,3 +323,9 @@ class PostureController:
                 min(max(-a, -most_a), most_a), min(max(-b, -most_b), most_b),
                 min(max(-c, -most_c), most_c))
         return np.array(torques)
+
+
+def _caught(measured: Triple, planned: Triple, share: float) -> Triple:
+    """Velocity for which feet are placed, with a share of what differs sideways and in turning."""
+    return (measured[0], planned[1] + share * (measured[1] - planned[1]),
+            planned[2] + share * (measured[2] - planned[2]))

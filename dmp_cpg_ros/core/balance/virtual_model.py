@@ -207,8 +207,12 @@ class VirtualModel:
         self._inertia = triple(description.base_inertia.diagonal().tolist())
         self.height = description.stance_height + float(description.com_in_base[2])
 
+    def push_rate(self, p: PostureParameters) -> float:
+        """Force per mass and error of the horizontal velocity [1/s]."""
+        return self._rate * p.velocity_gain
+
     def wrench(self, p: PostureParameters, body: BodyMotion, r: Triple, bounce: Bounce = LEVEL,
-               sway_acceleration: float = 0.0) -> tuple[Triple, Triple]:
+               acceleration: tuple[float, float] = (0.0, 0.0)) -> tuple[Triple, Triple]:
         """Force [N] and moment [N m] about the centre of mass in the frame of the ground.
 
         Parameters
@@ -221,8 +225,8 @@ class VirtualModel:
             Reference v_x, v_y [m/s], γ [rad/s].
         bounce : Bounce
             Planned motion along the normal of the ground.
-        sway_acceleration : float
-            Planned acceleration across the way [m/s^2].
+        acceleration : tuple of float
+            Planned, along and across the way [m/s^2].
 
         Returns
         -------
@@ -231,7 +235,7 @@ class VirtualModel:
         rate, squared = self._rate, self._rate * self._rate
         z_x, z_y, _ = body.R_ground_base[2]
         roll, pitch = z_y, -z_x  # for small angles
-        push = rate * p.velocity_gain
+        push = self.push_rate(p)
         lift = (
             squared * p.height_stiffness * (self.height + bounce.height - body.height)
             + rate * p.height_damping * (bounce.velocity - body.velocity[2])
@@ -241,8 +245,8 @@ class VirtualModel:
         i_x, i_y, i_z = self._inertia
         return (
             (
-                mass * (push * (r[0] - body.velocity[0]) + GRAVITY * up_x),
-                mass * (push * (r[1] - body.velocity[1]) + sway_acceleration + GRAVITY * up_y),
+                mass * (push * (r[0] - body.velocity[0]) + acceleration[0] + GRAVITY * up_x),
+                mass * (push * (r[1] - body.velocity[1]) + acceleration[1] + GRAVITY * up_y),
                 mass * (lift + GRAVITY * up_z)),
             (
                 -i_x * (stiffness * roll + damping * body.rate[0]),

@@ -108,6 +108,10 @@ class CycleOfLegs(ABC):
         Locked oscillator phases relative to fl [rad].
     moving_phases : ndarray (4,) or None
         The same while gaits change, which moves them.
+    catching : float
+        Share of an error of the velocity across that footholds answer: none where all legs swing
+        together. They turn the body about its length then, with nothing on the ground that holds
+        it, and the four feet that stand afterwards catch it without.
     rest_rate : float
         Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]; 0, other than
         while gaits change.
@@ -117,6 +121,7 @@ class CycleOfLegs(ABC):
     highest_speed: float
     phases: Array
     moving_phases: Array | None = None
+    catching: float = 1.0
     rest_rate: float = 0.0
     _paced: tuple[tuple[float, ...], Pace] | None = None
 
@@ -228,6 +233,7 @@ class Gait(CycleOfLegs):
                 raise ParameterError(f"gait '{self.name}': {rule}")
         vars(self).update(
             rest=_rest_phase(lag), phases=-2.0 * np.pi * lag, groups=stance_groups(lag),
+            catching=float(stance_groups(lag) != 1),
             _tables=tuple(table.tolist() for table in tables))
 
     @classmethod

@@ -167,6 +167,8 @@ class BlendedGait(CycleOfLegs):
             weight=weight, turning=turning, rest=way.before.rest + weight * way.rest_arc,
             highest_speed=blended_limit(
                 way.before.highest_speed, way.after.highest_speed, weight),
+            catching=way.before.catching
+            + weight * (way.after.catching - way.before.catching),
             phases=phases, moving_phases=phases, rest_rate=turning * way.rest_arc)
 
     @property
