@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits, quarter_weight
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.gait.running import RunningGait, highest_speed
+from dmp_cpg_ros.core.gait.running import RunningGait, limiting_gaits
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.inhibition.prediction import predict
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
@@ -40,6 +40,7 @@ from dmp_cpg_ros.core.modes.leg_control import LegControl
 from dmp_cpg_ros.core.modes.manager import ModeState
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceSystem
+from dmp_cpg_ros.core.reference.governor import Governor
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
@@ -105,11 +106,10 @@ class WalkingLoop:
         self._reader = reader = KnownGaits({**(gaits or {}), gait.name: gait})
         scale, legs = body_scale(description), RobotLegs(description)
         self._weight = description.mass * GRAVITY
-        self.gate = CommandGate(
-            p.reference, scale, highest_speed(p.gait_choice, gait.name, reader.named))
+        self.gate = CommandGate(p.reference, scale)
         self.canonical = RunningGait(
             p.canonical, scale, reader, p.gait_change, p.gait_choice, quarter_weight(description))
-        self._take(p)
+        self._take(p, gait)
         self.inbox = VoteInbox()
         self.estimator = None if p.state_source.state_source != ESTIMATE else BodyEstimator(
             description, p.estimation, legs)
@@ -128,10 +128,13 @@ class WalkingLoop:
         self._limits: ContactLimits | None = None
         self._barring = 'standing'
 
-    def _take(self, p: SuiteParameters) -> None:
+    def _take(self, p: SuiteParameters, wanted: Gait) -> None:
         """Make the parts anew that may get other parameters and hold nothing else."""
-        self.parameters, self.reference = p, ReferenceSystem(
-            p.reference, self.canonical.scale.hip_radius)
+        gaits = limiting_gaits(p.gait_choice, wanted.name, self._reader.named)
+        self.gate.follow(p.reference, gaits)
+        self.parameters = p
+        self.reference = ReferenceSystem(
+            p.reference, self.canonical.scale.hip_radius, Governor(gaits, self.canonical.scale))
         self.supervisor = GaitSupervisor(p.inhibition, p.voting, p.leg.activity_rate)
         self.voting = Voting(p.inhibition, p.voting, p.votes, p.reference, self._weight)
 
@@ -247,8 +250,7 @@ class WalkingLoop:
         verdict = CertificateGate().judge(present, present.certificate(), proposed)
         if verdict.accepted:
             p = proposed.parameters
-            self._take(p)
-            self.gate.follow(p.reference, highest_speed(p.gait_choice, wanted.name, named))
+            self._take(p, wanted)
             self.canonical = self.canonical.with_parameters(
                 p.canonical, p.gait_change, p.gait_choice)
             self.canon = replace_unchecked(canon, wanted=wanted)

@@ -59,6 +59,9 @@ class ReferenceFilter(SuiteNode):
         self._publisher.publish(self._writer.fill(stamp_ns, self._r))
 
     def diagnostic_values(self) -> Mapping[str, Any]:
-        """Reference and whether a stop holds it at zero."""
-        return {**dict(zip(('v_x', 'v_y', 'gamma'), self._r, strict=True)),
-                'stopping': self._requested}
+        """Reference, whether a stop holds it at zero, what was asked for and what cut it."""
+        names = ('v_x', 'v_y', 'gamma')
+        return {**dict(zip(names, self._r, strict=True)), 'stopping': self._requested,
+                **{f'asked_{name}': value
+                   for name, value in zip(names, self._gate.asked, strict=True)},
+                'limited_by': self._gate.limited_by or 'acceleration' * self._system.limited}

@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from multiprocessing import Pool
 from typing import Any
 
@@ -66,22 +67,24 @@ class Outcome:
 
 def course(seed: int, seconds: float, limits: Velocity, gaits: Sequence[str] = GAITS
            ) -> list[tuple[float, str, Any]]:
-    """Events of one walk in order of time: ``command``, ``gait``, ``stop`` (whether)."""
-    rng = np.random.default_rng(seed)
+    """Events of one walk in order of time: ``command``, ``gait``, ``stop`` (whether); those of a
+    longer one begin with them.
+    """
+    jumps, changes, stops = np.random.default_rng(seed).spawn(3)
 
-    def times(between: tuple[float, float]) -> Iterator[float]:
+    def times(rng: np.random.Generator, between: tuple[float, float]) -> Iterator[float]:
         at = 0.0
         while (at := at + float(rng.uniform(*between))) < seconds:
             yield at
 
     events: list[tuple[float, str, Any]] = [
-        (at, 'command', tuple((rng.uniform(-1.0, 1.0, 3) * limits).tolist()))
-        for at in (0.0, *times(JUMPS))]
-    events += [(at, 'gait', str(rng.choice(gaits))) for at in times(CHANGES)]
+        (at, 'command', tuple((jumps.uniform(-1.0, 1.0, 3) * limits).tolist()))
+        for at in chain((0.0,), times(jumps, JUMPS))]
+    events += [(at, 'gait', str(changes.choice(gaits))) for at in times(changes, CHANGES)]
     begin = 0.0
-    for at in times(STOPS):
+    for at in times(stops, STOPS):
         if at > begin:  # not while the stop before is held
-            begin = at + float(rng.uniform(*HOLDS))
+            begin = at + float(stops.uniform(*HOLDS))
             events += [(at, 'stop', True), (begin, 'stop', False)]
     return sorted(events, key=lambda event: event[0])
 

@@ -253,9 +253,10 @@ class PostureController:
         outside = -self.model.height / GRAVITY
         beside = (p.slope_lean * lean_x + outside * plan.curve[0],
                   p.slope_lean * lean_y + outside * plan.curve[1])
+        caught = measured if gait.apart == 1.0 else _caught(measured, planned, gait.apart)
         shift = [
             (along + beside[0], across + beside[1]) for along, across in self.placement.shift(
-                p, _caught(measured, planned, gait.catching), planned, pi * duty / omega)]
+                p, caught, planned, pi * duty / omega)]
         raised = self.placement.raised(p, shift, R_ground_base)
         legs = self.legs.at(state.joint_position.tolist())
         feet = [vec3.times(R_ground_base, vec3.minus(foot, self._com_in_base)) for foot, _ in legs]
@@ -326,6 +327,7 @@ class PostureController:
 
 
 def _caught(measured: Triple, planned: Triple, share: float) -> Triple:
-    """Velocity for which feet are placed, with a share of what differs sideways and in turning."""
-    return (measured[0], planned[1] + share * (measured[1] - planned[1]),
-            planned[2] + share * (measured[2] - planned[2]))
+    """Velocity for which feet are placed, with a share of what differs from the plan: none where
+    all legs swing together, and the four feet that stand afterwards catch the body without.
+    """
+    return vec3.moved(planned, vec3.minus(measured, planned), share)

@@ -22,7 +22,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups
-from dmp_cpg_ros.core.gait.speed_limit import within_limit
+from dmp_cpg_ros.core.gait.speed_limit import blended_limit, within_limit
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
@@ -43,10 +43,20 @@ class BodyScale:
     hip_radius : float
         Horizontal distance from the base's origin to a foot [m]: a turn at γ moves a foot at γ
         times this.
+    room_ahead : float
+        How far a foot comes ahead of its neutral place [m].
+    room_across : float
+        Distance of a neutral place from the middle [m].
+    rolling : float
+        (I_xx/I_yy) (y/x), with I the body's inertia and x, y the distances of its feet: by this
+        much slower than along the body legs that all swing together may swing across it.
     """
 
     leg_length: float
     hip_radius: float
+    room_ahead: float = inf
+    room_across: float = inf
+    rolling: float = 1.0
 
     def speed(self, dimensionless: float) -> float:
         """Speed u √(g l) of a dimensionless one u [m/s]."""
@@ -63,14 +73,19 @@ class BodyScale:
             (v_x * v_x + across * across) ** 0.5
             + LATERAL_WEIGHT * abs(gamma) * self.hip_radius)
 
-    def limited(self, velocity: Triple, highest_speed: float, largest_curve: float = inf
-                ) -> Triple:
+    def limited(self, velocity: Triple, highest_speed: float, largest_curve: float = inf,
+                apart: float = 1.0) -> Triple:
         """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
         share of g, that goes with it [m/s], [rad/s], see
-        :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
+        :mod:`~dmp_cpg_ros.core.gait.speed_limit`; ``apart`` is that of the gait.
         """
-        return within_limit(velocity, self.foot_speed(*velocity), self.speed(highest_speed),
-                            largest_curve * GRAVITY)
+        most = self.speed(highest_speed)
+        if apart < 1.0:
+            v_x, v_y, gamma = velocity
+            across = blended_limit(self.rolling * most, inf, apart)
+            velocity = v_x, min(max(v_y, -across), across), gamma
+        return within_limit(
+            velocity, self.foot_speed(*velocity), most, largest_curve * GRAVITY)
 
 
 class Pace(NamedTuple):
@@ -108,10 +123,9 @@ class CycleOfLegs(ABC):
         Locked oscillator phases relative to fl [rad].
     moving_phases : ndarray (4,) or None
         The same while gaits change, which moves them.
-    catching : float
-        Share of an error of the velocity across that footholds answer: none where all legs swing
-        together. They turn the body about its length then, with nothing on the ground that holds
-        it, and the four feet that stand afterwards catch it without.
+    apart : float
+        0 where all legs swing together, else 1, and between while gaits change. Legs that swing
+        together turn the body while nothing on the ground holds it.
     rest_rate : float
         Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]; 0, other than
         while gaits change.
@@ -121,7 +135,7 @@ class CycleOfLegs(ABC):
     highest_speed: float
     phases: Array
     moving_phases: Array | None = None
-    catching: float = 1.0
+    apart: float = 1.0
     rest_rate: float = 0.0
     _paced: tuple[tuple[float, ...], Pace] | None = None
 
@@ -154,7 +168,7 @@ class CycleOfLegs(ABC):
         v_x, v_y, gamma = r.tolist()
         asked = (v_x, v_y, gamma, scale.leg_length, scale.hip_radius)
         if self._paced is None or self._paced[0] != asked:
-            velocity = scale.limited((v_x, v_y, gamma), self.highest_speed)
+            velocity = scale.limited((v_x, v_y, gamma), self.highest_speed, apart=self.apart)
             speed = scale.foot_speed(*velocity)
             omega, duty = self.omega(speed, scale), self.duty(speed, scale)
             pace = Pace(velocity, omega, self.own_omegas(omega), duty)
@@ -192,6 +206,8 @@ class Gait(CycleOfLegs):
         Dimensionless stride frequencies.
     duty_factor : ndarray (n,)
         Fraction β of the cycle that a foot is planned to stand, in (0, 1).
+    steps : int
+        How often in a cycle feet come down.
     highest_speed : float
         Dimensionless foot speed that the gait never exceeds, not below the last of ``speed``, so
         that the cadence is that of the tables with and without it; infinite for none.
@@ -206,6 +222,8 @@ class Gait(CycleOfLegs):
     rest: float = field(init=False)
     phases: Array = field(init=False, repr=False, compare=False)
     groups: int = field(init=False)
+    steps: int = field(init=False)
+    apart: float = field(init=False, default=1.0)
     cadence_scale: float = field(init=False, default=1.0)
     _tables: tuple[list[float], ...] = field(init=False, repr=False, compare=False)
 
@@ -233,7 +251,7 @@ class Gait(CycleOfLegs):
                 raise ParameterError(f"gait '{self.name}': {rule}")
         vars(self).update(
             rest=_rest_phase(lag), phases=-2.0 * np.pi * lag, groups=stance_groups(lag),
-            catching=float(stance_groups(lag) != 1),
+            apart=float(stance_groups(lag) != 1), steps=len(np.unique(np.round(lag % 1.0, 9))),
             _tables=tuple(table.tolist() for table in tables))
 
     @classmethod

@@ -74,9 +74,9 @@ class GaitChoiceParameters(Parameters):
             raise ParameterError('auto_speeds must increase by more than auto_hysteresis')
 
 
-def highest_speed(parameters: GaitChoiceParameters, name: str,
-                  named: Callable[[str], Gait]) -> float:
-    """Dimensionless foot speed up to which commands are followed.
+def limiting_gaits(parameters: GaitChoiceParameters, name: str,
+                   named: Callable[[str], Gait]) -> tuple[Gait, ...]:
+    """Gaits whose limits commands are to keep.
 
     Parameters
     ----------
@@ -89,11 +89,11 @@ def highest_speed(parameters: GaitChoiceParameters, name: str,
 
     Returns
     -------
-    float
-        That of the gait, or of the fastest that may be chosen.
+    tuple of Gait
+        The gait, or all that may be chosen.
     """
     names = parameters.auto_gaits if parameters.auto_gait else (name,)
-    return max(named(each).highest_speed for each in names)
+    return tuple(named(each) for each in names)
 
 
 def chosen_gait(parameters: GaitChoiceParameters, present: str, r: Array, scale: BodyScale) -> str:

@@ -154,6 +154,7 @@ class BlendedGait(CycleOfLegs):
     turning: float = field(init=False, repr=False, compare=False)
     rest: float = field(init=False, repr=False, compare=False)
     highest_speed: float = field(init=False, repr=False, compare=False)
+    apart: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Validate and blend; ``turning`` is 2π dw/dt, the rate of an arc of one cycle [rad/s]."""
@@ -167,8 +168,7 @@ class BlendedGait(CycleOfLegs):
             weight=weight, turning=turning, rest=way.before.rest + weight * way.rest_arc,
             highest_speed=blended_limit(
                 way.before.highest_speed, way.after.highest_speed, weight),
-            catching=way.before.catching
-            + weight * (way.after.catching - way.before.catching),
+            apart=way.before.apart + weight * (way.after.apart - way.before.apart),
             phases=phases, moving_phases=phases, rest_rate=turning * way.rest_arc)
 
     @property

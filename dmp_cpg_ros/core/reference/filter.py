@@ -5,8 +5,9 @@ Section 5).
 
 v̇ = α_r (v_ext − v),   γ̇ = α_r (γ_ext − γ)
 
-|v̇| is limited, for no foot can push the body harder; but not where the filter brakes no harder
-than it would for v_ext = 0, so that stops are those of the plain filter.
+|v̇| is limited, for no foot can push the body harder (:mod:`~dmp_cpg_ros.core.reference.governor`);
+but not where the filter brakes no harder than it would for v_ext = 0, so that stops are those of
+the plain filter.
 
 While a stop is requested, r goes to zero along its own direction, ṙ = −max(α_r, a_b/s) r with
 s = |v| + |γ| l the largest speed of a foot: as fast as the filter or with the constant
@@ -15,16 +16,17 @@ deceleration a_b, whichever is faster, so that it is zero after a finite time an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 
 import numpy as np
 
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.gait.gait import BodyScale
+from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
 from dmp_cpg_ros.core.parameters import Parameters, parameter
+from dmp_cpg_ros.core.reference.governor import Governor
 
 
 @dataclass(frozen=True)
@@ -62,22 +64,29 @@ class CommandGate:
         Limits and timeout.
     scale : BodyScale, optional
         The robot's lengths, for the limits of the gait and of curves.
-    highest_speed : float
-        Dimensionless foot speed of the gait that is wanted, see
-        :func:`~dmp_cpg_ros.core.gait.running.highest_speed`.
+    gaits : sequence of Gait
+        Whose limits are kept, see :func:`~dmp_cpg_ros.core.gait.running.limiting_gaits`: those of
+        the fastest.
+
+    Attributes
+    ----------
+    limited_by : str
+        What cut the command that acts: ``range``, ``gait``, ``timeout``; empty for nothing.
     """
 
     def __init__(self, parameters: ReferenceParameters, scale: BodyScale | None = None,
-                 highest_speed: float = inf) -> None:
+                 gaits: Sequence[Gait] = ()) -> None:
         """Start with a zero command."""
-        self._scale = scale
-        self.follow(parameters, highest_speed)
+        self._scale, self.limited_by = scale, ''
+        self.asked: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        self.follow(parameters, gaits)
         self._command: tuple[float, float, float] = (0.0, 0.0, 0.0)
         self._received_ns, self._fresh = 0, False
 
-    def follow(self, parameters: ReferenceParameters, highest_speed: float) -> None:
-        """Take new limits; they hold for the next command, that of the gait at once."""
-        self.parameters, self.highest_speed = parameters, highest_speed
+    def follow(self, parameters: ReferenceParameters, gaits: Sequence[Gait]) -> None:
+        """Take new limits; they hold for the next command, those of the gait at once."""
+        self.parameters = parameters
+        self._fastest = max(gaits, key=lambda gait: gait.highest_speed) if gaits else None
 
     def accept(self, v_x: float, v_y: float, gamma: float) -> None:
         """Take a new command; it acts from the next :meth:`at` on.
@@ -95,10 +104,11 @@ class CommandGate:
         if not np.all(np.isfinite((v_x, v_y, gamma))):
             raise DataError(
                 f'command v = ({v_x}, {v_y}) m/s, gamma = {gamma} rad/s must be finite')
-        p = self.parameters
+        p, asked = self.parameters, (float(v_x), float(v_y), float(gamma))
         limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
         v_x, v_y, gamma = (min(max(float(value), -limit), limit) for value, limit in zip(
             (v_x, v_y, gamma), limits, strict=True))
+        self.asked = asked
         self._command, self._fresh = (v_x, v_y, gamma), True
 
     def at(self, time_ns: int) -> tuple[float, float, float]:
@@ -108,11 +118,16 @@ class CommandGate:
         self._received_ns = min(self._received_ns, time_ns)
         timeout = self.parameters.cmd_vel_timeout
         if timeout > 0.0 and (time_ns - self._received_ns) * 1e-9 > timeout:
+            self.limited_by = 'timeout'
             return 0.0, 0.0, 0.0
-        if self._scale is None:
+        self.limited_by = '' if self._command == self.asked else 'range'
+        if self._scale is None or self._fastest is None:
             return self._command
-        return self._scale.limited(
-            self._command, self.highest_speed, self.parameters.max_curve)
+        limited = self._scale.limited(self._command, self._fastest.highest_speed,
+                                      self.parameters.max_curve, self._fastest.apart)
+        if limited != self._command:
+            self.limited_by = 'gait'
+        return limited
 
 
 class ReferenceSystem:
@@ -121,15 +136,24 @@ class ReferenceSystem:
     Parameters
     ----------
     parameters : ReferenceParameters
-        Rate and limits.
+        Rate and largest acceleration.
     foot_distance : float
         l, distance of a foot from the base's origin, for braking while it turns [m].
+    governor : Governor, optional
+        What the gait and the robot allow of it; all without.
+
+    Attributes
+    ----------
+    limited : bool
+        Whether the limit acted in the last step.
     """
 
-    def __init__(self, parameters: ReferenceParameters, foot_distance: float = 0.0) -> None:
+    def __init__(self, parameters: ReferenceParameters, foot_distance: float = 0.0,
+                 governor: Governor | None = None) -> None:
         """Keep the parameters."""
         self.parameters, self._filter = parameters, FirstOrderFilter(parameters.alpha_r)
         self._foot_distance = foot_distance
+        self._governor, self.limited = governor or Governor(), False
 
     def towards(self, r: Array, command: tuple[float, float, float], stopping: bool, dt: float
                 ) -> Array:
@@ -161,13 +185,14 @@ class ReferenceSystem:
         """
         kept = self._filter.kept(dt)
         following = r_ext + (r - r_ext) * kept
-        most = self.parameters.max_acceleration * dt
-        change_x, change_y, _ = (following - r).tolist()
-        if change_x * change_x + change_y * change_y <= most * most:
+        self.limited = False
+        if dt <= 0.0 or not r_ext[:2].any():
             return following
         change = following[:2] - r[:2]
-        if following[:2] @ following[:2] <= r[:2] @ r[:2]:
-            most = max(most, float(1.0 - kept) * float(np.sqrt(r[:2] @ r[:2])))
-        if change @ change > most * most * (1.0 + 1e-12):
-            following[:2] = r[:2] + change * (most / float(np.sqrt(change @ change)))
+        share = self._governor.share(r, change, dt, self.parameters.max_acceleration)
+        if share < 1.0 and following[:2] @ following[:2] <= r[:2] @ r[:2]:
+            share = max(share, float((1.0 - kept) * np.sqrt((r[:2] @ r[:2]) / (change @ change))))
+        self.limited = share < 1.0
+        if self.limited:
+            following[:2] = r[:2] + share * change
         return following

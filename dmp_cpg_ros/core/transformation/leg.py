@@ -288,8 +288,16 @@ class LegPrimitive:
 def body_scale(description: RobotDescription) -> BodyScale:
     """Lengths that make the robot's speeds dimensionless."""
     foothold = nominal_foothold(description, LEGS[0])
-    hip_height = description.stance_height + float(description.legs[0].hip_in_base[2])
-    return BodyScale(hip_height, float(np.hypot(foothold[0], foothold[1])))
+    geometry, inertia = description.legs[0], description.base_inertia.diagonal()
+    hip_height = description.stance_height + float(geometry.hip_in_base[2])
+    kinematics = LegKinematics(geometry)
+    straight, depth = (kinematics.thigh_length + kinematics.shank_length,
+                       hip_height - geometry.foot_radius)
+    x, y = (abs(float(place)) for place in foothold[:2])
+    return BodyScale(
+        hip_height, float(np.hypot(foothold[0], foothold[1])),
+        float(np.sqrt(max(straight * straight - depth * depth, 0.0))), y,
+        float(inertia[0] / inertia[1]) * y / x)
 
 
 def nominal_foothold(description: RobotDescription, leg: str) -> Array:

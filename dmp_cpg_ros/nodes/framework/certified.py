@@ -29,9 +29,10 @@ from dmp_cpg_ros.core.certificates.changes import refused_change
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait.running import GaitChoiceParameters, RunningGait, highest_speed
+from dmp_cpg_ros.core.gait.running import GaitChoiceParameters, RunningGait, limiting_gaits
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, ReferenceSystem
+from dmp_cpg_ros.core.reference.governor import Governor
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
 from dmp_cpg_ros.nodes.framework.parameters import plain
@@ -319,11 +320,6 @@ class Certified:
         return RunningGait(of(CanonicalParameters), self._scale, self.gaits,
                            of(GaitChangeParameters), of(GaitChoiceParameters), quarter)
 
-    def reference(self) -> ReferenceSystem:
-        """Reference system of the robot."""
-        return ReferenceSystem(
-            self._node.parameters_of(ReferenceParameters), self._scale.hip_radius)
-
     def commands(self) -> CommandGate:
         """What comes on ``cmd_vel``, limited."""
         commands = CommandGate(self._node.parameters_of(ReferenceParameters), self._scale)
@@ -338,9 +334,18 @@ class Certified:
 
     def limit(self, commands: CommandGate) -> None:
         """Let commands follow the limits, those of the gait included."""
+        commands.follow(self._node.parameters_of(ReferenceParameters), self._limiting_gaits())
+
+    def reference(self) -> ReferenceSystem:
+        """The reference's filters, with the limits of the gait that is wanted."""
+        return ReferenceSystem(
+            self._node.parameters_of(ReferenceParameters), self._scale.hip_radius,
+            Governor(self._limiting_gaits(), self._scale))
+
+    def _limiting_gaits(self) -> tuple[Gait, ...]:
         of = self._node.parameters_of
-        commands.follow(of(ReferenceParameters), highest_speed(
-            of(GaitChoiceParameters), of(suite.GaitParameters).gait, self.gaits.named))
+        return limiting_gaits(
+            of(GaitChoiceParameters), of(suite.GaitParameters).gait, self.gaits.named)
 
 
 def certificate_words(certificate: Certificate) -> str:

@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.balance.controller import PostureController, PostureParame
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
-from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, highest_speed
+from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, limiting_gaits
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
 from dmp_cpg_ros.core.gait.transition import GaitTransition
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -101,10 +101,11 @@ def test_commands_are_followed_up_to_the_gait_or_the_fastest_that_may_be_chosen(
     gate.accept(3.0, 0.0, 0.0)
     assert gate.at(0) == (3.0, 0.0, 0.0)
     choice = GaitChoiceParameters()
-    gate.follow(gate.parameters, highest_speed(choice, 'walk', GAITS.__getitem__))
+    gate.follow(gate.parameters, limiting_gaits(choice, 'walk', GAITS.__getitem__))
     assert gate.at(1)[0] == pytest.approx(GAITS['walk'].highest_speed * ROOT)
     choice = GaitChoiceParameters(auto_gait=True)
-    assert highest_speed(choice, 'walk', GAITS.__getitem__) == GAITS['trot'].highest_speed
+    gate.follow(gate.parameters, limiting_gaits(choice, 'walk', GAITS.__getitem__))
+    assert gate.at(2)[0] == pytest.approx(3.0)
 
 
 @pytest.mark.parametrize('gait', [GAITS['walk'], GaitTransition(GAITS['trot'], GAITS['walk']).at(
