@@ -163,6 +163,7 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     with Pool(options.workers) as pool:
         for outcome in pool.imap(walk, range(options.seed, options.seed + options.runs)):
             outcomes.append(outcome)
+            print(f'\r{len(outcomes)}/{options.runs} ', end='', file=sys.stderr, flush=True)
             for line in ([f'fell: {outcome.fell}'] if outcome.fell else []) + [
                     f'stop in {gait}: predicted {predicted:.3f} s, bound {bound:.3f} s, '
                     f'took {took:.3f} s' for gait, predicted, bound, took in outcome.late]:

@@ -253,7 +253,7 @@ class PostureController:
         outside = -self.model.height / GRAVITY
         beside = (p.slope_lean * lean_x + outside * plan.curve[0],
                   p.slope_lean * lean_y + outside * plan.curve[1])
-        caught = measured if gait.apart == 1.0 else _caught(measured, planned, gait.apart)
+        caught = self.placement.caught(measured, planned, gait.apart)
         shift = [
             (along + beside[0], across + beside[1]) for along, across in self.placement.shift(
                 p, caught, planned, pi * duty / omega)]
@@ -324,10 +324,3 @@ class PostureController:
                 min(max(-a, -most_a), most_a), min(max(-b, -most_b), most_b),
                 min(max(-c, -most_c), most_c))
         return np.array(torques)
-
-
-def _caught(measured: Triple, planned: Triple, share: float) -> Triple:
-    """Velocity for which feet are placed, with a share of what differs from the plan: none where
-    all legs swing together, and the four feet that stand afterwards catch the body without.
-    """
-    return vec3.moved(planned, vec3.minus(measured, planned), share)

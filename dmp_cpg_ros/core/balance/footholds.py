@@ -36,6 +36,11 @@ Pair = tuple[float, float]
 LARGEST_RAISE = 0.35
 """Largest correction of a swinging foot's height by levelling, in leg lengths."""
 
+INSIDE = 0.3
+"""How far from the middle the capture point is left to feet that stand around it, as a share of
+their distance.
+"""
+
 SLIGHT = 0.03
 """Slope of which half is followed, more of steeper ones and little of the few tenths of a degree
 that soft ground and compliant feet feign.
@@ -86,6 +91,27 @@ class FootPlacement:
         """Way that the body can make over standing feet with a share of the straight legs [m]."""
         return min(sqrt(max((reach * straight) ** 2 - depth * depth, 0.0))
                    for straight, depth in zip(self._straight, self._depth, strict=True))
+
+    def caught(self, measured: Triple, planned: Triple, apart: float) -> Triple:
+        """Velocity for which feet are placed: the measured one, but where all legs swing together
+        only what the four feet do not catch that stand afterwards. Of an error e of the velocity
+        that is the part with |e| √(h/g) beyond ``INSIDE`` of the feet's distance from the middle.
+
+        Parameters
+        ----------
+        measured, planned : tuple of float
+            v_x, v_y [m/s], γ [rad/s].
+        apart : float
+            Of the gait: 0 where all legs swing together.
+        """
+        if apart == 1.0:
+            return measured
+        place_x, place_y, _ = self._footholds[0]
+        inside = INSIDE * (1.0 - apart) * (GRAVITY / self._leg_length) ** 0.5
+        e_x, e_y, e_gamma = vec3.minus(measured, planned)
+        e_x -= min(max(e_x, -inside * place_x), inside * place_x)
+        e_y -= min(max(e_y, -inside * place_y), inside * place_y)
+        return vec3.plus(planned, (e_x, e_y, apart * e_gamma))
 
     def within_reach(self, down: Sequence[Pair], reach: float) -> list[Pair]:
         """Shorten displacements from the neutral places to what the legs reach.
