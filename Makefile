@@ -65,7 +65,7 @@ STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
 FIGURE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-files benchmark-walking doc-images view-image paper-figures bench lint install clean
+.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures bench lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -90,6 +90,9 @@ study-faults: $(INSTALLED) ## kill nodes of walking suites, with and without res
 
 study-adversary: $(INSTALLED) ## search for a certificate that is wrong (STUDY_ARGS='--seconds 600')
 	$(BIN)/python -m dmp_cpg_ros.studies.adversary $(STUDY_ARGS)
+
+study-commands: $(INSTALLED) ## walk under random commands, gait changes and stops (STUDY_ARGS=...)
+	$(BIN)/python -m dmp_cpg_ros.studies.random_commands $(STUDY_ARGS)
 
 study-files: $(INSTALLED) ## read 20,000 spoiled files of every kind (STUDY_ARGS=...)
 	$(BIN)/python -m dmp_cpg_ros.studies.fuzz_files $(STUDY_ARGS)

@@ -206,6 +206,9 @@ class Gait(CycleOfLegs):
         Dimensionless stride frequencies.
     duty_factor : ndarray (n,)
         Fraction β of the cycle that a foot is planned to stand, in (0, 1).
+    two_sided : float
+        Share of the time with feet on the ground in which feet of both sides are, at the
+        shortest stance.
     steps : int
         How often in a cycle feet come down.
     highest_speed : float
@@ -223,6 +226,7 @@ class Gait(CycleOfLegs):
     phases: Array = field(init=False, repr=False, compare=False)
     groups: int = field(init=False)
     steps: int = field(init=False)
+    two_sided: float = field(init=False)
     apart: float = field(init=False, default=1.0)
     cadence_scale: float = field(init=False, default=1.0)
     _tables: tuple[list[float], ...] = field(init=False, repr=False, compare=False)
@@ -252,6 +256,7 @@ class Gait(CycleOfLegs):
         vars(self).update(
             rest=_rest_phase(lag), phases=-2.0 * np.pi * lag, groups=stance_groups(lag),
             apart=float(stance_groups(lag) != 1), steps=len(np.unique(np.round(lag % 1.0, 9))),
+            two_sided=_two_sided(lag, float(self.duty_factor.min())),
             _tables=tuple(table.tolist() for table in tables))
 
     @classmethod
@@ -332,6 +337,14 @@ def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:
         return ys[-1]
     share = (at - xs[place - 1]) / (xs[place] - xs[place - 1])
     return ys[place - 1] + share * (ys[place] - ys[place - 1])
+
+
+def _two_sided(lag: Array, duty: float, grid: int = 400) -> float:
+    """Share of the stance of some foot in which feet of both sides stand."""
+    at = (np.arange(grid)[:, None] / grid - lag + 0.5) % 1.0 - 0.5
+    left, right = (np.any((np.abs(at) > 0.5 * (1.0 - duty))[:, legs], axis=1)
+                   for legs in ([0, 2], [1, 3]))
+    return float(np.sum(left & right) / np.sum(left | right))
 
 
 def _rest_phase(lag: Array) -> float:

@@ -16,8 +16,11 @@ with the speed alone. Commands therefore keep to
 
     s² + c² ≤ 1 ,    c = u |γ| / (κ g) ,
 
-with s the speed's share of the highest one and κ the parameter ``max_curve``; a reference on its
-way to a command is never far outside.
+with s the speed's share of the highest one and κ the parameter ``max_curve`` times the share of
+stance in which feet of both sides stand, for one side alone does not hold the roll of a curve; a
+reference on its way to a command is never far outside. Legs that all swing together turn the body
+meanwhile, the more the less its inertia, and across the way it stands on a narrower track: v_y
+keeps to (I_xx/I_yy) (y/x) of the highest speed in such a gait, with x and y the feet's distances.
 
 Velocity and turn rate are shortened alike: a curve stays the same curve.
 """

@@ -123,8 +123,10 @@ class CommandGate:
         self.limited_by = '' if self._command == self.asked else 'range'
         if self._scale is None or self._fastest is None:
             return self._command
-        limited = self._scale.limited(self._command, self._fastest.highest_speed,
-                                      self.parameters.max_curve, self._fastest.apart)
+        gait = self._fastest
+        limited = self._scale.limited(
+            self._command, gait.highest_speed, self.parameters.max_curve * gait.two_sided,
+            gait.apart)
         if limited != self._command:
             self.limited_by = 'gait'
         return limited
