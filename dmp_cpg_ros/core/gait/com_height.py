@@ -65,6 +65,24 @@ def stance_groups(lag: NDArray[np.float64]) -> int:
     return len(places) if np.ptp(gaps) < 1e-6 else 0
 
 
+def two_sided(lag: NDArray[np.float64], duty: float, grid: int = 400) -> float:
+    """Share of the stance of some foot in which feet of both sides stand.
+
+    Parameters
+    ----------
+    lag : ndarray (4,)
+        Fractions of a cycle by which fl, fr, rl, rr follow the first.
+    duty : float
+        Duty factor β.
+    grid : int
+        Number of phases that are looked at.
+    """
+    at = (np.arange(grid)[:, None] / grid - lag + 0.5) % 1.0 - 0.5
+    left, right = (np.any((np.abs(at) > 0.5 * (1.0 - duty))[:, legs], axis=1)
+                   for legs in ([0, 2], [1, 3]))
+    return float(np.sum(left & right) / np.sum(left | right))
+
+
 def planned_bounce(cycle_position: float, groups: int, duty: float, omega: float) -> Bounce:
     """Bounce of the body, from where any leg is in its cycle.
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups
+from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups, two_sided
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit, within_limit
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -48,8 +48,7 @@ class BodyScale:
     room_across : float
         Distance of a neutral place from the middle [m].
     rolling : float
-        (I_xx/I_yy) (y/x), with I the body's inertia and x, y the distances of its feet: by this
-        much slower than along the body legs that all swing together may swing across it.
+        (I_xx/I_yy) (y/x), with I the body's inertia and x, y the distances of its feet.
     """
 
     leg_length: float
@@ -124,8 +123,7 @@ class CycleOfLegs(ABC):
     moving_phases : ndarray (4,) or None
         The same while gaits change, which moves them.
     apart : float
-        0 where all legs swing together, else 1, and between while gaits change. Legs that swing
-        together turn the body while nothing on the ground holds it.
+        0 where all legs swing together, which turns the body, else 1; between while gaits change.
     rest_rate : float
         Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]; 0, other than
         while gaits change.
@@ -207,8 +205,7 @@ class Gait(CycleOfLegs):
     duty_factor : ndarray (n,)
         Fraction β of the cycle that a foot is planned to stand, in (0, 1).
     two_sided : float
-        Share of the time with feet on the ground in which feet of both sides are, at the
-        shortest stance.
+        Share of stance with feet of both sides on the ground, where it is shortest.
     steps : int
         How often in a cycle feet come down.
     highest_speed : float
@@ -256,7 +253,7 @@ class Gait(CycleOfLegs):
         vars(self).update(
             rest=_rest_phase(lag), phases=-2.0 * np.pi * lag, groups=stance_groups(lag),
             apart=float(stance_groups(lag) != 1), steps=len(np.unique(np.round(lag % 1.0, 9))),
-            two_sided=_two_sided(lag, float(self.duty_factor.min())),
+            two_sided=two_sided(lag, float(self.duty_factor.min())),
             _tables=tuple(table.tolist() for table in tables))
 
     @classmethod
@@ -337,14 +334,6 @@ def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:
         return ys[-1]
     share = (at - xs[place - 1]) / (xs[place] - xs[place - 1])
     return ys[place - 1] + share * (ys[place] - ys[place - 1])
-
-
-def _two_sided(lag: Array, duty: float, grid: int = 400) -> float:
-    """Share of the stance of some foot in which feet of both sides stand."""
-    at = (np.arange(grid)[:, None] / grid - lag + 0.5) % 1.0 - 0.5
-    left, right = (np.any((np.abs(at) > 0.5 * (1.0 - duty))[:, legs], axis=1)
-                   for legs in ([0, 2], [1, 3]))
-    return float(np.sum(left & right) / np.sum(left | right))
 
 
 def _rest_phase(lag: Array) -> float:
