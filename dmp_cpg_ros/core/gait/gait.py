@@ -22,7 +22,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups, two_sided
-from dmp_cpg_ros.core.gait.speed_limit import blended_limit, within_limit
+from dmp_cpg_ros.core.gait.speed_limit import within_limit
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
@@ -61,16 +61,19 @@ class BodyScale:
         """Speed u √(g l) of a dimensionless one u [m/s]."""
         return dimensionless * (GRAVITY * self.leg_length) ** 0.5
 
-    def foot_speed(self, v_x: float, v_y: float, gamma: float) -> float:
+    def foot_speed(self, v_x: float, v_y: float, gamma: float, apart: float = 1.0) -> float:
         """Speed by which a gait chooses its cadence: a bound on that of any stance foot [m/s].
 
         Speed sideways and from turning counts ``LATERAL_WEIGHT`` times: across the body the feet
-        have about half the room, so that the steps must be shorter.
+        have about half the room, so that the steps must be shorter. By a highest speed it counts
+        1/``rolling`` times where a gait's legs swing together, with ``apart`` 0.
         """
-        across = LATERAL_WEIGHT * v_y
+        weight = LATERAL_WEIGHT
+        if apart < 1.0:
+            weight += (1.0 - apart) * max(0.0, 1.0 / self.rolling - weight)
+        across = weight * v_y
         return float(
-            (v_x * v_x + across * across) ** 0.5
-            + LATERAL_WEIGHT * abs(gamma) * self.hip_radius)
+            (v_x * v_x + across * across) ** 0.5 + weight * abs(gamma) * self.hip_radius)
 
     def limited(self, velocity: Triple, highest_speed: float, largest_curve: float = inf,
                 apart: float = 1.0) -> Triple:
@@ -78,13 +81,8 @@ class BodyScale:
         share of g, that goes with it [m/s], [rad/s], see
         :mod:`~dmp_cpg_ros.core.gait.speed_limit`; ``apart`` is that of the gait.
         """
-        most = self.speed(highest_speed)
-        if apart < 1.0:
-            v_x, v_y, gamma = velocity
-            across = blended_limit(self.rolling * most, inf, apart)
-            velocity = v_x, min(max(v_y, -across), across), gamma
-        return within_limit(
-            velocity, self.foot_speed(*velocity), most, largest_curve * GRAVITY)
+        return within_limit(velocity, self.foot_speed(*velocity, apart),
+                            self.speed(highest_speed), largest_curve * GRAVITY)
 
 
 class Pace(NamedTuple):

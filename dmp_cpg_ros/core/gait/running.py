@@ -314,7 +314,9 @@ class RunningGait:
             return new, new.settled(turned(x, wanted.phases - gait.phases), r, inhibition)
         if inhibition.requested or isinstance(gait, BlendedGait):
             return network, x
-        if self.scale.foot_speed(*r.tolist()) > HASTE * self.scale.speed(wanted.highest_speed):
+        v_x, v_y, gamma = r.tolist()
+        speed = self.scale.foot_speed(v_x, v_y, gamma, wanted.apart)
+        if speed > HASTE * self.scale.speed(wanted.highest_speed):
             return network, x
         transition = self.gaits.transition(self.gaits.named(gait.name), wanted)
         return self.network(transition.at(0.0, 0.0).scaled(gait.cadence_scale)), x

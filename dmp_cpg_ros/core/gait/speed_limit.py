@@ -18,9 +18,10 @@ with the speed alone. Commands therefore keep to
 
 with s the speed's share of the highest one and κ the parameter ``max_curve`` times the share of
 stance in which feet of both sides stand, for one side alone does not hold the roll of a curve; a
-reference on its way to a command is never far outside. Legs that all swing together turn the body
-meanwhile, the more the less its inertia, and across the way it stands on a narrower track: v_y
-keeps to (I_xx/I_yy) (y/x) of the highest speed in such a gait, with x and y the feet's distances.
+reference on its way to a command is never far outside. Legs that all swing together turn the
+body meanwhile, the more the less its inertia, and across the way it stands on a narrower track:
+speed sideways and from turning then counts (I_yy/I_xx) (x/y) times in s, with x and y the feet's
+distances, else twice.
 
 Velocity and turn rate are shortened alike: a curve stays the same curve.
 """
