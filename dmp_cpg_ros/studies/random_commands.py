@@ -49,6 +49,8 @@ class Outcome:
         which no stop held it [m].
     stops : list of (str, float, float, float)
         Gait; time to rest as predicted, bounded, and measured of those that came to rest [s].
+    stepped : int
+        Stops that the robot stepped out of, of which nothing is claimed.
     """
 
     seed: int
@@ -57,6 +59,7 @@ class Outcome:
     asked: float = 0.0
     granted: float = 0.0
     stops: list[tuple[str, float, float, float]] = field(default_factory=list)
+    stepped: int = 0
 
     @property
     def late(self) -> list[tuple[str, float, float, float]]:
@@ -131,6 +134,8 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
         if not loop.inhibition.requested:
             outcome.asked += foot_speed(*asked) * run.tick_s
             outcome.granted += foot_speed(*loop.gate.at(run.state.time_ns)) * run.tick_s
+        if open_stop is not None and loop.stop.state in ('releasing', 'stepping'):
+            outcome.stepped, open_stop = outcome.stepped + 1, None
         if open_stop is not None and loop.stop.state == 'at_rest':
             outcome.stops.append((*open_stop, loop.stop.measured_s))
             open_stop = None
@@ -170,13 +175,14 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
                 print(f'seed {outcome.seed}: {line}', flush=True)
     fallen, late = (sum(map(bool, values)) for values in (
         [outcome.fell for outcome in outcomes], [late for each in outcomes for late in each.late]))
-    stops = sum(len(outcome.stops) for outcome in outcomes)
+    stops, stepped = sum(len(each.stops) for each in outcomes), sum(
+        each.stepped for each in outcomes)
     asked, granted = (sum(getattr(each, name) for each in outcomes)
                       for name in ('asked', 'granted'))
     walked = sum(outcome.seconds for outcome in outcomes)
     print('\n' + output.markdown_table(
-        ('walks', 'time s', 'fell', 'stops to rest', 'late', 'granted'),
-        [(str(len(outcomes)), f'{walked:.0f}', str(fallen), str(stops), str(late),
+        ('walks', 'time s', 'fell', 'stops to rest', 'late', 'stepped out', 'granted'),
+        [(str(len(outcomes)), f'{walked:.0f}', str(fallen), str(stops), str(late), str(stepped),
           output.percent(granted, asked))]))
     output.write_results(options.json, [vars(outcome) for outcome in outcomes])
     return int(fallen > 0 or late > 0)
