@@ -27,13 +27,10 @@ from rclpy.timer import Timer
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.nodes.framework.health import NodeHealth
 
-CHANGES_S, CHANGES_SHARE = 0.5, 0.1
-"""Processor time that changes of parameters may take at once [s], and in the long run its share:
-to judge one takes longer than a tick.
+CHANGES, CHANGES_HZ = 20.0, 2.0
+"""Requests to change parameters that are heard at once, and in the long run [1/s]: to judge one
+takes longer than a tick. They are counted, not timed, so that a slow machine refuses no other.
 """
-
-LEAST_CHANGE_S = 0.02
-"""What a request counts for at least [s]: so many cheap ones a second are enough, too."""
 
 MOST_CHANGES = 200
 """Parameters that one request may change."""
@@ -71,7 +68,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
     def __init__(self, name: str, **options: Any) -> None:
         """Create the node, unconfigured."""
         self._traced: set[tuple[str, type[Exception]]] = set()
-        self._changes = CHANGES_S, time.monotonic()
+        self._changes = CHANGES, time.monotonic()
         self.active = self.configured = False
         self.state_label = 'unconfigured'
         self.failure: Exception | None = None
@@ -101,6 +98,11 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
 
     def report(self) -> None:
         """Tell what :attr:`health` knows."""
+
+    @property
+    def waited_for(self) -> bool:
+        """Whether the robot waits for this node at every tick, so that no work makes it late."""
+        return False
 
     # Transitions -------------------------------------------------------------------------------
 
@@ -230,18 +232,15 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
             srv_type, srv_name, self.guarded(srv_name, callback), *arguments, **options)
 
     def _limited(self, callback: Callable[..., Any]) -> Callable[..., Any]:
-        """Refuse changes of parameters when those before took so long that ticks would starve."""
+        """Refuse changes of parameters that come so often that ticks would starve."""
         def answer(request: Any, response: Any) -> Any:
-            begin, (left_s, then) = time.thread_time(), self._changes
+            left, then = self._changes
             now = time.monotonic()
-            left_s = min(CHANGES_S, left_s + CHANGES_SHARE * (now - then))
-            if left_s > 0.0 and len(request.parameters) <= MOST_CHANGES:
-                try:
-                    return callback(request, response)
-                finally:
-                    cost_s = max(LEAST_CHANGE_S, time.thread_time() - begin)
-                    self._changes = left_s - cost_s, now
-            self._changes = left_s, now
+            left = min(CHANGES, left + CHANGES_HZ * (now - then))
+            heard = (self.waited_for or left >= 1.0) and len(request.parameters) <= MOST_CHANGES
+            self._changes = max(0.0, left - heard), now
+            if heard:
+                return callback(request, response)
             refusal = SetParametersResult(successful=False, reason=(
                 'too many changes of parameters; ask again in a few seconds'))
             self.health.reject('set_parameters', refusal.reason)

@@ -182,6 +182,11 @@ class SuiteNode(GuardedLifecycleNode):
         own = self._sets.get(parameters.LockStepParameters)
         return own is not None and cast(parameters.LockStepParameters, own).lock_step
 
+    @property
+    def waited_for(self) -> bool:
+        """Whether no work makes a tick late: in lock-step the robot waits."""
+        return self.lock_step
+
     def parameters_of(self, parameter_set: type[P]) -> P:
         """Return the values in effect of one parameter set."""
         return cast(P, self._sets[parameter_set])
