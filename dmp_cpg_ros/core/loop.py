@@ -153,7 +153,7 @@ class WalkingLoop:
         dt = self._clock.step(state.time_ns)
         self._dt = dt or self._dt
         command, inhibition = self.gate.at(state.time_ns), self.inhibition
-        self.r = r = self.reference.towards(self.r, command, inhibition.requested, dt)
+        self.r = r = self.reference.towards(self.r, command, inhibition, dt)
         self.canon = canon = self.canonical.step(
             self.canon, r, inhibition, dt, state.foot_force, self._contact_limits(dt))
         gait, x, x_dot, network = canon.gait, canon.x, canon.x_dot, self.network

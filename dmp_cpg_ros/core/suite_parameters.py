@@ -197,7 +197,7 @@ CHANGEABLE: dict[str, tuple[str, ...]] = {
         'auto_gait', 'auto_gaits', 'auto_speeds', 'auto_hysteresis'),
     INHIBITION: (
         'inhibition_gain', 'region_radius', 'inhibited_legs', 'capture_speed', 'auto_inhibit',
-        'auto_delay', 'push_recovery', 'vote_rule', 'vote_majority', 'vote_limit',
+        'auto_delay', 'push_recovery', 'caution', 'vote_rule', 'vote_majority', 'vote_limit',
         *UNCERTIFIED_VOTES),
 }
 """Parameters of the certified nodes that may change while they run, by the node that owns them;

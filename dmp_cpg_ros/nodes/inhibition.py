@@ -152,7 +152,8 @@ class InhibitionNode(SuiteNode):
         news = self._news() != self._told
         if news:
             self._publish()
-        if news or self.lock_step or stamp_ns - self._told_ns >= HEARTBEAT_NS:
+        if (news or self.lock_step or self._state.share != before.share
+                or stamp_ns - self._told_ns >= HEARTBEAT_NS):
             self._publish_gains()
         if self.lock_step:
             self._memory.publish(

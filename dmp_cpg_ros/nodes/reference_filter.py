@@ -5,12 +5,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import approached
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import REFERENCE
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -32,7 +35,8 @@ class ReferenceFilter(SuiteNode):
         """Build the filter and its topics."""
         self.certified = Certified(self, lambda: Acting(self._cadence))
         self._system = self.certified.reference()
-        self._r, self._requested = np.zeros(3), False
+        self._r = np.zeros(3)
+        self._inhibition = Inhibition(False, np.zeros(len(LEGS)), 1.0)
         self._cadence = self.parameters_of(CanonicalParameters).cadence_scale
         self._writer, self._publisher = ReferenceWriter(), self.publisher('reference')
         gains = InhibitionGainsReader()
@@ -53,15 +57,19 @@ class ReferenceFilter(SuiteNode):
             dt, (*_, self._r) = known
         self._cadence = approached(self._cadence, wanted, dt)
         command, gains = self._gate.at(stamp_ns), values['inhibition_gains']
-        silent = not self.lock_step and gains is not None and stamp_ns - gains[0] > SILENT_NS
-        self._requested = silent or gains is not None and gains[1].requested
-        self._r = self._system.towards(self._r, command, self._requested, dt)
+        if gains is not None:
+            self._inhibition = gains[1]
+            if not self.lock_step and stamp_ns - gains[0] > SILENT_NS:
+                self._inhibition = replace(gains[1], requested=True)
+        self._r = self._system.towards(self._r, command, self._inhibition, dt)
         self._publisher.publish(self._writer.fill(stamp_ns, self._r))
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Reference, whether a stop holds it at zero, what was asked for and what cut it."""
         names = ('v_x', 'v_y', 'gamma')
-        return {**dict(zip(names, self._r, strict=True)), 'stopping': self._requested,
+        return {**dict(zip(names, self._r, strict=True)), 'stopping': self._inhibition.requested,
+                'share': self._inhibition.share,
                 **{f'asked_{name}': value
                    for name, value in zip(names, self._gate.asked, strict=True)},
-                'limited_by': self._gate.limited_by or 'acceleration' * self._system.limited}
+                'limited_by': 'balance' if self._inhibition.share < 1.0 else (
+                    self._gate.limited_by or 'acceleration' * self._system.limited)}

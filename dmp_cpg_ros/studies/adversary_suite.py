@@ -90,7 +90,7 @@ class Oscillators(WalkingLoop):
         self.now_ns += self.tick_ns
         dt, inhibition = self._dt, self.inhibition
         command = self.gate.at(self.now_ns)
-        self.r = self.reference.towards(self.r, command, inhibition.requested, dt)
+        self.r = self.reference.towards(self.r, command, inhibition, dt)
         if self._weaken == 'places':
             inhibition = _Separate(**vars(inhibition))
         self.canon = canon = self.canonical.step(self.canon, self.r, inhibition, dt)

@@ -41,6 +41,8 @@ class InhibitionParameters(Parameters):
     push_recovery: bool = parameter(
         True, 'whether a push that standing legs cannot bear releases the gait from a stop until '
         'the robot stands again')
+    caution: bool = parameter(
+        True, 'whether a walking robot that is disturbed follows less of its command')
 
     def __post_init__(self) -> None:
         """Validate; at least one leg, none twice."""
@@ -95,6 +97,8 @@ class Inhibition:
     rest_phase : float
         Phase of fl at rest [rad]: every x_{i,d} is the place of leg i then. The field is the same
         in all directions, so that what holds for one phase holds for each.
+    share : float
+        Share of the command that the reference follows, in (0, 1].
     """
 
     requested: bool
@@ -104,6 +108,7 @@ class Inhibition:
     automatic: bool = True
     opposite: bool = False
     rest_phase: float = 0.0
+    share: float = 1.0
 
     def acting_gains(self, x: Array, target: Array) -> Array:
         """Gains that act at a state: α_i inside C_i and zero outside.

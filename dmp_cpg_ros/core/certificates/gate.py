@@ -35,8 +35,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
 
 UNCERTIFIED = frozenset(
-    ('auto_inhibit', 'auto_delay', 'push_recovery', 'start_inhibited', 'cmd_vel_timeout',
-     'allow_uncertified', 'auto_speeds', 'auto_hysteresis', *UNCERTIFIED_VOTES, *VOTE_SOURCES))
+    ('auto_inhibit', 'auto_delay', 'push_recovery', 'caution', 'start_inhibited',
+     'cmd_vel_timeout', 'allow_uncertified', 'auto_speeds', 'auto_hysteresis', *UNCERTIFIED_VOTES,
+     *VOTE_SOURCES))
 """Parameters of certified nodes that no inequality depends on."""
 
 _CAPTURING = frozenset(('rho', 'coupling_gain', 'coupling_graph', 'inhibition_gain',

@@ -45,7 +45,7 @@ def predict(supervisor: GaitSupervisor, reference: ReferenceSystem, canonical: R
     tick_ns = round(dt * 1e9)
     start_ns, inhibition = state.time_ns, published
     for k in range(1, ceil(horizon / dt) + 1):
-        r = reference.towards(r, command, inhibition.requested, dt)
+        r = reference.towards(r, command, inhibition, dt)
         canon = canonical.step(canon, r, inhibition, dt)
         state = supervisor.step(
             state, start_ns + k * tick_ns, canonical.network(canon.gait), canon.x, canon.x_dot,

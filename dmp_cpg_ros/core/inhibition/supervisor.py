@@ -24,6 +24,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.caution import followed_share
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, PushState, push_step
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
@@ -94,6 +95,8 @@ class SupervisorState:
         Leg that is inhibited where it is chosen.
     rest_phase : float
         Phase of fl at which the gait is brought to rest [rad].
+    share : float
+        Share of the command that the reference follows.
     """
 
     time_ns: int
@@ -112,6 +115,7 @@ class SupervisorState:
     push: PushState = NO_PUSH
     leg: int = 0
     rest_phase: float = 0.0
+    share: float = 1.0
 
     @property
     def in_force(self) -> bool:
@@ -154,7 +158,7 @@ class GaitSupervisor:
         """
         return Inhibition(state.in_force, self._gains(state, state.armed),
                           self.parameters.region_radius, state.state == 'at_rest', state.automatic,
-                          state.push.opposite, state.rest_phase)
+                          state.push.opposite, state.rest_phase, state.share)
 
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
         if not state.requested:
@@ -214,9 +218,20 @@ class GaitSupervisor:
             state = self._automatic(state, any(command))
         state = self._voted(state, tally or state.tally)
         state = self._pushed(state, network, x, margins, body_mode)
+        if self.parameters.caution:
+            state = self._cautious(state, margins, network.scale.leg_length, dt)
         if state.requested:
             return self._stopping(state, network, x, rates, speed)
         return self._running(state, network.phase_errors(x), speed)
+
+    @staticmethod
+    def _cautious(state: SupervisorState, margins: Sequence[float] | None, leg_length: float,
+                  dt: float) -> SupervisorState:
+        """Follow less of the command while the body is disturbed."""
+        share = 1.0
+        if not (state.in_force or state.state == 'releasing'):
+            share = followed_share(state.share, margins, leg_length, dt)
+        return state if share == state.share else replace_unchecked(state, share=share)
 
     def _automatic(self, state: SupervisorState, commanded: bool) -> SupervisorState:
         """Stop after a time of zero command, and start at a command."""

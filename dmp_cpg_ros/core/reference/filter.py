@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.maths import Array
@@ -157,11 +158,13 @@ class ReferenceSystem:
         self._foot_distance = foot_distance
         self._governor, self.limited = governor or Governor(), False
 
-    def towards(self, r: Array, command: tuple[float, float, float], stopping: bool, dt: float
-                ) -> Array:
-        """Advance towards a command, or to zero while a stop is requested; ndarray (3,)."""
-        if not stopping:
-            return self.step(r, np.array(command), dt)
+    def towards(self, r: Array, command: tuple[float, float, float], inhibition: Inhibition,
+                dt: float) -> Array:
+        """Advance towards the share of a command that is to be followed, or to zero while a stop
+        is requested; ndarray (3,).
+        """
+        if not inhibition.requested:
+            return self.step(r, inhibition.share * np.array(command), dt)
         v_x, v_y, gamma = r.tolist()
         speed = (v_x * v_x + v_y * v_y) ** 0.5 + abs(gamma) * self._foot_distance
         kept, lost = self._filter.kept(dt), self.parameters.braking * dt

@@ -325,7 +325,8 @@ class InhibitionGainsWriter:
         """Refill; raises DataError when a number is not finite."""
         return self._writer.fill(time_ns, np.array((
             *inhibition.gains, inhibition.region_radius, inhibition.rest_phase,
-            inhibition.requested, inhibition.at_rest, inhibition.automatic, inhibition.opposite)))
+            inhibition.requested, inhibition.at_rest, inhibition.automatic, inhibition.opposite,
+            inhibition.share)))
 
 
 _LARGEST_GAIN = (range_of(InhibitionParameters, 'inhibition_gain')[1]
@@ -343,18 +344,20 @@ class InhibitionGainsReader:
     def read(self, message: AnyJointState) -> Inhibition:
         """Inhibition that is announced; raises DataError for numbers that no parameters allow."""
         (values,) = self._reader.read(message)
-        gains, (radius, rest, *flags) = values[:len(LEGS)], values[len(LEGS):].tolist()
+        gains, (radius, rest, *flags, share) = values[:len(LEGS)], values[len(LEGS):].tolist()
         if not (0.0 <= gains.min() and gains.max() <= _LARGEST_GAIN):
             raise DataError(f'gains {gains} must be from 0 to {_LARGEST_GAIN:g}')
         low, high = _RADII
         if not low <= radius <= high:
             raise DataError(f'region_radius = {radius} must be from {low:g} to {high:g}')
         if not {0.0, 1.0}.issuperset(flags):
-            raise DataError(f'{", ".join(layouts.GAIN_ROWS[-4:])} must be 0 or 1, not {flags}')
+            raise DataError(f'{", ".join(layouts.GAIN_ROWS[-5:-1])} must be 0 or 1, not {flags}')
         if not 0.0 <= rest <= 2.0 * pi:
             raise DataError(f'rest_phase = {rest} must be from 0 to 2 pi')
+        if not 0.0 < share <= 1.0:
+            raise DataError(f'share = {share} must be above 0 and at most 1')
         requested, at_rest, automatic, opposite = map(bool, flags)
-        return Inhibition(requested, gains, radius, at_rest, automatic, opposite, rest)
+        return Inhibition(requested, gains, radius, at_rest, automatic, opposite, rest, share)
 
 
 def read_votes(message: JointState) -> tuple[dict[str, float], str]:

@@ -11,7 +11,7 @@ import pytest
 from core_examples import TICK, network
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
@@ -40,7 +40,7 @@ class Gait:
 
     def tick(self) -> SupervisorState:
         self.tick_count += 1
-        self.r = self.reference.towards(self.r, self.command, self.published.requested, TICK)
+        self.r = self.reference.towards(self.r, self.command, self.published, TICK)
         self.x = self.network.step(self.x, self.r, self.published, TICK)
         rate = self.network.rate(self.x, self.r, self.published)
         self.stop = self.supervisor.step(
@@ -143,9 +143,10 @@ def test_braking_is_as_fast_as_is_asked_and_within_its_bounds(
     reference, r = ReferenceParameters(braking=braking), np.array([speed, 0.2 * speed, turn])
     of, scale = ReferenceSystem(reference, network().scale.hip_radius), network().scale
     start, feet, way, ticks = r, scale.foot_speed(*r), 0.0, 0
+    stopping = Inhibition(True, np.zeros(4), 0.3)
     while r.any():
         way += TICK * float(np.hypot(*r[:2]))
-        before, r = r, of.towards(r, (9.0, 9.0, 9.0), True, TICK)
+        before, r = r, of.towards(r, (9.0, 9.0, 9.0), stopping, TICK)
         ticks += 1
         assert np.all(np.abs(r) <= np.abs(before)) and np.all(r * start >= 0.0)  # no overshoot
         assert np.allclose(np.cross(r, start), 0.0)                       # along the same curve

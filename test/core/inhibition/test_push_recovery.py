@@ -152,6 +152,7 @@ def test_a_start_ends_it() -> None:
     run.until('stepping')
     run.loop.request(False)
     assert not run.loop.stop.in_force
+    body.margins = WIDE
     run.until('walking')
     run.go(1.0)
     assert run.loop.r[0] == pytest.approx(0.4, abs=0.05)

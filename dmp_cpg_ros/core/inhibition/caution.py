@@ -1,0 +1,53 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""How much of the command a walking body that is disturbed follows.
+
+The measure is the least margin m of the capture point in the support polygon
+(:mod:`~dmp_cpg_ros.core.balance.capture_point`), of a leg of length l. While the robot walks as it
+is to, it is above 0.27 l in all gaits within their limits, but for bounds that turn. Less says
+that the body does not follow its reference: it was pushed, a foot has slipped, a gait is changing,
+or what is asked is more than the gait can do. The steps that bring it back need the room that
+speed takes, so the reference is given only the share
+
+    s = (m/l − DISTURBED) / (EASY − DISTURBED)  in [LEAST, 1]
+
+of the command. It falls at once and grows by ``REGAIN`` again. In a stop and while a start is
+under way it is 1: their predictions depend on nothing of the body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+DISTURBED, EASY = 0.12, 0.24
+"""Margins at which the share is least and 1, in lengths of the leg. The first is
+:data:`~dmp_cpg_ros.core.inhibition.push_recovery.PUSHED`: what standing legs can just bear.
+"""
+
+LEAST = 0.1
+"""Least share: with none a robot that is held, or wrong about its speed, would not move again."""
+
+REGAIN = 1.0
+"""Rate at which the share grows again [1/s]: a cycle or two to test what has been given back."""
+
+
+def followed_share(share: float, margins: Sequence[float] | None, leg_length: float, dt: float
+                   ) -> float:
+    """Share of the command after a tick, in [LEAST, 1].
+
+    Parameters
+    ----------
+    share : float
+        One tick before.
+    margins : sequence of four floats, or None
+        To the edges of the support polygon [m], where they are known.
+    leg_length : float
+        l [m].
+    dt : float
+        [s]
+    """
+    regained = min(1.0, share + REGAIN * dt)
+    if margins is None:
+        return regained
+    room = (min(margins) / leg_length - DISTURBED) / (EASY - DISTURBED)
+    return min(regained, max(LEAST, room))
