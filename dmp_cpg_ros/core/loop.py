@@ -27,7 +27,7 @@ from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait, limiting_gaits
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
-from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.voters import vote_sensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
@@ -125,6 +125,7 @@ class WalkingLoop:
         self.estimator_state: EstimatorState | None = None
         self.posture = self.body.initial_state()
         self.leg_states = [leg.initial_state() for leg in self.legs]
+        self.outlook: Outlook | None = None
         self._limits: ContactLimits | None = None
         self._barring = 'standing'
 
@@ -208,16 +209,18 @@ class WalkingLoop:
         self.gate.accept(v_x, v_y, gamma)
 
     def request(self, stop: bool) -> float:
-        """Request a stop or a start, as the service does; returns the predicted time to it [s].
+        """Request a stop or a start, as the service does; returns the predicted time to it [s],
+        and keeps what else is predicted in :attr:`outlook`.
 
         Raises DataError for a start while the robot does not stand.
         """
         if not stop and self._barring != 'standing':
             raise DataError(f'the gait cannot start: the robot is {self._barring}')
         self.stop = self.supervisor.request(self.stop, stop)
-        return predict(
+        self.outlook = look_ahead(
             self.supervisor, self.reference, self.canonical, self.stop, self.inhibition,
             self.canon, self.r, self.gate.at(self.stop.time_ns), self._dt)
+        return self.outlook.time_s
 
     def change(self, values: Mapping[str, Any]) -> str:
         """Change parameters as the nodes' services do; they act from the next tick on.

@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import CanonicalState
 from dmp_cpg_ros.core.inhibition.handover import adopted
-from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
@@ -78,6 +78,7 @@ class InhibitionNode(SuiteNode):
         self._x_dot: Any = None
         self._r, self._body_mode = np.zeros(3), 'standing'
         self._predicted = self._bound = self._way = nan
+        self._outlook: Outlook | None = None
         self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
         self._drive, self._joined, self._waited = FOLLOWING, False, 0
         self._found: Inhibition | None = None
@@ -272,10 +273,18 @@ class InhibitionNode(SuiteNode):
         when = f'in {self._predicted:.3f} s' if isfinite(self._predicted) else 'not within 10 s'
         most = f'at most {self._bound:.3f} s' if isfinite(self._bound) else (
             'without a bound from this state')
-        way = (f'; the reference goes on for at most {self._way:.3f} m' + (
+        way = (f'; the reference goes on for at most {self._way:.3f} m{self._standing()}' + (
             '; a push may begin it anew'
             if self._supervisor.parameters.push_recovery else '')) if stop else ''
         return True, f'{"at rest" if stop else "walking"} {when}, {most}; {self._words()}{way}'
+
+    def _standing(self) -> str:
+        """When and where the body will stand, of which there is no certificate but trials."""
+        of = self._outlook
+        if of is None or not isfinite(of.time_s):
+            return ''
+        return (f'; the body stands in about {of.stands_s:.2f} s, by trials within '
+                f'{of.stands_within_s:.2f} s and {of.stands_within_m:.2f} m')
 
     def _predict(self) -> None:
         """Look ahead to the rest or the walk that was just requested."""
@@ -283,10 +292,11 @@ class InhibitionNode(SuiteNode):
         canon = CanonicalState(
             gait, self.certified.gaits.named(gait_name(self)), gait.cadence_scale, self._x,
             self._x_dot, initial_contact_state())
-        self._predicted = predict(
+        self._outlook = outlook = look_ahead(
             self._supervisor, self._reference, self._running_gait, self._state, self._acting,
             canon, self._r, self._gate.at(self._state.time_ns),
             self.parameters_of(TickParameters).tick_ns * 1e-9, body_mode=self._body_mode)
+        self._predicted = outlook.time_s
         if isfinite(self._state.measured_s):  # released by a push in full swing: it runs already
             self._predicted = self._state.measured_s
         running = self.certified.running_in(gait)
@@ -331,7 +341,9 @@ class InhibitionNode(SuiteNode):
                 **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,
                 'rest_phase': acting.rest_phase,
                 'request_stamp': state.request_ns * 1e-9, 'predicted_s': self._predicted,
-                'bound_s': self._bound, 'bound_m': self._way, 'measured_s': state.measured_s,
+                'bound_s': self._bound, 'bound_m': self._way,
+                'stands_s': self._outlook.stands_s if self._outlook else nan,
+                'measured_s': state.measured_s,
                 'certified': self.certified.certificate_in(self._network.gait).holds,
                 'grade': self._words()}
         if self._voting.voting.voting:

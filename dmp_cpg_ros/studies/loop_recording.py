@@ -170,6 +170,10 @@ class StopOutcome:
         Largest horizontal acceleration of the body during the hold, over 40 ms [m/s^2].
     resumed_speed : float
         Mean forward speed after the resume [m/s].
+    stands_s, within_s, within_m : float
+        Predicted of the body: time until it stands, time and way within which it does [s], [m].
+    stepped : bool
+        Whether the robot stepped out of the stop, which then begins anew.
     """
 
     fell: bool
@@ -185,11 +189,23 @@ class StopOutcome:
     tilt: float = np.nan
     deceleration: float = np.nan
     resumed_speed: float = np.nan
+    stands_s: float = np.nan
+    within_s: float = np.nan
+    within_m: float = np.nan
+    stepped: bool = False
 
     @property
     def prediction_error(self) -> float:
         """Share of the measured time by which the prediction missed it; NaN without either."""
         return abs(self.predicted_s - self.measured_s) / self.measured_s
+
+    @property
+    def broken(self) -> bool:
+        """Whether it did not become of the body what was said: it fell, or stood later or farther
+        on although no step began the stop anew.
+        """
+        return self.fell or not self.stepped and not (
+            self.still_s <= self.within_s + 1e-9 and self.displacement_m <= self.within_m)
 
     @property
     def bounded(self) -> bool:

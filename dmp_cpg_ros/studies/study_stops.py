@@ -21,14 +21,17 @@ oscillator is coupled or inhibited until the gait is resumed.
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import groupby, product
-from math import isnan, pi
+from math import cos, isnan, pi, sin
 from multiprocessing import Pool
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -69,6 +72,9 @@ WALKING_BEFORE, WALKING_AFTER = 4.0, 3.5
 SHORTEST_HOLD, LONGEST_HOLD, HOLD_AT_REST = 2.5, 12.0, 1.0
 """The hold takes this at least and at most, and this after the oscillators are at rest [s]."""
 
+LARGEST_PUSH = 2.6
+"""Of random stops [N s]: 0.3 m/s of the package's robot."""
+
 SPEED_WINDOW = 2.0
 """Time at the end over which the resumed speed is averaged [s]."""
 
@@ -95,7 +101,9 @@ class StopCase:
     leg : str
         Leg whose oscillator is inhibited, or ``auto``.
     push : float
-        Lateral impulse in the instant of the request [N s].
+        Impulse in the instant of the request [N s].
+    direction : float
+        Of the push, from ahead to the left [rad].
     method : str
         One of ``METHODS``.
     braking : float
@@ -119,6 +127,7 @@ class StopCase:
     resumes: bool = True
     friction: float = 0.0
     payload: float = 0.0
+    direction: float = pi / 2.0
 
 
 Results = list[tuple[StopCase, StopOutcome]]
@@ -148,9 +157,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         help='also stop by freezing all phases, and by finishing every swing')
     parser.add_argument('--random', type=at_least_one, metavar='N',
                         help='instead of the phases N stops at random: gait, speed between the '
-                        'extremes of --speeds, phase, friction 0.4 to 1, payload up to 30 %%; '
-                        'says within which time the body stands with 95 %% confidence')
+                        'extremes of --speeds, phase, friction 0.3 to 1, payload up to 30 %%, '
+                        'push up to 2.6 N s; says how often the body stands as was said')
     parser.add_argument('--seed', type=int, default=0, help='of --random (default: 0)')
+    parser.add_argument('--record', type=Path, metavar='FILE',
+                        help='of --random: add outcomes here, and go on from those that are there')
     parser.add_argument('--quiet', action='store_true', help='show no progress')
     return run_command(parser, arguments, _study)
 
@@ -160,11 +171,13 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     suite = suite_of(options.file, cases[0].leg, cases[0].braking)
     for gait in options.gaits:
         load_gait(gait)
-    results = run_cases(cases, options.file, options.jobs, quiet=options.quiet)
+    results = run_cases(cases, options.file, options.jobs, options.quiet, options.record)
     print(f'{suite.file}: {len(cases)} stops; columns with two numbers are median / worst\n')
     print(table(results, by_case=not options.random))
     if options.random:
         print(f'\n{scenario_bound([outcome for _, outcome in results])}')
+        print(*(f'not as was said: {case} {outcome}' for case, outcome in results
+                if outcome.broken), sep='\n')
     print(*(f'fell: {case}' for case, outcome in results if outcome.fell), sep='\n')
     write_results(options.json, [vars(case) | vars(outcome) for case, outcome in results])
     return int(any(outcome.fell for case, outcome in results if case.method == METHODS[0]))
@@ -190,27 +203,34 @@ def cases_of(options: argparse.Namespace) -> list[StopCase]:
 
 
 def random_cases(options: argparse.Namespace) -> list[StopCase]:
-    """Independent stops of one leg, or of any, with one braking."""
-    rng, speeds = np.random.default_rng(options.seed), options.speeds
-    return [StopCase(str(rng.choice(options.gaits)), float(rng.uniform(min(speeds), max(speeds))),
-                     float(rng.random()), leg=options.legs[0], braking=options.braking[0],
-                     resumes=not options.no_resume, friction=float(rng.uniform(0.4, 1.0)),
-                     payload=float(rng.uniform(0.0, 0.3))) for _ in range(options.random)]
-
-
-def scenario_bound(outcomes: Sequence[StopOutcome], doubt: float = 0.05) -> str:
-    """What N independent stops say of the next one: the largest of N numbers is exceeded with a
-    probability below ε unless something of probability (1 − ε)^N = β has happened (Wilks 1941).
+    """Independent stops of one leg, or of any, with one braking; each depends on the seed and its
+    number only.
     """
-    share = 1.0 - doubt ** (1.0 / len(outcomes))
-    if any(outcome.fell or not outcome.standing for outcome in outcomes):
-        return 'not every body stood: nothing is said of the next one'
-    still, way = (max(getattr(outcome, name) for outcome in outcomes)
-                  for name in ('still_s', 'displacement_m'))
-    return (f'{len(outcomes)} stops: the body of another one drawn alike stands later than '
-            f'{still:.3f} s, or, apart from that, goes farther than {way:.3f} m, with a '
-            f'probability below {100.0 * share:.1f} % each, at {100.0 * (1.0 - doubt):.0f} % '
-            'confidence')
+    cases, speeds = [], options.speeds
+    for number in range(options.random):
+        rng = np.random.default_rng((options.seed, number))
+        cases.append(StopCase(
+            str(rng.choice(options.gaits)), float(rng.uniform(min(speeds), max(speeds))),
+            float(rng.random()), leg=options.legs[0], push=float(rng.uniform(0.0, LARGEST_PUSH)),
+            braking=options.braking[0], resumes=not options.no_resume,
+            friction=float(rng.uniform(0.3, 1.0)), payload=float(rng.uniform(0.0, 0.3)),
+            direction=float(rng.uniform(0.0, 2.0 * pi))))
+    return cases
+
+
+def scenario_bound(outcomes: Sequence[StopOutcome]) -> str:
+    """What N independent stops say of the next one: with none that is not as was said, one is so
+    with a probability below ε unless something of probability (1 − ε)^N = β has happened.
+    """
+    count, broken, stepped = len(outcomes), *(
+        sum(getattr(outcome, name) for outcome in outcomes) for name in ('broken', 'stepped'))
+    of = f'{count} stops, {stepped} stepped out of; in {broken} the body did not stand as was said'
+    if broken:
+        return of
+    shares = (f'{1.0 - doubt ** (1.0 / count):.2g} at confidence 1 - {doubt:g}'
+              for doubt in (0.05, 1e-6))
+    return (f'{of}: it does not in another one drawn alike with a probability below '
+            f'{" and below ".join(shares)}')
 
 
 @lru_cache
@@ -234,20 +254,26 @@ def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     return list(run_trials(robot, cases, p, certificate.time_to_rest))
 
 
-def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int,
-              quiet: bool = True) -> Results:
-    """Run cases on several processes; the results do not depend on how many."""
+def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int, quiet: bool = True,
+              record: Path | None = None) -> Results:
+    """Run cases on several processes; the results do not depend on how many, nor on how much of
+    them a record holds already.
+    """
     outcomes: list[StopOutcome] = []
+    if record is not None and record.exists():
+        outcomes = [StopOutcome(**json.loads(line)) for line in record.read_text().splitlines()]
     walks = [list(group) for _, group in groupby(
-        cases, lambda case: (*_key(case), case.friction, case.payload))]
-    with Pool(jobs) as pool:
+        cases[len(outcomes):], lambda case: (*_key(case), case.friction, case.payload))]
+    with Pool(jobs) as pool, open(record or os.devnull, 'a', encoding='utf-8') as kept:
         for of_walk in pool.imap(partial(run_walk, file=file), walks):
             outcomes += of_walk
+            print(*(json.dumps(vars(outcome)) for outcome in of_walk), sep='\n', file=kept,
+                  flush=True)
             if not quiet:
                 print(f'\r{len(outcomes)}/{len(cases)}', end='', file=sys.stderr, flush=True)
     if not quiet:
         print('\r', end='', file=sys.stderr)
-    return list(zip(cases, outcomes, strict=True))
+    return list(zip(cases, outcomes[:len(cases)], strict=True))
 
 
 class FreezingLoop(WalkingLoop):
@@ -343,12 +369,11 @@ def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], parameters: SuiteP
 def _outcome(run: LoopRun[FreezingLoop], case: StopCase, bound_s: float) -> StopOutcome:
     """What becomes of a run that walks at the phase of the case."""
     if case.push:
-        run.push(np.array((0.0, case.push, 0.0)))
+        run.push(case.push * np.array((cos(case.direction), sin(case.direction), 0.0)))
     run.states = [run.state]
     times: dict[str, Any] = {}
     if case.method == METHODS[0]:
-        predicted, measured = _held(run)
-        times = {'predicted_s': predicted, 'bound_s': bound_s, 'measured_s': measured}
+        times = {'bound_s': bound_s, **_held(run)}
     else:
         run.loop.freeze(case.method == 'finish_swing')
         run.walk(SHORTEST_HOLD)
@@ -367,16 +392,21 @@ def _outcome(run: LoopRun[FreezingLoop], case: StopCase, bound_s: float) -> Stop
                    walked_on=abs(resumed - case.speed) <= runs.WALKING_ERROR * case.speed)
 
 
-def _held(run: LoopRun[FreezingLoop]) -> tuple[float, float]:
-    """Inhibit and hold; return the predicted and measured time to rest [s]."""
-    predicted, held, measured = run.loop.request(True), 0.0, np.inf
+def _held(run: LoopRun[FreezingLoop]) -> dict[str, Any]:
+    """Inhibit and hold; return what was predicted, and the measured time to rest [s]."""
+    predicted, held, measured, stepped = run.loop.request(True), 0.0, np.inf, False
+    of = run.loop.outlook
+    assert of is not None
     while held < min(LONGEST_HOLD, max(SHORTEST_HOLD, measured + HOLD_AT_REST)) and not run.fell():
         run.walk(run.tick_s)
         held += run.tick_s
+        stepped |= run.loop.stop.push.acts
         if run.loop.stop.state == 'at_rest':
             measured = run.loop.stop.measured_s
     # a robot that fell on the way says nothing of the oscillators' time to rest
-    return predicted, np.nan if run.fell() and measured == np.inf else measured
+    return {'predicted_s': predicted, 'stepped': stepped, 'stands_s': of.stands_s,
+            'within_s': of.stands_within_s, 'within_m': of.stands_within_m,
+            'measured_s': np.nan if run.fell() and measured == np.inf else measured}
 
 
 def table(results: Results, by_case: bool = True) -> str:

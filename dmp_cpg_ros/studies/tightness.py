@@ -31,7 +31,7 @@ from dmp_cpg_ros.core.gait.gait import BodyScale
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.gait.running import RunningGait
-from dmp_cpg_ros.core.inhibition.prediction import predict
+from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, GaitSupervisor
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import phi_functions
@@ -307,9 +307,10 @@ def rest_row(graph: str) -> Row:
                       automatic=False, activity=np.ones(SIZE))
     start = canonical.initial_state(gait, replace(p.inhibition, start_inhibited=False))
     slowest = max(
-        predict(supervisor, ReferenceSystem(p.reference), canonical,
-                supervisor.request(walking, True), supervisor.inhibition(walking),
-                replace(start, x=network.locked_state(float(phi))), fastest, (0.0, 0.0, 0.0), tick)
+        look_ahead(supervisor, ReferenceSystem(p.reference), canonical,
+                   supervisor.request(walking, True), supervisor.inhibition(walking),
+                   replace(start, x=network.locked_state(float(phi))), fastest, (0.0, 0.0, 0.0),
+                   tick).time_s
         for phi in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False))
     return Row('time to rest', graph, 'time [s], defaults', bound, slowest)
 

@@ -7,7 +7,9 @@ from __future__ import annotations
 import json
 import re
 from argparse import Namespace
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +24,7 @@ from dmp_cpg_ros.analysis.recording import (
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest
-from dmp_cpg_ros.studies.study_stops import random_cases, scenario_bound
+from dmp_cpg_ros.studies.study_stops import random_cases, run_cases, scenario_bound
 
 ROBOT = quadruped()
 
@@ -61,17 +63,26 @@ def test_the_body_stands_when_it_stays_below_two_centimetres_per_second_on_four_
     assert body_at_rest(lifted, ROBOT, 2.0).still_s == pytest.approx(150 * TICK)
 
 
-def test_random_stops_bound_the_next_one_as_often_as_is_said() -> None:
-    rng, misses = np.random.default_rng(3), 0
-    for _ in range(200):
-        times = rng.exponential(size=30)
-        told = scenario_bound([StopOutcome(False, True, still_s=t, displacement_m=t)
-                               for t in times])
-        assert f'{times.max():.3f} s' in told
-        share = float(re.search(r'below ([0-9.]+) %', told)[1]) / 100.0  # type: ignore[index]
-        misses += np.exp(-times.max()) > share         # the true probability of exceeding it
-    assert misses <= 20                                # 5 % of 200 are 10
-    assert 'nothing is said' in scenario_bound([StopOutcome(True)])
+AS_SAID = StopOutcome(False, True, still_s=0.9, within_s=1.0, displacement_m=0.1, within_m=0.2)
+
+
+def test_random_stops_say_of_the_next_one_what_is_wrong_as_rarely_as_is_said() -> None:
+    rng, wrong = np.random.default_rng(3), 0
+    for failing in rng.uniform(0.0, 0.3, 500):  # the true probability that one is not as was said
+        late = rng.random(30) < failing
+        told = scenario_bound([replace(AS_SAID, still_s=1.1) if bad else AS_SAID for bad in late])
+        below = re.search(r'below ([0-9.]+) at confidence 1 - 0.05', told)
+        assert bool(below) is not late.any()
+        wrong += below is not None and failing > float(below[1])
+    assert wrong <= 25                                 # 5 % of 500
+
+
+@pytest.mark.parametrize(('changes', 'broken'), [
+    ({}, False), ({'still_s': 1.1}, True), ({'displacement_m': 0.3}, True), ({'fell': True}, True),
+    ({'still_s': 1.1, 'stepped': True}, False), ({'within_s': np.nan}, True)])
+def test_what_was_said_of_a_body_is_broken_by_falls_delays_and_longer_ways(
+        changes: dict[str, Any], broken: bool) -> None:
+    assert replace(AS_SAID, **changes).broken is broken
 
 
 def test_random_stops_depend_on_the_seed_only() -> None:
@@ -79,7 +90,19 @@ def test_random_stops_depend_on_the_seed_only() -> None:
                         legs=['auto'], braking=[3.0], no_resume=True)
     cases = random_cases(options)
     assert cases == random_cases(options) and len(set(cases)) == 5
-    assert all(0.5 <= case.speed <= 1.5 and 0.4 <= case.friction <= 1.0 for case in cases)
+    assert cases[:3] == random_cases(Namespace(**{**vars(options), 'random': 3}))
+    assert all(0.5 <= case.speed <= 1.5 and 0.3 <= case.friction <= 1.0 for case in cases)
+
+
+def test_a_record_is_gone_on_with_and_changes_nothing(tmp_path: Path) -> None:
+    cases = random_cases(Namespace(random=2, seed=1, gaits=['trot'], speeds=[0.3], legs=['auto'],
+                                   braking=[4.0], no_resume=True))
+    record = tmp_path / 'record'
+    first = run_cases(cases[:1], None, 1, record=record)
+    both = run_cases(cases, None, 1, record=record)
+    assert str(both) == str(run_cases(cases, None, 2)) and str(both[:1]) == str(first)
+    assert len(record.read_text(encoding='utf-8').splitlines()) == 2
+    assert not any(outcome.broken for _, outcome in both)
 
 
 @pytest.mark.parametrize(('speed', 'force'), [(0.02, 20.0), (0.0, 1.0)])
