@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 TOPICS = {
     'sensor_msgs/msg/JointState': ('joint_states', 'joint_targets', 'joint_work',
                                    'canonical_state', 'foot_contacts', 'posture_feedback'),
-    'nav_msgs/msg/Odometry': ('odom', 'estimated_odom'),
+    'nav_msgs/msg/Odometry': ('ground_truth', 'odom', 'estimated_odom'),
     'geometry_msgs/msg/TwistStamped': ('reference', 'cmd_vel'),
     'geometry_msgs/msg/Twist': ('cmd_vel',),
     'diagnostic_msgs/msg/DiagnosticArray': ('inhibition_state', 'body_mode', 'diagnostics'),
@@ -81,6 +81,9 @@ def _loaded(bag: Path) -> Recording:
             received = Received(bag_ns, _stamp_ns(message), message)
             messages[base_name(connection.topic)].append(received)
         counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}
+    # Bags of others have one odometry, and in old ones of this suite it is the truth.
+    truth, estimate = (('ground_truth', 'odom') if messages['ground_truth']
+                       else ('odom', 'estimated_odom'))
     time, work, _, peak_effort = _table(messages['joint_work'], JOINT_NAMES)
     return Recording(
         joints=recording.JointSeries(*_table(messages['joint_states'], JOINT_NAMES)),
@@ -89,7 +92,7 @@ def _loaded(bag: Path) -> Recording:
         canonical=_canonical(messages['canonical_state']),
         reference=recording.VelocitySeries(*_rows(messages['reference'], _velocity, (3,))),
         commands=recording.VelocitySeries(*_rows(_on_robot_clock(messages), _velocity, (3,))),
-        odometry=_odometry(messages['odom']), estimate=_odometry(messages['estimated_odom']),
+        odometry=_odometry(messages[truth]), estimate=_odometry(messages[estimate]),
         feet=_feet(messages['foot_contacts']),
         inhibition=_changes(messages['inhibition_state'], lambda e: (e.message, e.values)),
         modes=_modes(messages), statuses=_by_name(messages['diagnostics']),

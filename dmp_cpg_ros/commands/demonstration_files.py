@@ -278,7 +278,8 @@ def read_motion(path: Path, topic: str = 'joint_targets', robot_file: Path | Non
     context, _ = run_context(parameters, robot_file)
     rows, at, attitude = motion.common_rows(joints.time, canonical.time, recording.odometry.time)
     if not len(rows):
-        raise DataError(f"'{path}': no stamp has all of {topic}, canonical_state and odom")
+        raise DataError(f"'{path}': no stamp has all of {topic}, canonical_state and "
+                        'ground_truth or odom')
     missing = [JOINT_NAMES[j] for j in np.flatnonzero(np.isnan(joints.position[rows]).any(axis=0))]
     if missing:
         raise DataError(f"'{path}': {topic} lacks the joints {', '.join(missing)}")

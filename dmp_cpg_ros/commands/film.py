@@ -94,7 +94,7 @@ def film(recording: Recording, context: RunContext, robot_file: Path | None, pat
     checked_film_path(path)
     odometry, joints = recording.odometry, recording.joints
     if not (odometry.time.size and joints.time.size):
-        raise DataError('a film needs recorded joint_states and odom')
+        raise DataError('a film needs recorded joint_states and ground_truth or odom')
     first = max(odometry.time[0], joints.time[0], shot.start)
     last = min(odometry.time[-1], joints.time[-1], shot.end)
     times = np.arange(first, last + 1e-9, 1.0 / shot.fps)

@@ -76,7 +76,7 @@ LARGEST_PUSH = 1000.0
 TIMED_S = 1.0
 """Span over which the real-time factor is taken [s]."""
 
-STATE_TOPICS = ('odom', 'estimated_odom', 'joint_states', 'canonical_state', 'reference',
+STATE_TOPICS = ('ground_truth', 'odom', 'joint_states', 'canonical_state', 'reference',
                 'inhibition_gains', 'foot_contacts')
 """What is read for every frame."""
 
@@ -248,7 +248,7 @@ class LiveView:
             answer.set_result((True, ''))
         elif name == 'push':
             message = WrenchStamped()
-            message.header.frame_id, force = 'odom', message.wrench.force
+            message.header.frame_id, force = 'world', message.wrench.force
             force.x, force.y, force.z = value
             self._pushes.publish(message)
             answer.set_result((True, ''))
@@ -315,7 +315,7 @@ class LiveView:
                 except DataError as error:
                     self._node.get_logger().warning(f'{name}: {error}', throttle_duration_sec=5.0)
         values = self._values
-        motion = values.get('odom') or values.get('estimated_odom')
+        motion = values.get('ground_truth') or values.get('odom')
         if motion is None or 'joint_states' not in values:
             return {}
         stamp, angles = values['joint_states']

@@ -22,7 +22,7 @@ from dmp_cpg_ros.suite_table import RECORDER
 
 ALL = 'all'
 
-CLOCK_TOPICS = ('joint_states', 'imu', 'odom', 'foot_contacts')
+CLOCK_TOPICS = ('joint_states', 'imu', 'ground_truth', 'foot_contacts')
 """Topics whose stamps are the robot's clock, because this robot itself writes them; of ``/clock``
 there may be several.
 """

@@ -58,7 +58,7 @@ CLOCK_EVERY = 4
 VOTING_TOPICS = ('imu', 'foot_contacts')
 """What the inhibition reads when sensors can vote."""
 
-STATE_TOPICS = ('/clock', 'imu', 'odom', 'foot_contacts', 'joint_states')
+STATE_TOPICS = ('/clock', 'imu', 'ground_truth', 'foot_contacts', 'joint_states')
 """What the robot publishes at every tick, the tick itself last: between nodes of one process, what
 it leads to runs before its publication ends.
 """

@@ -79,7 +79,7 @@ class BodyState:
         self.readers: dict[str, Callable[[Any], Any]] = {
             'joint_states': robot_state.JointsReader().read}
         if node.parameters_of(StateSourceParameters).state_source != ESTIMATE:
-            self.readers['odom'] = robot_state.read_odom
+            self.readers['ground_truth'] = robot_state.read_odom
             return
         self.optional = BODY_TOPICS[ESTIMATE]
         self.readers |= {'joint_states': robot_state.JointsReader(strict=False).read,
@@ -88,7 +88,7 @@ class BodyState:
         self._estimator = BodyEstimator(
             description, node.parameters_of(EstimationParameters), legs)
         self._writer = robot_state.OdometryWriter()
-        self._publisher = node.publisher('estimated_odom')
+        self._publisher = node.publisher('odom')
         self._published, self._problem_ns = -1, 0
         self.on_parameters()
 
@@ -113,7 +113,7 @@ class BodyState:
         """
         if self._estimator is None:
             position, velocity, effort = values['joint_states']
-            base: robot_state.BaseMotion = values['odom']
+            base: robot_state.BaseMotion = values['ground_truth']
             return RobotState(stamp_ns, position, velocity, effort, *base, np.zeros(3),
                               np.zeros(len(LEGS)))
         readings = sensor_readings(stamp_ns, values)

@@ -37,7 +37,7 @@ class StartPose:
     Attributes
     ----------
     base_position : ndarray (3,)
-        In ``odom`` [m].
+        In ``world`` [m].
     base_quaternion : ndarray (4,)
         w, x, y, z, as MuJoCo has it.
     joint_position : ndarray (12,)

@@ -78,7 +78,7 @@ SLOWEST, FASTEST, LOWEST = 0.35, 0.65, 0.15
 """Speeds [m/s] and the height of the base [m] of a robot that walks on."""
 
 OWN = tuple(topic for topic in TOPICS if topic.publishers != ('user',) and topic.recorded
-            and topic.name not in ('/clock', '/diagnostics', 'joint_work', 'estimated_odom'))
+            and topic.name not in ('/clock', '/diagnostics', 'joint_work', 'odom'))
 """Topics that only nodes of the suite may write."""
 
 TICKED = ('joint_states', 'imu', 'foot_contacts', 'reference', 'canonical_state',
@@ -116,7 +116,7 @@ class Intruder(Node):  # type: ignore[misc]
         self.create_subscription(DiagnosticArray, '/diagnostics', self._on_report, 100)
 
     def _hear(self, topic: Interface, data: bytes) -> None:
-        if topic.name != 'odom':
+        if topic.name != 'ground_truth':
             self.last[topic.name] = data
             return
         with suppress(rclpy_implementation.RMWError):  # its own garbage comes back

@@ -57,6 +57,16 @@ def test_every_topic_survives_the_bag(
     assert_same(load_recording(write_bag(walked, tmp_path / 'bag', storage=storage)), walked)
 
 
+@pytest.mark.parametrize('odometry', [('ground_truth', 'odom'), ('odom', 'estimated_odom')])
+def test_the_truth_of_new_and_of_old_bags_is_not_the_estimate(
+        walked: Recording, tmp_path: Path, odometry: tuple[str, str]) -> None:
+    still = dataclasses.replace(walked.odometry, velocity_in_base=np.zeros((
+        len(walked.odometry.time), 3)))
+    recording = dataclasses.replace(walked, estimate=still)
+    assert_same(load_recording(write_bag(recording, tmp_path / 'bag', odometry=odometry)),
+                recording)
+
+
 def test_a_run_folder_and_a_file_in_the_bag_name_the_bag(
     walked: Recording, tmp_path: Path
 ) -> None:

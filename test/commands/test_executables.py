@@ -34,7 +34,7 @@ OUTPUTS = (
     'posture_feedback',
     'joint_targets',
     'joint_states',
-    'odom',
+    'ground_truth',
 )
 
 
@@ -114,7 +114,7 @@ def poisoned(kind: type, name: str, round_: int) -> Any:
         message.name = list(ENTRY_NAMES[name])
         for field in ('position', 'velocity', 'effort'):
             setattr(message, field, [bad] * len(message.name))
-    elif name in ('reference', 'odom', 'cmd_vel'):
+    elif name in ('reference', 'ground_truth', 'cmd_vel'):
         twist = message
         while hasattr(twist, 'twist'):
             twist = twist.twist

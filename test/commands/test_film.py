@@ -103,7 +103,7 @@ def test_what_cannot_be_written_is_refused_before_the_run(tmp_path, capsys, monk
 
 
 def test_an_empty_recording_or_time_has_no_film(glide, tmp_path):
-    with pytest.raises(DataError, match='needs recorded joint_states and odom'):
+    with pytest.raises(DataError, match='needs recorded joint_states and ground_truth or odom'):
         film(Recording(), RunContext(), None, tmp_path / 'film.gif')
     with pytest.raises(DataError, match='nothing was recorded between 5.0 s'):
         film(glide, RunContext(), None, tmp_path / 'film.gif', Shot(start=5.0))

@@ -191,7 +191,7 @@ def test_a_push_acts_in_the_world(client: Client, ros: Ros) -> None:
     ros.spin_until(lambda: bool(pushes))
     force = pushes[0].wrench.force
     assert (force.x, force.y, force.z) == (0.0, 12.5, 1.0)
-    assert pushes[0].header.frame_id == 'odom'
+    assert pushes[0].header.frame_id == 'world'
 
 
 @pytest.mark.parametrize('command', [

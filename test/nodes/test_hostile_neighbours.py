@@ -549,7 +549,7 @@ def test_the_suite_walks_on_among_garbage(processes: Processes, ros: Ros) -> Non
     nodes += [processes.node('leg_transformation', leg=leg) for leg in LEGS]
     for node in nodes:
         node.wait_for_output('active')
-    places: list[Any] = ros.collect(Odometry, 'odom', interface('odom').reader_qos)
+    places: list[Any] = ros.collect(Odometry, 'ground_truth', interface('ground_truth').reader_qos)
     reports = ros.collect(DiagnosticArray, '/diagnostics', 1000)
     topics = {topic.name: topic for kind in kinds for topic in read_by(kind)
               if kind not in topic.sometimes and topic.name != '/clock'}

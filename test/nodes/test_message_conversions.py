@@ -156,9 +156,9 @@ def read_state(writer: RobotStateWriter) -> RobotState:
     rate, acceleration = read_imu(imu)
     assert bits(rate, acceleration) == bits(*read_imu(writer.imu))
     assert imu.orientation_covariance[0] == -1.0  # ROS for: there is no orientation
-    base = read_odom(wire(writer.odom))
+    base = read_odom(wire(writer.ground_truth))
     stamps = {header_ns(message) for message in (
-        writer.joint_states, writer.imu, writer.odom, writer.foot_contacts)}
+        writer.joint_states, writer.imu, writer.ground_truth, writer.foot_contacts)}
     assert stamps == {stamp_ns(writer.clock.clock)}
     return RobotState(stamps.pop(), *joints, *base, acceleration,
                       FootContactsReader().read(wire(writer.foot_contacts)), rate)
@@ -258,7 +258,7 @@ def test_no_bad_number_enters_otherwise(bad: float) -> None:
                 read_reference(twist)
     writer = RobotStateWriter()
     writer.fill(state_of(np.ones(59)))
-    odom = wire(writer.odom)
+    odom = wire(writer.ground_truth)
     for part in (odom.pose.pose.position, odom.pose.pose.orientation, odom.twist.twist.linear,
                  odom.twist.twist.angular):
         good, part.y = part.y, bad
@@ -288,7 +288,7 @@ def test_no_bad_number_leaves(bad: float) -> None:
 def test_a_quaternion_must_be_a_rotation() -> None:
     writer = RobotStateWriter()
     writer.fill(state_of(np.ones(59)))
-    odom = wire(writer.odom)
+    odom = wire(writer.ground_truth)
     odom.pose.pose.orientation.w = 3.0
     with pytest.raises(DataError, match='quaternion'):
         read_odom(odom)

@@ -29,6 +29,7 @@ def write_bag(
     wall_clock: bool = False,
     namespace: str = '',
     stamped_commands: bool = False,
+    odometry: tuple[str, str] = ('ground_truth', 'odom'),
 ) -> Path:
     """Write a bag.
 
@@ -46,11 +47,13 @@ def write_bag(
         Put before the relative topic names, such as ``/spot``.
     stamped_commands : bool
         Whether ``cmd_vel`` is TwistStamped.
+    odometry : tuple of str
+        Topics of the truth and of the estimate.
     """
     with Writer(folder, version=9, storage_plugin=storage) as writer:
         connections: dict[str, Any] = {}
         for time_ns, topic, kind, message in sorted(
-            _messages(recording, stamped_commands), key=lambda m: m[0]
+            _messages(recording, stamped_commands, odometry), key=lambda m: m[0]
         ):
             name = topic if topic.startswith('/') else f'{namespace}/{topic}'
             if name not in connections:
@@ -65,8 +68,9 @@ def make(kind: str, **fields: Any) -> Any:
     return STORE.types[kind](**fields)
 
 
-def _messages(recording: Recording, stamped: bool) -> Iterator[tuple[int, str, str, Any]]:
-    yield from _robot_messages(recording)
+def _messages(recording: Recording, stamped: bool, odometry: tuple[str, str],
+              ) -> Iterator[tuple[int, str, str, Any]]:
+    yield from _robot_messages(recording, *odometry)
     for time, value in zip(recording.reference.time, recording.reference.value, strict=True):
         yield (
             _ns(time),
@@ -115,7 +119,8 @@ def _messages(recording: Recording, stamped: bool) -> Iterator[tuple[int, str, s
             yield _ns(event.time), '/diagnostics', *_status({name: event})
 
 
-def _robot_messages(recording: Recording) -> Iterator[tuple[int, str, str, Any]]:
+def _robot_messages(recording: Recording, truth: str, estimate: str,
+                    ) -> Iterator[tuple[int, str, str, Any]]:
     joints, odometry, feet = recording.joints, recording.odometry, recording.feet
     for row, time in enumerate(joints.time):
         yield (
@@ -138,10 +143,10 @@ def _robot_messages(recording: Recording) -> Iterator[tuple[int, str, str, Any]]
             *_joint_state(time, LEGS, np.array([]), np.array([]), force),
         )
     for row, time in enumerate(odometry.time):
-        yield _ns(time), 'odom', 'nav_msgs/msg/Odometry', _odometry(odometry, row, time)
+        yield _ns(time), truth, 'nav_msgs/msg/Odometry', _odometry(odometry, row, time)
     for row, time in enumerate(recording.estimate.time):
         message = _odometry(recording.estimate, row, time)
-        yield _ns(time), 'estimated_odom', 'nav_msgs/msg/Odometry', message
+        yield _ns(time), estimate, 'nav_msgs/msg/Odometry', message
 
 
 def _odometry(odometry: Any, row: int, time: float) -> Any:

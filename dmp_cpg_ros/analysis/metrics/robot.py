@@ -233,7 +233,7 @@ class EstimateErrors(NamedTuple):
 
 
 def estimate_errors(recording: Recording) -> EstimateErrors | None:
-    """Errors of ``estimated_odom`` against ``odom``; None where one of them is missing."""
+    """Errors of ``odom`` against ``ground_truth``; None where one of them is missing."""
     both = motion.matched(recording.odometry, recording.estimate)
     if len(both[0].time) < 2:
         return None

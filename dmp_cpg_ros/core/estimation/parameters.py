@@ -55,7 +55,7 @@ class EstimationParameters(Parameters):
     terrain_time: float = parameter(
         0.3, "time constant of the filter on the ground's plane", 0.01, 10.0, unit='s')
     estimate_rate: float = parameter(
-        50.0, 'rate at which estimated_odom is published; 0: never', 0.0, 2000.0, unit='Hz')
+        50.0, 'rate of odom and of its transform; 0: never', 0.0, 2000.0, unit='Hz')
 
     @cached_property
     def spread(self) -> Array:

@@ -29,9 +29,9 @@ class RobotState:
     joint_position, joint_velocity, joint_effort : ndarray (12,)
         Measured [rad], [rad/s], [N m], in the order of ``JOINT_NAMES``.
     base_position_in_world : ndarray (3,)
-        Origin of ``base_link`` in ``odom`` [m].
+        Origin of ``base_link`` in ``world`` [m].
     base_quaternion : ndarray (4,)
-        Orientation of ``base_link`` in ``odom``, x, y, z, w.
+        Orientation of ``base_link`` in ``world``, x, y, z, w.
     base_velocity_in_base, base_rate_in_base : ndarray (3,)
         Linear [m/s] and angular [rad/s] velocity of ``base_link``, seen in ``base_link``.
     acceleration_in_base : ndarray (3,)

@@ -19,8 +19,10 @@ from dmp_cpg_ros.core.maths.rotations import Array, roll_pitch_yaw
 HOLD_NS = 100_000_000
 """How long a force acts that is not renewed [ns]."""
 
-FRAMES = ('base_footprint', 'odom')
-"""Frames of a force: x along the base's heading and z up, or the world's."""
+FRAMES = ('base_footprint', 'odom', 'world')
+"""Frames of a force: x along the base's heading and z up, or the world's; the simulator,
+which knows of no drift, takes ``odom`` as the world.
+"""
 
 LARGEST_FORCE = 15_000.0
 """Largest component of a force [N]: a hundred times a robot's weight, which a simulation bears."""
@@ -61,7 +63,7 @@ class PushForce:
     def in_world(self, base_quaternion: Array) -> Array:
         """Force in the world, ndarray (3,) [N], for a base orientation x, y, z, w."""
         f_x, f_y, f_z = self.force
-        if self.frame == 'odom':
+        if self.frame != FRAMES[0]:
             return np.array((f_x, f_y, f_z))
         yaw = roll_pitch_yaw(base_quaternion)[2]
         c, s = cos(yaw), sin(yaw)

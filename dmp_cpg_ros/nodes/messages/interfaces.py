@@ -149,10 +149,10 @@ TOPICS: tuple[Interface, ...] = (
               ('user',), (INHIBITION,), sometimes=(INHIBITION,)),
     Interface('push', WrenchStamped,
               'force on the base from its stamp on, for 0.1 s unless the next one comes before; '
-              'frame base_footprint (along the heading) or odom', ('user',), (ROBOT,)),
+              'frame base_footprint (along the heading) or world', ('user',), (ROBOT,)),
     Interface('imu', Imu, 'turn rate and specific force in base_link; no orientation',
               (ROBOT,), (POSTURE, INHIBITION), sometimes=(POSTURE, INHIBITION)),
-    Interface('odom', Odometry, "true pose and twist of base_link in odom, the simulator's",
+    Interface('ground_truth', Odometry, 'true pose and twist of base_link in world',
               (ROBOT,), (POSTURE,), sometimes=(POSTURE,)),
     Interface('foot_contacts', JointState, 'effort = normal force of each foot',
               (ROBOT,), FEELING, sometimes=FEELING),
@@ -160,8 +160,8 @@ TOPICS: tuple[Interface, ...] = (
               'position = positive work of each joint since time 0 [J], effort = largest torque '
               'since the last message [N m], over every physics step; at every tenth tick',
               (ROBOT,), (), sometimes=(ROBOT,)),
-    Interface('estimated_odom', Odometry,
-              "estimated pose and twist of base_link, at the parameter's rate",
+    Interface('odom', Odometry,
+              "the robot's own estimate: pose and twist of base_link in odom, at estimate_rate",
               (POSTURE,), (), sometimes=(POSTURE,)),
     Interface('robot_description', String,
               'URDF of the robot, with links base_link, its bodies and fl_foot to rr_foot',
@@ -224,7 +224,7 @@ SERVICES: tuple[Interface, ...] = (
 )
 """Services of the suite."""
 
-BODY_TOPICS = {ESTIMATE: ('imu', 'foot_contacts'), GROUND_TRUTH: ('odom',)}
+BODY_TOPICS = {ESTIMATE: ('imu', 'foot_contacts'), GROUND_TRUTH: ('ground_truth',)}
 """What the posture controller reads besides joints, by the parameter ``state_source``."""
 
 INTERFACES: dict[str, Interface] = {interface.name: interface for interface in TOPICS + SERVICES}

@@ -19,7 +19,8 @@ from dmp_cpg_ros.nodes.messages import cdr
 from dmp_cpg_ros.nodes.messages.joint_states import JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed, set_stamp
 
-BASE_FRAME, WORLD_FRAME = 'base_link', 'odom'
+BASE_FRAME, ODOM_FRAME, WORLD_FRAME = 'base_link', 'odom', 'world'
+"""Frames: the base, where it believes that it was switched on (REP-105), and the simulator's."""
 
 WORK_EVERY = 10
 """``joint_work`` comes with every so many states: it is a sum, of which nothing is lost."""
@@ -31,11 +32,11 @@ class RobotStateWriter:
     """The five messages of a robot's state, refilled at every tick.
 
     ``imu`` holds what a gyroscope and an accelerometer measure and no orientation: fusing them
-    is the reader's task, and yaw is nothing that such a sensor knows. ``odom`` is the truth.
+    is the reader's task, and yaw is nothing that such a sensor knows.
 
     Attributes
     ----------
-    clock, imu, odom, foot_contacts, joint_states : messages
+    clock, imu, ground_truth, foot_contacts, joint_states : messages
         Valid after :meth:`fill`.
     joint_work : message or None
         Only of every tenth state, and of a robot that knows its work.
@@ -43,8 +44,8 @@ class RobotStateWriter:
 
     def __init__(self) -> None:
         """Lay the messages out."""
-        self.clock, self._odom, self._imu = Clock(), OdometryWriter(), cdr.RefilledMessage(
-            BASE_FRAME)
+        self.clock, self._truth, self._imu = (
+            Clock(), OdometryWriter(WORLD_FRAME), cdr.RefilledMessage(BASE_FRAME))
         self._imu.constant(*[0.0] * 4, -1.0, *[0.0] * 8)  # no orientation: its covariance says so
         self._imu.refilled(measured_rate_in_base=3)
         self._imu.constant(*[0.0] * 9)
@@ -64,7 +65,7 @@ class RobotStateWriter:
         set_stamp(self.clock.clock, time_ns)
         self.imu = cdr.SerializedImu(self._imu.filled(
             time_ns, state.measured_rate_in_base, state.acceleration_in_base))
-        self.odom = self._odom.fill(
+        self.ground_truth = self._truth.fill(
             time_ns, state.base_position_in_world, state.base_quaternion,
             state.base_velocity_in_base, state.base_rate_in_base)
         self.joint_work = self._filled_work(state)
@@ -93,11 +94,11 @@ class RobotStateWriter:
 
 
 class OdometryWriter:
-    """Writes an ``Odometry`` of ``base_link`` in ``odom``."""
+    """Writes an ``Odometry`` of ``base_link`` in a frame, by default ``odom``."""
 
-    def __init__(self) -> None:
+    def __init__(self, frame: str = ODOM_FRAME) -> None:
         """Lay the message out."""
-        self._message = cdr.RefilledMessage(WORLD_FRAME, BASE_FRAME)
+        self._message = cdr.RefilledMessage(frame, BASE_FRAME)
         self._message.refilled(position=3, quaternion=4)
         self._message.constant(*[0.0] * 36)
         self._message.refilled(velocity=3, rate=3, covariance=36)
@@ -150,7 +151,7 @@ class FootContactsReader:
 
 
 class BaseMotion(NamedTuple):
-    """Motion of ``base_link``, as ``odom`` tells it; in the order of :class:`RobotState`.
+    """Motion of ``base_link``, as an ``Odometry`` tells it; in the order of :class:`RobotState`.
 
     Attributes
     ----------
@@ -169,7 +170,7 @@ class BaseMotion(NamedTuple):
 
 
 def read_odom(message: Odometry) -> BaseMotion:
-    """Read ``odom``; raises DataError, also for a quaternion that is no rotation."""
+    """Read an ``Odometry``; raises DataError, also for a quaternion that is no rotation."""
     pose, twist = message.pose.pose, message.twist.twist
     q = pose.orientation
     quaternion = np.array((q.x, q.y, q.z, q.w))

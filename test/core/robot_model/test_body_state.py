@@ -100,8 +100,8 @@ def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros:
     process = processes.node('posture_control')
     feedback, told = (ros.collect(interface(name).type, name, interface(name).reader_qos)
                       for name in ('posture_feedback', '/diagnostics'))
-    estimates = ros.collect(interface('estimated_odom').type, 'estimated_odom',
-                            interface('estimated_odom').reader_qos)
+    estimates = ros.collect(interface('odom').type, 'odom',
+                            interface('odom').reader_qos)
     names = ('imu', 'foot_contacts', 'joint_states', 'reference', 'canonical_state')
     publishers = {name: ros.node.create_publisher(
         interface(name).type, name, interface(name).publisher_qos) for name in names}
