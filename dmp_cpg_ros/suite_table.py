@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters
 LEG, POSTURE, ROBOT, RECORDER = (
     'leg_transformation', 'posture_control', 'mujoco_robot', 'bag_recorder')
 
-ABSOLUTE_TOPICS = ('/clock', '/diagnostics')
+ABSOLUTE_TOPICS = ('/clock', '/diagnostics', '/tf', '/tf_static')
 """Topics that ROS names absolutely, once for all nodes of a domain."""
 
 
@@ -111,8 +111,8 @@ def instances() -> Iterator[tuple[Kind, str, Mapping[str, str]]]:
 def namespace_rules(namespace: str) -> list[tuple[str, str]]:
     """Remapping rules (from, to) with which a whole suite runs in a namespace.
 
-    A robot in a namespace has its own clock and diagnostics there: absolute names would mix
-    the clocks of two robots in one domain.
+    A robot in a namespace has its own clock, diagnostics and frames there: absolute names would
+    mix those of two robots in one domain.
     """
     if namespace in ('', '/'):
         return []

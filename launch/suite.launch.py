@@ -8,11 +8,14 @@ more: it plays a scenario, waits until the nodes are ready, and writes a report.
 
 from pathlib import Path
 
+from ament_index_python.packages import get_packages_with_prefixes
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
 
+from dmp_cpg_ros.robot.urdf import urdf
 from dmp_cpg_ros.suite import load_suite
 from dmp_cpg_ros.suite_table import (
     COMPOSED,
@@ -23,6 +26,9 @@ from dmp_cpg_ros.suite_table import (
     instances,
     namespace_rules,
 )
+
+FRAMES = 'robot_state_publisher'
+"""Package and executable that publish the frames of the links, below ``base_link``."""
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -54,6 +60,10 @@ def generate_launch_description() -> LaunchDescription:
             description='whether to record all topics of the suite in a bag'),
         DeclareLaunchArgument(
             'bag', default_value='bag', description='folder of that bag; must not exist yet'),
+        DeclareLaunchArgument(
+            FRAMES, default_value='auto', choices=['auto', 'true', 'false'],
+            description='whether to start it for the frames of all links on /tf; auto: where it '
+                        'is installed'),
         OpaqueFunction(function=nodes),
     ])
 
@@ -78,8 +88,11 @@ def nodes(context: LaunchContext) -> list[Node]:
         shared['expected_nodes'] = list(KINDS)
         if Path(given('bag')).exists():
             raise FileExistsError(f"'{given('bag')}' exists; name another folder with bag:=FOLDER")
-    table = {name: (kind.name, own) for kind, name, own in instances()}
     described = []
+    if given(FRAMES) == 'true' or (
+            given(FRAMES) == 'auto' and FRAMES in get_packages_with_prefixes()):
+        described.append(frames_of(suite.robot_file, namespace))
+    table = {name: (kind.name, own) for kind, name, own in instances()}
     for process, names in {**({RECORDER: (RECORDER,)} if recording else {}),
                            **PROCESSES[given('processes')]}.items():
         kind, own = table[names[0]]
@@ -101,3 +114,17 @@ def nodes(context: LaunchContext) -> list[Node]:
             on_exit=Shutdown() if ROBOT in names else None,
             respawn=given('respawn') == 'true' and ROBOT not in names))
     return described
+
+
+def frames_of(robot_file: Path, namespace: str) -> Node:
+    """Make the node that turns ``joint_states`` into ``/tf``, with the robot's own description.
+
+    The latched ``robot_description`` stays the robot's alone: this node's copy has another name.
+    """
+    return Node(
+        package=FRAMES, executable=FRAMES, name=FRAMES, namespace=namespace or None,
+        parameters=[{
+            'robot_description': ParameterValue(urdf(robot_file), value_type=str),
+            'use_sim_time': True, 'publish_frequency': 50.0}],
+        remappings=[('robot_description', f'{FRAMES}/robot_description'),
+                    *(rule for rule in namespace_rules(namespace) if rule[0] != '__ns')])

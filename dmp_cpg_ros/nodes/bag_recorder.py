@@ -65,8 +65,8 @@ class BagRecorder(SuiteNode):
         self._bag = BagWriter(wanted, parameters.storage)
         if self._bag.folder != wanted:
             self.get_logger().warning(f"'{wanted}' exists: recording into '{self._bag.folder}'")
-        topics = [topic for topic in RECORDED
-                  if ALL in parameters.topics or topic.name in parameters.topics]
+        topics = [topic for topic in RECORDED if topic.installed
+                  and (ALL in parameters.topics or topic.name in parameters.topics)]
         stamped = [topic.name for topic in topics if _bears_robot_time(topic)]
         clocks = [name for name in stamped if name in CLOCK_TOPICS] or stamped
         self._drained_at_end = [

@@ -35,7 +35,8 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.nodes.framework.gaits import description_of, follow_gait, known_gaits
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions, robot_state
-from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS
+from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS, interface
+from dmp_cpg_ros.nodes.messages.transforms import WITHOUT_TF, TransformWriter
 from dmp_cpg_ros.nodes.messages.values import stamped, told_at
 from dmp_cpg_ros.suite_table import POSTURE
 
@@ -89,6 +90,12 @@ class BodyState:
             description, node.parameters_of(EstimationParameters), legs)
         self._writer = robot_state.OdometryWriter()
         self._publisher = node.publisher('odom')
+        self._transforms = None
+        if interface('/tf').installed:
+            self._transforms = node.publisher('/tf')
+            self._transform = TransformWriter(robot_state.ODOM_FRAME, robot_state.BASE_FRAME)
+        else:
+            node.get_logger().info(WITHOUT_TF)
         self._published, self._problem_ns = -1, 0
         self.on_parameters()
 
@@ -125,6 +132,9 @@ class BodyState:
         if self._period_ns and stamp_ns // self._period_ns != self._published:
             self._published = stamp_ns // self._period_ns
             self._publisher.publish(self._writer.fill_estimate(estimate))
+            if self._transforms is not None:
+                self._transforms.publish(self._transform.fill(
+                    stamp_ns, estimate.position_in_world, estimate.quaternion))
         return estimated_state(readings, estimate)
 
     def diagnostic_values(self) -> Mapping[str, Any]:

@@ -25,12 +25,14 @@ from std_srvs.srv import Trigger
 
 from dmp_cpg_ros.configuration import find_config, load_yaml
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.suite_table import KINDS, RECORDER, ROBOT, WALKING_NODES
+from dmp_cpg_ros.robot.urdf import urdf
+from dmp_cpg_ros.suite_table import ABSOLUTE_TOPICS, KINDS, RECORDER, ROBOT, WALKING_NODES
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
 ARGUMENTS = {'parameters': '', 'robot': '', 'lock_step': '', 'namespace': '', 'record': 'false',
-             'processes': 'each', 'bag': 'bag', 'respawn': 'false'}
+             'processes': 'each', 'bag': 'bag', 'respawn': 'false',
+             'robot_state_publisher': 'auto'}
 
 UP_S = 90.0
 """How long nine processes may take to start and to find each other on a loaded machine [s]."""
@@ -54,6 +56,7 @@ def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
         'launch.substitutions': ['LaunchConfiguration'],
         'launch_ros': [],
         'launch_ros.actions': ['Node'],
+        'launch_ros.parameter_descriptions': ['ParameterValue'],
     }
     for module, members in names.items():
         stand_in = ModuleType(module)
@@ -155,6 +158,28 @@ def test_arguments_left_empty_override_nothing_and_given_ones_reach_the_nodes(
     file = str(find_config('robots/mini_quadruped.yaml'))
     assert given['mujoco_robot'] == {'lock_step': True, 'robot': file}
     assert given['leg_transformation_rr'] == {'lock_step': True, 'robot': file, 'leg': 'rr'}
+
+
+@pytest.mark.parametrize('namespace', ['', 'robot1'])
+def test_the_frames_of_the_links_come_from_the_robots_description_where_that_is_installed(
+        launch_file: ModuleType, monkeypatch: pytest.MonkeyPatch, namespace: str) -> None:
+    given = {**ARGUMENTS, 'namespace': namespace, 'robot': 'robots/mini_quadruped.yaml'}
+    frames = 'robot_state_publisher'
+    monkeypatch.setattr(launch_file, 'get_packages_with_prefixes', dict)
+    without = launch_file.nodes(given)
+    assert sorted(node.name for node in without) == sorted(WALKING_NODES)
+    monkeypatch.setattr(launch_file, 'get_packages_with_prefixes', lambda: {frames: '/opt/ros'})
+    node, *others = launch_file.nodes(given)
+    assert [other.name for other in others] == [other.name for other in without]
+    assert (node.package, node.executable, node.name) == (frames, frames, frames)
+    assert node.namespace == (f'/{namespace}' if namespace else None)
+    (parameters,), remappings = node.parameters, dict(node.remappings)
+    text = parameters['robot_description']
+    assert text.positional == (urdf(find_config(given['robot'])),) and text.value_type is str
+    assert parameters['use_sim_time'] is True
+    assert remappings.pop('robot_description') == f'{frames}/robot_description'
+    assert remappings == ({name: name[1:] for name in ABSOLUTE_TOPICS} if namespace else {})
+    assert len(launch_file.nodes({**given, frames: 'false'})) == len(without)
 
 
 @pytest.mark.parametrize('name', ['parameters', 'robot'])

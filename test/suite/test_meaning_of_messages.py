@@ -18,7 +18,7 @@ from rosbags.highlevel import AnyReader
 
 from dmp_cpg_ros.core.balance.body_command import MODES
 from dmp_cpg_ros.nodes.messages.interfaces import TOPICS
-from dmp_cpg_ros.nodes.messages.robot_state import BASE_FRAME, WORLD_FRAME
+from dmp_cpg_ros.nodes.messages.robot_state import BASE_FRAME, ODOM_FRAME, WORLD_FRAME
 from dmp_cpg_ros.suite_table import WALKING
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
@@ -39,7 +39,7 @@ events:
   - {at: 3.2, lie_down: true}
 """
 
-FRAMES = {'', BASE_FRAME, WORLD_FRAME, 'base_footprint'}
+FRAMES = {'', BASE_FRAME, ODOM_FRAME, WORLD_FRAME, 'base_footprint'}
 CONTROLLING = {topic.name for topic in TOPICS
                if {kind.name for kind in WALKING}.intersection(topic.subscribers)}
 

@@ -41,6 +41,7 @@ from dmp_cpg_ros.nodes.messages.conversions import GaitMemoryReader
 from dmp_cpg_ros.nodes.messages.interfaces import (
     PUBLISHER_DEPTH,
     REPEATED,
+    SHARED,
     Interface,
     expected_count,
     interface,
@@ -421,7 +422,7 @@ class SuiteNode(GuardedLifecycleNode):
         now_ns, now_s = time.time_ns(), time.monotonic()
         for topic in dict.fromkeys(topic for topic, _ in (*self._inputs, *self._outputs)):
             count = expected_count(topic.publishers)
-            if not count or topic.name.startswith('~') or topic.name == '/diagnostics':
+            if not count or topic.name.startswith('~') or topic.name in SHARED:
                 continue
             too_many = self.count_publishers(self.resolve_topic_name(topic.name)) > count
             if (too_many and self._publishers_of(topic)[1]) or any(

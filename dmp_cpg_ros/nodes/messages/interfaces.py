@@ -34,6 +34,7 @@ from std_srvs.srv import SetBool, Trigger
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE, GROUND_TRUTH
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION, REFERENCE
+from dmp_cpg_ros.nodes.messages.transforms import TFMessage
 from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, RECORDER, ROBOT
 
 PUBLISHER_DEPTH = 2000
@@ -101,6 +102,11 @@ class Interface:
         return hasattr(self.type, 'Request')
 
     @property
+    def installed(self) -> bool:
+        """Whether its type can be sent here."""
+        return hasattr(self.type, 'get_fields_and_field_types')
+
+    @property
     def publisher_qos(self) -> QoSProfile:
         """Profile that publishers offer."""
         return _qos(1 if self.latched else PUBLISHER_DEPTH, latched=self.latched)
@@ -163,6 +169,12 @@ TOPICS: tuple[Interface, ...] = (
     Interface('odom', Odometry,
               "the robot's own estimate: pose and twist of base_link in odom, at estimate_rate",
               (POSTURE,), (), sometimes=(POSTURE,)),
+    Interface('/tf', TFMessage,
+              'odom -> base_link as odom says; joints from robot_state_publisher. '
+              'Only where tf2_msgs is installed', (POSTURE,), (), sometimes=(POSTURE,)),
+    Interface('/tf_static', TFMessage,
+              'fixed joints, from robot_state_publisher. Only where tf2_msgs is installed',
+              ('user',), (), latched=True),
     Interface('robot_description', String,
               'URDF of the robot, with links base_link, its bodies and fl_foot to rr_foot',
               (ROBOT,), ('user',), latched=True),
@@ -201,6 +213,9 @@ TOPICS: tuple[Interface, ...] = (
               (RECORDER,), ('user',), latched=True, recorded=False),
 )
 """Topics of the suite."""
+
+SHARED = ('/diagnostics', '/tf', '/tf_static')
+"""Topics that nodes of other packages may write too."""
 
 SILENT_NS = 500_000_000
 """Age of the newest ``inhibition_gains`` from which inhibition counts as gone [ns]."""
