@@ -232,8 +232,8 @@ def _statuses(messages: Messages) -> Iterator[tuple[str, StatusEvent]]:
 
 def _by_name(messages: Messages) -> dict[str, tuple[StatusEvent, ...]]:
     histories: dict[str, list[StatusEvent]] = defaultdict(list)
-    for name, event in _statuses(messages):
-        histories[name].append(event)
+    for name, event in _statuses(messages):  # robot/node, where the robot has a namespace
+        histories[base_name(name)].append(event)
     return {name: tuple(history) for name, history in histories.items()}
 
 

@@ -447,6 +447,13 @@ def test_diagnostics_come_once_in_a_second_of_the_robots_clock() -> None:
         assert set(np.diff(due[1:])) == {1_000_000_000}
 
 
+def test_reports_of_two_robots_are_told_apart() -> None:
+    reports = [NodeHealth('node', robot=space).status('active', {}, periodic=False).status[0]
+               for space in ('/', '/robot1', '/lab/robot2')]
+    assert [report.name for report in reports] == ['node', 'robot1/node', 'lab/robot2/node']
+    assert [report.hardware_id for report in reports] == ['dmp_cpg_ros', 'robot1', 'lab/robot2']
+
+
 def test_of_many_bad_messages_few_are_logged() -> None:
     now = 0.0
     health = NodeHealth('node', clock=lambda: now)

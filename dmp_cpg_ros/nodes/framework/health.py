@@ -47,6 +47,8 @@ class NodeHealth:
         Name of the node.
     clock : callable () → float
         Steady time [s]: what is dropped may come while the robot's clock stands still.
+    robot : str
+        Namespace of the node, by which several robots are told apart.
 
     Attributes
     ----------
@@ -58,9 +60,10 @@ class NodeHealth:
         Messages that were dropped, per topic; requests, per service.
     """
 
-    def __init__(self, name: str, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, name: str, clock: Callable[[], float] = time.monotonic,
+                 robot: str = '') -> None:
         """Start healthy; nodes report at different moments, so that no tick bears all reports."""
-        self.name, self._clock = name, clock
+        self.name, self._clock, self._robot = name, clock, robot.strip('/')
         self.ticks = self.stamp_ns = 0
         self.rejected: dict[str, int] = {}
         self._recent: dict[str, tuple[bytes, str]] = {}
@@ -123,7 +126,8 @@ class NodeHealth:
             self.name, self.stamp_ns, '; '.join(message for _, message in told) or state,
             {'state': state, 'ticks': self.ticks, 'last_stamp_ns': self.stamp_ns,
              **{f'rejected.{topic}': count for topic, count in self.rejected.items()}, **values},
-            level=max((level for level, _ in told), default=DiagnosticStatus.OK))
+            level=max((level for level, _ in told), default=DiagnosticStatus.OK),
+            robot=self._robot)
 
 
 def _level(error: bool) -> bytes:

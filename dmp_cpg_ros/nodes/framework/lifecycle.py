@@ -73,7 +73,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         self.state_label = 'unconfigured'
         self.failure: Exception | None = None
         super().__init__(name, **options)
-        self.health = NodeHealth(self.get_name())
+        self.health = NodeHealth(self.get_name(), robot=self.get_namespace())
         self._guard_transitions(self._service_change_state)
 
     # Hooks -------------------------------------------------------------------------------------

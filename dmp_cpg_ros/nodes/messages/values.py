@@ -66,10 +66,13 @@ def text(value: Any) -> str:
 
 
 def status_message(name: str, time_ns: int, message: str, values: Mapping[str, Any], *,
-                   level: bytes = DiagnosticStatus.OK) -> DiagnosticArray:
-    """Status of a node at a time [ns]; numbers become text that reads back to the same float."""
+                   level: bytes = DiagnosticStatus.OK, robot: str = '') -> DiagnosticArray:
+    """Status of a node of a robot at a time [ns]; numbers become text that reads back to the same
+    float.
+    """
     array = DiagnosticArray(status=[DiagnosticStatus(
-        name=name, hardware_id='dmp_cpg_ros', level=level, message=message,
+        name=f'{robot}/{name}'.strip('/'), hardware_id=robot or 'dmp_cpg_ros',
+        level=level, message=message,
         values=[KeyValue(key=key, value=text(value)) for key, value in values.items()])])
     set_stamp(array.header.stamp, time_ns)
     return array
