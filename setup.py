@@ -22,7 +22,7 @@ NAME = 'dmp_cpg_ros'
 EXECUTABLES = (
     # The nodes, in the order of the data flow.
     'reference_filter', 'canonical_oscillators', 'inhibition', 'posture_control',
-    'leg_transformation', 'mujoco_robot', 'bag_recorder',
+    'leg_transformation', 'mujoco_robot', 'bag_recorder', 'visualization',
     # The commands.
     'walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client', 'live_view',
     'composed_suite', 'study_stops', 'benchmark_walking', 'study_recovery',

@@ -22,8 +22,8 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
-LEG, POSTURE, ROBOT, RECORDER = (
-    'leg_transformation', 'posture_control', 'mujoco_robot', 'bag_recorder')
+LEG, POSTURE, ROBOT, RECORDER, VISUALIZATION = (
+    'leg_transformation', 'posture_control', 'mujoco_robot', 'bag_recorder', 'visualization')
 
 ABSOLUTE_TOPICS = ('/clock', '/diagnostics', '/tf', '/tf_static')
 """Topics that ROS names absolutely, once for all nodes of a domain."""
@@ -74,19 +74,25 @@ SUITE_TABLE: tuple[Kind, ...] = (
     _single(ROBOT, 'MujocoRobotNode', core.RobotParameters, SensorParameters, WorldParameters,
             StateSourceParameters, core.TickParameters, core.RobotFileParameters, VotingSwitch),
     _single(RECORDER, 'BagRecorder'),
+    _single(VISUALIZATION, 'Visualization',
+            LegParameters, core.GaitParameters, core.RobotFileParameters),
 )
 """All kinds of nodes in the order of the data flow; the robot comes last of those that walk, so
-that its first state finds everybody listening.
+that its first state finds everybody listening. After it come those that look on.
 """
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in SUITE_TABLE}
 """The table by the name of the kind."""
 
-WALKING: tuple[Kind, ...] = tuple(kind for kind in SUITE_TABLE if kind.name != RECORDER)
-"""Kinds of nodes that walk: all but the recorder."""
+WALKING: tuple[Kind, ...] = tuple(
+    kind for kind in SUITE_TABLE if kind.name not in (RECORDER, VISUALIZATION))
+"""Kinds of nodes that walk: all but those that look on."""
+
+RECORDED_WALK: tuple[str, ...] = (*(kind.name for kind in WALKING), RECORDER)
+"""Names of the kinds that wait for one another where a walk is recorded."""
 
 WALKING_NODES: tuple[str, ...] = tuple(name for kind in WALKING for name in kind.instances)
-"""Names in the graph of all nodes but the recorder's."""
+"""Names in the graph of all nodes that walk."""
 
 
 COMPOSED = 'composed_suite'
@@ -103,7 +109,7 @@ PROCESSES: dict[str, dict[str, tuple[str, ...]]] = {
 
 def instances() -> Iterator[tuple[Kind, str, Mapping[str, str]]]:
     """Every node of the suite, the recorder first: its kind, its name, its own parameters."""
-    for kind in (KINDS[RECORDER], *WALKING):
+    for kind in (KINDS[RECORDER], *WALKING, KINDS[VISUALIZATION]):
         for name, own in kind.instances.items():
             yield kind, name, own
 

@@ -19,10 +19,11 @@ from dmp_cpg_ros.robot.urdf import urdf
 from dmp_cpg_ros.suite import load_suite
 from dmp_cpg_ros.suite_table import (
     COMPOSED,
-    KINDS,
     PROCESSES,
+    RECORDED_WALK,
     RECORDER,
     ROBOT,
+    VISUALIZATION,
     instances,
     namespace_rules,
 )
@@ -61,6 +62,10 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             'bag', default_value='bag', description='folder of that bag; must not exist yet'),
         DeclareLaunchArgument(
+            VISUALIZATION, default_value='false', choices=['true', 'false'],
+            description='whether to publish markers and the path of the body, for RViz and '
+                        'Foxglove'),
+        DeclareLaunchArgument(
             FRAMES, default_value='auto', choices=['auto', 'true', 'false'],
             description='whether to start it for the frames of all links on /tf; auto: where it '
                         'is installed'),
@@ -85,7 +90,7 @@ def nodes(context: LaunchContext) -> list[Node]:
         shared['lock_step'] = given('lock_step') == 'true'
     recording = given('record') == 'true'
     if recording:
-        shared['expected_nodes'] = list(KINDS)
+        shared['expected_nodes'] = list(RECORDED_WALK)
         if Path(given('bag')).exists():
             raise FileExistsError(f"'{given('bag')}' exists; name another folder with bag:=FOLDER")
     described = []
@@ -93,7 +98,9 @@ def nodes(context: LaunchContext) -> list[Node]:
             given(FRAMES) == 'auto' and FRAMES in get_packages_with_prefixes()):
         described.append(frames_of(suite.robot_file, namespace))
     table = {name: (kind.name, own) for kind, name, own in instances()}
-    for process, names in {**({RECORDER: (RECORDER,)} if recording else {}),
+    looking_on = [name for name, wanted in (
+        (RECORDER, recording), (VISUALIZATION, given(VISUALIZATION) == 'true')) if wanted]
+    for process, names in {**{name: (name,) for name in looking_on},
                            **PROCESSES[given('processes')]}.items():
         kind, own = table[names[0]]
         parameters = {'output': given('bag')} if kind == RECORDER else dict(shared)

@@ -33,7 +33,14 @@ from dmp_cpg_ros.nodes.framework import claims, execution, health
 from dmp_cpg_ros.nodes.messages.conversions import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
-from dmp_cpg_ros.suite_table import PROCESSES, RECORDER, ROBOT, WALKING_NODES, instances
+from dmp_cpg_ros.suite_table import (
+    PROCESSES,
+    RECORDER,
+    ROBOT,
+    VISUALIZATION,
+    WALKING_NODES,
+    instances,
+)
 
 READY_WITHIN_S = 120.0
 """How long nodes may take to come up and find each other [s]."""
@@ -134,8 +141,8 @@ def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
 
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say, *,
-              lock_step: bool, processes: str, view: bool = False, respawn: bool = False
-              ) -> str:
+              lock_step: bool, processes: str, view: bool = False, visualization: bool = False,
+              respawn: bool = False) -> str:
     """Run the suite from nothing to nothing.
 
     A walk goes on without its recorder, which says at once when it cannot write any more.
@@ -158,6 +165,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         How nodes share processes, a key of :data:`~dmp_cpg_ros.suite_table.PROCESSES`.
     view : bool
         Whether to serve a live view, whose end does not end the run.
+    visualization : bool
+        Whether to start the node that draws for RViz; its end does not end the run either.
     respawn : bool
         Whether processes that end before their time are started again, all but the robot's: with
         it a simulated robot has lost its state.
@@ -183,6 +192,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         try:
             if view:  # its address holds a token, which is for the terminal only
                 views.start('live_view', 'dmp_cpg_ros', ['live_view', *arguments], logged=False)
+            if visualization:
+                views.start(VISUALIZATION, 'dmp_cpg_ros', [VISUALIZATION, *arguments])
             kinds = {name: kind.name for kind, name, _ in instances()}
             shared = {RECORDER: (RECORDER,), **PROCESSES[processes]}
             for process, nodes in shared.items():

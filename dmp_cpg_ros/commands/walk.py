@@ -29,7 +29,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.suite import Suite, load_suite
-from dmp_cpg_ros.suite_table import KINDS, RECORDER, WALKING, namespace_rules
+from dmp_cpg_ros.suite_table import KINDS, RECORDED_WALK, RECORDER, WALKING, namespace_rules
 
 OK, FAILED, INTERRUPTED = 0, 1, 128
 """Exit statuses: a run that ended well, a fall or a dead node; plus the number of the signal that
@@ -177,7 +177,7 @@ def _run(plan: _Plan, folder: Path) -> int:
     options, ros = plan.options, plan.ros
     resolved = plan.resolved(gated=True)
     for values in resolved.values():
-        values.update(lock_step=options.lock_step, expected_nodes=list(KINDS))
+        values.update(lock_step=options.lock_step, expected_nodes=list(RECORDED_WALK))
     resolved[RECORDER] = {'output': str(folder / 'bag'),
                           'expected_nodes': [kind.name for kind in WALKING]}
     rules = [*ros.remappings, *namespace_rules(ros.namespace)]
@@ -188,7 +188,7 @@ def _run(plan: _Plan, folder: Path) -> int:
         unrecorded = run_suite(
             plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say,
             lock_step=options.lock_step, processes=options.processes,
-            view=options.view, respawn=options.respawn)
+            view=options.view, visualization=options.visualization, respawn=options.respawn)
         if unrecorded:
             print(f'walk: {unrecorded}; the rest of the walk was not recorded', file=sys.stderr)
         return FAILED if unrecorded else OK
@@ -277,6 +277,8 @@ def _parser() -> argparse.ArgumentParser:
     add('--view', action='store_true',
         help='serve a page that shows and drives the robot, on this machine only, and print its '
         'address')
+    add('--visualization', action='store_true',
+        help='publish markers and the path of the body, for RViz and Foxglove')
     add('--no-report', action='store_true', help='write metrics and manifest only')
     return parser
 

@@ -26,13 +26,20 @@ from std_srvs.srv import Trigger
 from dmp_cpg_ros.configuration import find_config, load_yaml
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.robot.urdf import urdf
-from dmp_cpg_ros.suite_table import ABSOLUTE_TOPICS, KINDS, RECORDER, ROBOT, WALKING_NODES
+from dmp_cpg_ros.suite_table import (
+    ABSOLUTE_TOPICS,
+    KINDS,
+    RECORDER,
+    ROBOT,
+    VISUALIZATION,
+    WALKING_NODES,
+)
 
 processes, ros, ros_domain = ros_processes.processes, ros_processes.ros, ros_processes.ros_domain
 
 ARGUMENTS = {'parameters': '', 'robot': '', 'lock_step': '', 'namespace': '', 'record': 'false',
              'processes': 'each', 'bag': 'bag', 'respawn': 'false',
-             'robot_state_publisher': 'auto'}
+             'robot_state_publisher': 'auto', 'visualization': 'false'}
 
 UP_S = 90.0
 """How long nine processes may take to start and to find each other on a loaded machine [s]."""
@@ -96,6 +103,8 @@ def test_launched_nodes_are_those_of_the_table(launch_file: ModuleType) -> None:
     assert sorted(node.name for node in described) == sorted(WALKING_NODES)
     recording = launch_file.nodes({**ARGUMENTS, 'record': 'true'})
     assert {node.name for node in recording} == {*WALKING_NODES, RECORDER}
+    drawn = launch_file.nodes({**ARGUMENTS, 'visualization': 'true'})
+    assert {node.name for node in drawn} == {*WALKING_NODES, VISUALIZATION}
     for node in recording:
         assert node.name in KINDS[node.executable].instances
     assert recording[-1].name == ROBOT and recording[-1].on_exit is not None

@@ -13,7 +13,8 @@ import pytest
 from checkout import PACKAGE, ROOT, imports, modules
 
 MESSAGES = {'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'lifecycle_msgs', 'nav_msgs',
-            'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs'}
+            'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs',
+            'visualization_msgs'}
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', *MESSAGES}
 RECORDS = {'rosbags', 'mcap'}
 FIGURES = {'matplotlib'}

@@ -140,7 +140,7 @@ class LegPrimitive:
     def __init__(self, leg: str, description: RobotDescription, parameters: LegParameters,
                  motion: Motion | None = None) -> None:
         """Derive foothold and scale from the description."""
-        self._motion: FootMotion = (
+        self.motion: FootMotion = (
             HermiteMotion() if motion is None else motion.of_leg(leg, description))
         self.parameters, self.place = parameters, LEGS.index(leg)
         geometry = description.legs[self.place]
@@ -206,8 +206,8 @@ class LegPrimitive:
         rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
         position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
-        path = self._path(reference, omega, duty, activity, state.stumble, feedback)
-        motion, foot, path_velocity = self._motion.step(state.motion, path, position, rate, dt)
+        path = self.path(reference, omega, duty, activity, state.stumble, feedback)
+        motion, foot, path_velocity = self.motion.step(state.motion, path, position, rate, dt)
         offset = triple(state.shift_in_base.tolist())
         offset_rate, stumble = self._offset_rate(
             state, offset, activity, path, position, path_velocity, feedback, dt)
@@ -223,8 +223,8 @@ class LegPrimitive:
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
         return LegState(joints, activity, np.array(offset), stumble, motion), goal, goal_velocity
 
-    def _path(self, reference: Triple, omega: float, duty: float, activity: float,
-              stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
+    def path(self, reference: Triple, omega: float, duty: float, activity: float,
+             stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
         """Path of the foot for the corrected reference, higher after a stumble."""
         v_x, v_y, gamma = plus(reference, triple(feedback.correction.tolist()))
         clearance = self.clearance + (self.stumble_lift if stumble.post_stumble else 0.0)

@@ -24,18 +24,19 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import Odometry, Path
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
+from visualization_msgs.msg import MarkerArray
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE, GROUND_TRUTH
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION, REFERENCE
 from dmp_cpg_ros.nodes.messages.transforms import TFMessage
-from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, RECORDER, ROBOT
+from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, RECORDER, ROBOT, VISUALIZATION
 
 PUBLISHER_DEPTH = 2000
 """Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the
@@ -140,13 +141,16 @@ TOPICS: tuple[Interface, ...] = (
               ('user',), (REFERENCE, INHIBITION),
               other_type='; with stamped_cmd_vel:=true it reads TwistStamped'),
     Interface('reference', TwistStamped, 'reference: v in linear, gamma in angular.z',
-              (REFERENCE,), (CANONICAL, LEG, INHIBITION, POSTURE)),
+              (REFERENCE,), (CANONICAL, LEG, INHIBITION, POSTURE, VISUALIZATION),
+              sometimes=(VISUALIZATION,)),
     Interface('canonical_state', JointState,
               'oscillators, shares of gaits, cadence: position = state, velocity = its rate',
-              (CANONICAL,), (LEG, INHIBITION, POSTURE)),
+              (CANONICAL,), (LEG, INHIBITION, POSTURE, VISUALIZATION),
+              sometimes=(VISUALIZATION,)),
     Interface('posture_feedback', JointState,
               'balance: torques, measured angles, shift, drift and forces of the feet; '
-              "the body's mode and the phase of its movement", (POSTURE,), (LEG, INHIBITION)),
+              "the body's mode and the phase of its movement",
+              (POSTURE,), (LEG, INHIBITION, VISUALIZATION), sometimes=(VISUALIZATION,)),
     Interface('joint_targets', JointState, 'targets of the three joints of one leg',
               (LEG,), (ROBOT,)),
     Interface('joint_states', JointState, 'measured joints; the tick of the suite',
@@ -168,7 +172,12 @@ TOPICS: tuple[Interface, ...] = (
               (ROBOT,), (), sometimes=(ROBOT,)),
     Interface('odom', Odometry,
               "the robot's own estimate: pose and twist of base_link in odom, at estimate_rate",
-              (POSTURE,), (), sometimes=(POSTURE,)),
+              (POSTURE,), (VISUALIZATION,), sometimes=(POSTURE, VISUALIZATION)),
+    Interface('markers', MarkerArray,
+              'feet and their forces, and how swinging feet go to their footholds; for people',
+              (VISUALIZATION,), ('user',), recorded=False),
+    Interface('body_path', Path, 'where the body has been, in odom; for people',
+              (VISUALIZATION,), ('user',), recorded=False),
     Interface('/tf', TFMessage,
               'odom -> base_link as odom says; joints from robot_state_publisher. '
               'Only where tf2_msgs is installed', (POSTURE,), (), sometimes=(POSTURE,)),

@@ -13,6 +13,7 @@ from dmp_cpg_ros.core.canonical.phase import phase_generator, state_at
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.leg import (
     LegFeedback,
     LegParameters,
@@ -21,6 +22,7 @@ from dmp_cpg_ros.core.transformation.leg import (
     body_scale,
     nominal_foothold,
 )
+from dmp_cpg_ros.core.transformation.preview import rest_of_swing, seen_from_now
 
 ROBOT = quadruped()
 REFERENCES = {'forward': [0.5, 0.0, 0.0], 'sideways': [0.0, 0.3, 0.0], 'turn': [0.2, 0.0, 0.8]}
@@ -110,3 +112,35 @@ def test_scale_of_the_body() -> None:
     scale = body_scale(ROBOT)
     assert scale.leg_length == pytest.approx(0.28)
     assert scale.hip_radius == pytest.approx(np.hypot(0.19, 0.11))
+
+
+@pytest.mark.parametrize('direction', REFERENCES)
+@pytest.mark.parametrize('leg', ['fl', 'rr'])
+def test_a_swinging_foot_is_shown_going_to_where_it_will_stand(leg: str, direction: str) -> None:
+    r, primitive = np.array(REFERENCES[direction]), leg_of(leg)
+    shift = np.array([0.02, -0.01, 0.0])
+    gait = GAITS['amble']
+    goals = walked(primitive, gait, r, shift, 3.0)[:, 0]
+    _, _, omegas, duty = gait.pace(r, primitive.scale)
+    omega, still = omegas[primitive.place], np.zeros(2)
+    positions = [gait.scalar_cycle_position(omega * k * TICK) for k in range(len(goals))]
+    swings = np.abs(positions) < 0.5 * (1.0 - duty)
+    landings = np.flatnonzero(swings[:-1] & ~swings[1:]) + 1
+    path = FootPath((0.0, 0.0, 0.0), *REFERENCES[direction], omega, duty, 0.0)
+    for tick in (landings[-1] - 20, landings[-1] - 6):
+        assert swings[tick]
+        x, feedback = state_at(omega * tick * TICK), LegFeedback(
+            goals[tick], shift, still, np.zeros(3))
+        x_dot = omega * phase_generator() @ x
+        way = rest_of_swing(primitive, gait, x, x_dot, r, feedback)
+        assert way is not None
+        np.testing.assert_allclose(way[0], primitive.kinematics.foot(goals[tick]), atol=1e-9)
+        landed = seen_from_now(path, (landings[-1] - tick) * TICK,
+                               primitive.kinematics.foot(goals[landings[-1]]))
+        np.testing.assert_allclose(way[-1], landed, atol=0.004)
+        assert way[:, 2].max() > landed[2] + 0.005
+        # A foot whose oscillator is inhibited, or that stands, is shown going nowhere.
+        assert rest_of_swing(primitive, gait, x, 0.0 * x_dot, r, feedback) is None
+        x = state_at(omega * landings[-1] * TICK)
+        x_dot = omega * phase_generator() @ x
+        assert rest_of_swing(primitive, gait, x, x_dot, r, feedback) is None
