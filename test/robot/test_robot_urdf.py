@@ -105,6 +105,37 @@ def test_another_reader_finds_the_same_robot(file: RobotFile, tmp_path: Path) ->
     compare(file, tmp_path)
 
 
+def test_a_reader_that_knows_nothing_of_mujoco_finds_the_same_robot(
+        file: RobotFile, tmp_path: Path) -> None:
+    yourdfpy = pytest.importorskip('yourdfpy', reason='pip install yourdfpy')
+    path = tmp_path / 'robot.urdf'
+    path.write_text(urdf(file), encoding='utf-8')
+    read = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=True)
+    model = load_model(file.model, file.base)
+    ids, rng = find_ids(model, file), np.random.default_rng(0)
+    assert set(JOINT_NAMES) <= set(read.actuated_joint_names)
+    for _ in range(5):
+        joints = rng.uniform(-1.0, 1.0, len(JOINT_NAMES))
+        data = pose(model, ids, joints)
+        read.update_cfg(dict(zip(JOINT_NAMES, joints.tolist(), strict=True)))
+        for leg, foot in zip(LEGS, ids.feet, strict=True):
+            np.testing.assert_allclose(
+                in_base(data, ids.base, foot_position(data, foot)),
+                read.get_transform(f'{leg}_foot', BASE_LINK)[:3, 3], atol=1e-6)
+        for name, joint in zip(JOINT_NAMES, ids.joints.tolist(), strict=True):
+            frame = read.get_transform(read.joint_map[name].child, BASE_LINK)
+            np.testing.assert_allclose(
+                in_base(data, ids.base, data.xanchor[joint]), frame[:3, 3], atol=1e-6)
+            body = model.jnt_bodyid[joint]
+            np.testing.assert_allclose(
+                data.xmat[ids.base].reshape(3, 3).T @ data.xmat[body].reshape(3, 3),
+                frame[:3, :3], atol=1e-6)
+
+
+def in_base(data: mujoco.MjData, base: int, point: np.ndarray) -> np.ndarray:
+    return data.xmat[base].reshape(3, 3).T @ (point - data.xpos[base])
+
+
 def test_bodies_with_several_joints_and_with_none(tmp_path: Path) -> None:
     own = load_robot_file(None)
     text = re.sub(r'(?s)<keyframe>.*</keyframe>', '', own.model.read_text('utf-8'))
