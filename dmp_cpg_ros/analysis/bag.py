@@ -35,6 +35,7 @@ from rosbags.typesys import Stores, get_typestore
 from dmp_cpg_ros.configuration import naming, numbered
 from dmp_cpg_ros.core.errors import DataError, MissingFileError
 from dmp_cpg_ros.core.parameters import LONGEST_SHOWN, shown
+from dmp_cpg_ros.core.robot_model.state import LEGS
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 """Definitions of the messages that are read; those in a bag are not trusted."""
@@ -199,7 +200,8 @@ def payload_digests(path: Path | str) -> dict[str, str]:
     -------
     dict of str to str
         Hexadecimal digests of ``joint_states``, ``canonical_state``, and ``joint_targets/fl``, …,
-        whose publisher is known by the leg that its first joint's name begins with.
+        whose publisher is known by the leg that its first joint's name begins with, or by that
+        name.
 
     Raises
     ------
@@ -214,7 +216,9 @@ def payload_digests(path: Path | str) -> dict[str, str]:
             message = None if key == 'joint_states' else _message(raw, connection)
             # One publisher per leg; they interleave as they like.
             if message is not None and key == 'joint_targets':
-                key += f'/{message.name[0].split("_", 1)[0] if message.name else "unnamed"}'
+                first = message.name[0] if message.name else 'unnamed'
+                leg = first.split('_', 1)[0]
+                key += f'/{leg if leg in LEGS else first}'
             elif message is not None:
                 # Its texts change their length, and then the middleware leaves pieces of earlier
                 # messages in the alignment bytes; written anew they are zeros.

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
@@ -30,6 +31,7 @@ TOPICS = {
     'geometry_msgs/msg/Twist': ('cmd_vel',),
     'diagnostic_msgs/msg/DiagnosticArray': ('inhibition_state', 'body_mode', 'diagnostics'),
     'rosgraph_msgs/msg/Clock': ('clock',),
+    'std_msgs/msg/String': ('robot_description',),
 }
 """Topics without namespace that are read, by their types of message."""
 
@@ -84,10 +86,11 @@ def _loaded(bag: Path) -> Recording:
     # Bags of others have one odometry, and in old ones of this suite it is the truth.
     truth, estimate = (('ground_truth', 'odom') if messages['ground_truth']
                        else ('odom', 'estimated_odom'))
-    time, work, _, peak_effort = _table(messages['joint_work'], JOINT_NAMES)
+    joints = _joint_names(messages['robot_description'])
+    time, work, _, peak_effort = _table(messages['joint_work'], joints)
     return Recording(
-        joints=recording.JointSeries(*_table(messages['joint_states'], JOINT_NAMES)),
-        targets=recording.JointSeries(*_table(messages['joint_targets'], JOINT_NAMES)),
+        joints=recording.JointSeries(*_table(messages['joint_states'], joints)),
+        targets=recording.JointSeries(*_table(messages['joint_targets'], joints)),
         work=recording.WorkSeries(time, work, peak_effort),
         canonical=_canonical(messages['canonical_state']),
         reference=recording.VelocitySeries(*_rows(messages['reference'], _velocity, (3,))),
@@ -98,6 +101,13 @@ def _loaded(bag: Path) -> Recording:
         modes=_modes(messages), statuses=_by_name(messages['diagnostics']),
         arrivals=_arrivals(messages['joint_states'], messages['joint_targets']),
         counts=counts, undecodable=dict(skipped))
+
+
+def _joint_names(descriptions: Messages) -> tuple[str, ...]:
+    """Names of our joints in a recording, as ``robot/urdf.py`` says them."""
+    named = {usual: name for of in descriptions[-1:] for name, usual in re.findall(
+        r'<dmp_cpg_ros_joint name="([^"]+)" usual="([^"]+)"', of.message.data)}
+    return tuple(named.get(usual, usual) for usual in JOINT_NAMES)
 
 
 def _stamp_ns(message: Any) -> int:

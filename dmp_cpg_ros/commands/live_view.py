@@ -54,6 +54,7 @@ from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, interface
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, JointsReader, read_odom
 from dmp_cpg_ros.nodes.messages.values import checked_numbers, header_ns
+from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.scene import Scene
 from dmp_cpg_ros.suite import load_gaits
 from dmp_cpg_ros.suite_table import ROBOT
@@ -135,6 +136,7 @@ class LiveView:
         self._radius = canonical[CanonicalParameters].radius
         gaits = KnownGaits(load_gaits(canonical[core.GaitParameters].gaits_file))
         file = find_config(robot[core.RobotFileParameters].robot)
+        self._joint_names = load_robot_file(file).joint_names
         self._scene = Scene(file, core.chosen_world(
             robot[WorldParameters], robot[core.RobotParameters]))
         reference, self._gaits = limits[ReferenceParameters], tuple(gaits.gaits)
@@ -158,7 +160,7 @@ class LiveView:
     def _subscribe(self, gaits: KnownGaits) -> None:
         newest = QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=1,
                             reliability=ReliabilityPolicy.BEST_EFFORT)
-        joints = JointsReader()
+        joints = JointsReader(self._joint_names)
         readers: dict[str, Callable[[Any], Any]] = {
             'joint_states': lambda message: (header_ns(message), joints.read(message)[0]),
             'canonical_state': conversions.CanonicalStateReader(gaits).read,

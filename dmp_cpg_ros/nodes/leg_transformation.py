@@ -50,7 +50,7 @@ class LegTransformation(SuiteNode):
         self._leg = LegControl(
             leg, description, parameters, Movements(description), load_motion(parameters.motion))
         self._state, self._joined = self._leg.initial_state(), False
-        self._writer = conversions.JointTargetsWriter(leg)
+        self._writer = conversions.JointTargetsWriter(leg, description.joint_names)
         self._publisher = self.publisher('joint_targets')
         readers: dict[str, Callable[[Any], Any]] = {
             'canonical_state': conversions.CanonicalStateReader(gaits).read,
@@ -58,7 +58,7 @@ class LegTransformation(SuiteNode):
             'posture_feedback': stamped(conversions.PostureFeedbackReader().read),
         }
         if parameters.reading == 'torque':
-            readers['joint_states'] = JointsReader().read
+            readers['joint_states'] = JointsReader(description.joint_names).read
         self.match('canonical_state', readers)
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:

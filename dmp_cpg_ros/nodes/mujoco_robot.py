@@ -81,8 +81,9 @@ class MujocoRobotNode(SuiteNode):
         self._robot = self._make_robot()
         self._guard = self._new_guard()
         self._body_mode = 'standing' if self._options.start_pose == 'standing' else 'lying'
+        names = self._robot.description.joint_names
         self._timing, self._writer, self._reader = (
-            RobotTiming(), RobotStateWriter(), conversions.JointTargetsReader())
+            RobotTiming(), RobotStateWriter(names), conversions.JointTargetsReader(names))
         self._state = self._robot.reset()
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
         self._silent_ns = -1
@@ -142,6 +143,10 @@ class MujocoRobotNode(SuiteNode):
             core.CANONICAL: name == 'foot_contacts' and options.contact_feedback,
         }
         return (*super().readers(topic), *self.outside(kind for kind in reads if reads[kind]))
+
+    def leg_of(self, joint: str) -> str:
+        """Leg of a joint by the robot's names."""
+        return self._reader.leg_of.get(joint, '')
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the robot has fallen or stands by itself."""

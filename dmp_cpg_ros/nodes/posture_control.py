@@ -78,12 +78,13 @@ class BodyState:
         self._estimator: BodyEstimator | None = None
         self.optional: tuple[str, ...] = ()
         self.readers: dict[str, Callable[[Any], Any]] = {
-            'joint_states': robot_state.JointsReader().read}
+            'joint_states': robot_state.JointsReader(description.joint_names).read}
         if node.parameters_of(StateSourceParameters).state_source != ESTIMATE:
             self.readers['ground_truth'] = robot_state.read_odom
             return
         self.optional = BODY_TOPICS[ESTIMATE]
-        self.readers |= {'joint_states': robot_state.JointsReader(strict=False).read,
+        self.readers |= {'joint_states': robot_state.JointsReader(
+                             description.joint_names, strict=False).read,
                          'imu': stamped(robot_state.read_imu),
                          'foot_contacts': stamped(robot_state.FootContactsReader().read)}
         self._estimator = BodyEstimator(

@@ -92,7 +92,7 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
         name=file.model.stem, legs=legs, mass=mass, base_inertia=np.zeros((3, 3)),
         com_in_base=np.zeros(3), kp=np.array(kp), kd=np.zeros(3),
         stance_height=file.stance_height or _stance_height(model, ids, legs, leg_length, home),
-        belly_depth=_belly_depth(model, ids.base, at_zero))
+        belly_depth=_belly_depth(model, ids.base, at_zero), joint_names=file.joint_names)
     standing = pose(model, ids, home_joint_position(description))
     com, inertia = _composite_inertia(model, standing, ids.base)
     kd = _damping(model, standing, ids, file, DAMPING_TIME * np.sqrt(leg_length / GRAVITY)

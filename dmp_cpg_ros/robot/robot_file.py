@@ -7,6 +7,7 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
@@ -16,7 +17,7 @@ from typing import Any, TypeVar
 from dmp_cpg_ros.configuration import find_config, load_yaml, naming
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
 from dmp_cpg_ros.core.parameters import check_names, shown
-from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS
 
 T = TypeVar('T')
 Triple = tuple[float, float, float]
@@ -49,6 +50,8 @@ class RobotFile:
         mass.
     torque_limit, velocity_limit : tuple of float or None
         Per joint of a leg [N m], [rad/s]; None: from the model, and a common value for the speed.
+    joint_names : tuple of str
+        Names of the twelve joints in messages and in the URDF, in the order of ``JOINT_NAMES``.
     """
 
     model: Path
@@ -60,6 +63,7 @@ class RobotFile:
     kd: Triple | None = None
     torque_limit: Triple | None = None
     velocity_limit: Triple | None = None
+    joint_names: tuple[str, ...] = JOINT_NAMES
 
     def without_gains(self) -> RobotFile:
         """The same robot with a joint drive that applies torques only, for the torque reading."""
@@ -100,8 +104,9 @@ def load_robot_file(robot: RobotFile | Path | str | None) -> RobotFile:
 
 def _read(path: Path) -> RobotFile:
     content, where = load_yaml(path), f"robot file '{path}'"
-    check_names(content, (*_REQUIRED, 'stance_height', *_PER_JOINT), _REQUIRED, where)
-    for key in ('joints', 'feet'):
+    check_names(content, (*_REQUIRED, 'stance_height', 'joint_names', *_PER_JOINT), _REQUIRED,
+                where)
+    for key in ('joints', 'feet', *(['joint_names'] if 'joint_names' in content else [])):
         check_names(content[key], LEGS, LEGS, f"{where}: '{key}'")
     model = _name(content['model'], f"{where}: 'model'")
     height = content.get('stance_height')
@@ -112,8 +117,26 @@ def _read(path: Path) -> RobotFile:
                      for leg in LEGS),
         feet=tuple(_name(content['feet'][leg], f"{where}: 'feet'") for leg in LEGS),
         stance_height=None if height is None else _positive(height, f"{where}: 'stance_height'"),
+        joint_names=_joint_names(content['joint_names'], f"{where}: 'joint_names'")
+        if 'joint_names' in content else JOINT_NAMES,
         **{key: _per_joint(content[key], f"{where}: '{key}'")
            for key in _PER_JOINT if content.get(key) is not None})
+
+
+def _joint_names(content: Any, where: str) -> tuple[str, ...]:
+    """Twelve names that are not alike, nor one of ours for another joint."""
+    names = [name for leg in LEGS for name in _entries(content[leg], f'{where}, {leg}', _name)]
+    for place, name in enumerate(names):
+        if not re.fullmatch(r'[A-Za-z][A-Za-z0-9_./-]*', name):
+            raise ParameterError(f'{where}: {shown(name)} must begin with a letter and have '
+                                 'letters, digits and _ . / - only')
+        if name in names[:place]:
+            raise ParameterError(f'{where}: {shown(name)} names {JOINT_NAMES[names.index(name)]} '
+                                 f'and {JOINT_NAMES[place]}')
+        if name in JOINT_NAMES and name != JOINT_NAMES[place]:
+            raise ParameterError(f'{where}: {shown(name)} for {JOINT_NAMES[place]} is the usual '
+                                 'name of another joint')
+    return tuple(names)
 
 
 def find_model(name: str, folder: Path | None) -> Path:

@@ -3,9 +3,9 @@
 """A robot's URDF, made from its model.
 
 Links are the model's bodies from the base on, each with its frame in its (last) joint, and a link
-in the centre of each foot. Joints bear the names that they have in ``joint_states``. The tree is
-that of MuJoCo's ``mj_kinematics``: bodies without a joint are fixed, several joints of a body
-follow one another through links without mass.
+in the centre of each foot. Joints bear their names in ``joint_states``, which the robot file may
+choose. The tree is that of MuJoCo's ``mj_kinematics``: bodies without a joint are fixed, several
+joints of a body follow one another through links without mass.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.parameters import shown
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_parts import find_ids, joints_of, subtree
@@ -29,6 +31,9 @@ from dmp_cpg_ros.robot.scene import SHOWN_GROUPS, geom_colour
 
 BASE_LINK = 'base_link'
 """Frame of the base (REP-105)."""
+
+RENAMED = 'dmp_cpg_ros_joint'
+"""Element that says which joint of ours a joint with another name is; other readers skip it."""
 
 _Element = ElementTree.Element
 _Geom = mujoco.mjtGeom
@@ -68,12 +73,15 @@ class _Tree:
             self._ids.joints.tolist(),
             np.concatenate([leg.torque_limit for leg in description.legs]),
             np.concatenate([leg.velocity_limit for leg in description.legs]), strict=True)}
-        self._names = dict(zip(self._ids.joints.tolist(), JOINT_NAMES, strict=True))
+        self._names = dict(zip(self._ids.joints.tolist(), file.joint_names, strict=True))
         self._root = ElementTree.Element('robot', name=description.name)
         self._origin: dict[int, Array] = {}  # of a body's link, in the body's frame
 
     def written(self) -> _Element:
         model, ids = self._model, self._ids
+        for name, usual in zip(self._names.values(), JOINT_NAMES, strict=True):
+            if name != usual:
+                ElementTree.SubElement(self._root, RENAMED, name=name, usual=usual)
         for body in sorted(subtree(model, ids.base)):
             if body == ids.base:
                 self._origin[body] = np.zeros(3)
@@ -102,6 +110,9 @@ class _Tree:
             self._joint(f'{self._name(body)}_fixed', 'fixed', link, self._name(body), place, turn)
         for j in joints:
             name = self._names.get(j) or model.joint(j).name or f'joint_{j}'
+            if j not in self._names and name in self._names.values():
+                raise ParameterError(f"'joint_names': {shown(name)} is a joint of no leg in the "
+                                     'model already')
             child = self._name(body)
             if j != joints[-1]:
                 child = f'{child}_{name}'

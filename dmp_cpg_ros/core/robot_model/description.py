@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dmp_cpg_ros.core.robot_model.state import Array
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, Array
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,8 @@ class RobotDescription:
     belly_depth : float
         How far the base's shape reaches below ``base_link`` [m]: the height of ``base_link`` when
         the robot lies on its belly.
+    joint_names : tuple of str
+        Names of the joints in messages, in the order of ``JOINT_NAMES``.
     """
 
     name: str
@@ -91,3 +93,4 @@ class RobotDescription:
     kp: Array
     kd: Array
     belly_depth: float = 0.0
+    joint_names: tuple[str, ...] = JOINT_NAMES

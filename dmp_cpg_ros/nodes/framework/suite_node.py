@@ -151,6 +151,10 @@ class SuiteNode(GuardedLifecycleNode):
         """Kinds of nodes that read one of this node's topics, for :meth:`missing`."""
         return self.outside(partners(topic, readers=True))
 
+    def leg_of(self, joint: str) -> str:
+        """Leg that a joint belongs to, for a node that reads what the legs send."""
+        return joint.partition('_')[0]
+
     def outside(self, kinds: Iterable[str]) -> tuple[str, ...]:
         """Those of some kinds of nodes that are not in this process."""
         inside = self.local.kinds if self.local is not None else ()
@@ -369,7 +373,7 @@ class SuiteNode(GuardedLifecycleNode):
             if ticked and not lock_step and time.time_ns() > now_ns + STALE_NS:
                 return
             message = read(data)  # only what can be read makes its sender the writer
-            watch = only or by_leg.get((message.name or ('',))[0].partition('_')[0])
+            watch = only or by_leg.get(self.leg_of((message.name or ('',))[0]))
             if watch is None or watch.admits(number, stamp_ns, now_ns):  # no leg: it is refused
                 callback(message)
             else:

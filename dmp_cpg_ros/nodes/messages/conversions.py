@@ -207,16 +207,18 @@ class GaitMemoryReader:
         return *self._canonical.read(message), r
 
 
-def _joints_of(leg: str) -> list[str]:
-    return [f'{leg}_{joint}' for joint in JOINTS_OF_LEG]
+def joints_of(leg: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Names of one leg's joints out of those of all."""
+    first = len(JOINTS_OF_LEG) * LEGS.index(leg)
+    return tuple(names[first:first + len(JOINTS_OF_LEG)])
 
 
 class JointTargetsWriter:
-    """Writes the ``joint_targets`` of one leg."""
+    """Writes the ``joint_targets`` of one leg, with its own out of the names of all joints."""
 
-    def __init__(self, leg: str) -> None:
+    def __init__(self, leg: str, names: Sequence[str] = JOINT_NAMES) -> None:
         """Lay the message of a leg out."""
-        self._writer = JointStateWriter(_joints_of(leg))
+        self._writer = JointStateWriter(joints_of(leg, names))
 
     def fill(self, time_ns: int, targets: JointTargets) -> cdr.SerializedJointState:
         """Refill with the targets of the leg's joints; raises DataError."""
@@ -224,19 +226,27 @@ class JointTargetsWriter:
 
 
 class JointTargetsReader:
-    """Reads ``joint_targets`` of whichever leg sent them."""
+    """Reads ``joint_targets`` of whichever leg sent them.
 
-    def __init__(self) -> None:
+    Attributes
+    ----------
+    leg_of : dict of str to str
+        Leg of each joint by its name.
+    """
+
+    def __init__(self, names: Sequence[str] = JOINT_NAMES) -> None:
         """Prepare the order of the joints of every leg."""
-        self._readers = {leg: JointStateReader(_joints_of(leg)) for leg in LEGS}
+        self._names = names
+        self._readers = {leg: JointStateReader(joints_of(leg, names)) for leg in LEGS}
+        self.leg_of = {name: leg for leg in LEGS for name in joints_of(leg, names)}
 
     def read(self, message: AnyJointState) -> tuple[str, JointTargets]:
         """Name of the leg and its targets; raises DataError, also for names of no leg."""
         names = message.name
-        leg = names[0].partition('_')[0] if names else ''
-        if leg not in self._readers or len(names) != len(JOINTS_OF_LEG):
+        leg = self.leg_of.get(names[0], '') if names else ''
+        if not leg or len(names) != len(JOINTS_OF_LEG):
             raise DataError(f"names {names} must be the {len(JOINTS_OF_LEG)} joints of one leg of "
-                            f"{', '.join(LEGS)}, such as {', '.join(JOINT_NAMES[:3])}")
+                            f"{', '.join(LEGS)}, such as {', '.join(self._names[:3])}")
         return leg, JointTargets(*self._readers[leg].read(message))
 
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import hypot
 from typing import NamedTuple
 
@@ -34,6 +35,11 @@ class RobotStateWriter:
     ``imu`` holds what a gyroscope and an accelerometer measure and no orientation: fusing them
     is the reader's task, and yaw is nothing that such a sensor knows.
 
+    Parameters
+    ----------
+    joint_names : sequence of str
+        Of the twelve joints.
+
     Attributes
     ----------
     clock, imu, ground_truth, foot_contacts, joint_states : messages
@@ -42,7 +48,7 @@ class RobotStateWriter:
         Only of every tenth state, and of a robot that knows its work.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, joint_names: Sequence[str] = JOINT_NAMES) -> None:
         """Lay the messages out."""
         self.clock, self._truth, self._imu = (
             Clock(), OdometryWriter(WORLD_FRAME), cdr.RefilledMessage(BASE_FRAME))
@@ -51,9 +57,9 @@ class RobotStateWriter:
         self._imu.constant(*[0.0] * 9)
         self._imu.refilled(acceleration_in_base=3)
         self._imu.constant(*[0.0] * 9)
-        self._joints = JointStateWriter(JOINT_NAMES, frame=BASE_FRAME)
+        self._joints = JointStateWriter(joint_names, frame=BASE_FRAME)
         self._feet = JointStateWriter(FOOT_NAMES, ('effort',), BASE_FRAME)
-        self._work = JointStateWriter(JOINT_NAMES, ('position', 'effort'), BASE_FRAME)
+        self._work = JointStateWriter(joint_names, ('position', 'effort'), BASE_FRAME)
         self._peak, self._fills = np.zeros(len(JOINT_NAMES)), 0
 
     def fill(self, state: RobotState) -> None:
@@ -123,13 +129,13 @@ class OdometryWriter:
 class JointsReader:
     """Reads ``joint_states``."""
 
-    def __init__(self, *, strict: bool = True) -> None:
+    def __init__(self, joint_names: Sequence[str] = JOINT_NAMES, *, strict: bool = True) -> None:
         """Prepare the order of the twelve joints; effort may be absent in others' messages, and
         numbers that cannot be are NaN unless it is strict.
         """
-        self._full = JointStateReader(JOINT_NAMES, strict=strict)
+        self._full = JointStateReader(joint_names, strict=strict)
         self._without_effort = JointStateReader(
-            JOINT_NAMES, ('position', 'velocity'), strict=strict)
+            joint_names, ('position', 'velocity'), strict=strict)
 
     def read(self, message: JointState | cdr.SerializedJointState) -> list[Array]:
         """Position [rad], velocity [rad/s] and effort [N m] (0 where absent), each (12,)."""
