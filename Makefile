@@ -37,14 +37,14 @@ SOURCES := $(shell find dmp_cpg_ros config launch resource -not -name '*.pyc' -n
 
 ifeq ($(ROS),sourced)
   VENV_FLAGS := --system-site-packages
-  ROS_WHEELS :=
+  EXTRAS := test
   # The venv's own packages come before those of the sourced workspaces.
   export PYTHONPATH := $(SITE)$(if $(PYTHONPATH),:$(PYTHONPATH))
   # Plugins of the sourced ROS 2 were written for another pytest.
   export PYTEST_DISABLE_PLUGIN_AUTOLOAD := 1
 else
   VENV_FLAGS :=
-  ROS_WHEELS := 'ros-jazzy-rclpy[fastrtps]' ros-jazzy-common-interfaces
+  EXTRAS := test,ros
   unexport PYTHONPATH
   ifneq ($(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
     # Left by another environment with the wheels, whose libraries are not those of .venv.
@@ -52,11 +52,15 @@ else
   endif
 endif
 
-# pip builds in .venv, not in the sources, where a stale build folder would be packed again.
+# The wheel is built in .venv, not in the sources, where a stale build folder would be packed again.
+# Only this build may see that folder: pip would pack its contents into whatever else it builds.
 BUILD := $(VENV)/build
-export DIST_EXTRA_CONFIG := $(BUILD)/setup.cfg
-PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check \
-  --no-build-isolation --use-pep517 --constraint $(VENV)/constraints.txt
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+MAKE_WHEEL = rm -rf $(BUILD) && mkdir -p $(BUILD) && \
+  printf '[build]\nbuild_base=%s\n[egg_info]\negg_base=%s\n' $(BUILD) $(BUILD) > $(BUILD)/setup.cfg && \
+  DIST_EXTRA_CONFIG=$(BUILD)/setup.cfg $(PIP) wheel --no-deps --no-build-isolation --use-pep517 \
+  --wheel-dir $(BUILD)/wheel .
+INSTALL_WHEEL = $(PIP) install --no-build-isolation --use-pep517 --constraint $(VENV)/constraints.txt
 
 # What every run needs is in environment.sh, for users' shells as for these commands.
 ACTIVATED := . $(BIN)/activate &&
@@ -130,9 +134,9 @@ clean: ## remove .venv and everything built; runs/ stays
 
 $(INSTALLED): $(READY) $(SOURCES)
 	@echo 'Installing dmp_cpg_ros into .venv ...'
-	@rm -rf $(BUILD) $(SITE)/dmp_cpg_ros && mkdir -p $(BUILD)  # no module that has moved stays behind
-	@printf '[build]\nbuild_base=%s\n[egg_info]\negg_base=%s\n' $(BUILD) $(BUILD) > $(DIST_EXTRA_CONFIG)
-	@$(PIP_INSTALL) --no-deps --force-reinstall .
+	@$(MAKE_WHEEL)
+	@rm -rf $(SITE)/dmp_cpg_ros  # no module that has moved stays behind
+	@$(INSTALL_WHEEL) --no-deps --force-reinstall $(BUILD)/wheel/*.whl
 	@grep -q environment.sh $(BIN)/activate || { \
 	  sed -i 's/^deactivate () {/&\n    ! command -v _dmp_cpg_ros_restore > \/dev\/null || _dmp_cpg_ros_restore/' $(BIN)/activate; \
 	  echo '. "$$VIRTUAL_ENV/../environment.sh"' >> $(BIN)/activate; }
@@ -149,10 +153,8 @@ $(READY): setup.py constraints.txt
 	@awk -F'==' 'FILENAME ~ /present/ { present[tolower($$1)] = 1; next } \
 	  !(tolower($$1) in present) { print }' $(VENV)/present.txt constraints.txt > $(VENV)/constraints.txt
 	@grep '^numpy==' $(VENV)/present.txt >> $(VENV)/constraints.txt || true
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-	  --constraint $(VENV)/constraints.txt 'setuptools>=68'
-	@mkdir -p $(BUILD)
-	@printf '[build]\nbuild_base=%s\n[egg_info]\negg_base=%s\n' $(BUILD) $(BUILD) > $(DIST_EXTRA_CONFIG)
-	@$(PIP_INSTALL) '.[test]' $(ROS_WHEELS)
+	@$(PIP) install --constraint $(VENV)/constraints.txt 'setuptools>=68'
+	@$(MAKE_WHEEL)
+	@$(INSTALL_WHEEL) "$$(echo $(BUILD)/wheel/*.whl)[$(EXTRAS)]"
 	@$(BIN)/python -c 'import rclpy' || { echo 'ROS 2 ($(ROS_DISTRO)) is sourced, but $(INTERPRETER) cannot import its rclpy. Name its Python with: make PYTHON=/usr/bin/python3' >&2; exit 1; }
 	@touch $@

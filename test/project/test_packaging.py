@@ -7,11 +7,15 @@ from __future__ import annotations
 import ast
 import os
 import re
+import shutil
 import subprocess
 import sys
+import tarfile
 import xml.etree.ElementTree as ElementTree
 from importlib import import_module
+from importlib.metadata import distributions
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 from checkout import PACKAGE, ROOT, imports, modules, setup_argument, setup_constant
@@ -109,11 +113,12 @@ def test_every_requirement_has_its_rosdep_key_and_a_tested_version() -> None:
     extras = setup_argument('extras_require')
     assert isinstance(extras, dict)
     for_tests = {name_of(text) for text in extras['test']}
+    others = {name_of(text) for extra in ('ros', 'doc') for text in extras[extra]}
     assert required == set(DEPENDENCIES)
     assert for_tests == set(TEST_DEPENDENCIES)
     assert {key for key, _ in DEPENDENCIES.values()} <= set(texts('exec_depend'))
     assert set(TEST_DEPENDENCIES.values()) == set(texts('test_depend'))
-    assert required | for_tests <= {name_of(line) for line in constraints()}
+    assert required | for_tests | others <= {name_of(line) for line in constraints()}
 
 
 def constraints() -> list[str]:
@@ -131,7 +136,8 @@ def test_one_tested_version_holds_for_each_python_and_is_within_bounds(python: s
         if pin.marker is None or pin.marker.evaluate(environment):
             assert pin.name not in pins, f'{pin.name} is pinned twice'
             pins[pin.name] = str(pin.specifier).removeprefix('==')
-    for text in setup_argument('install_requires'):
+    extras = setup_argument('extras_require')
+    for text in (*setup_argument('install_requires'), *extras['ros'], *extras['doc']):
         bound = requirements.Requirement(text)
         assert bound.specifier.contains(pins[bound.name]), f'{text}, but tested {pins[bound.name]}'
 
@@ -178,6 +184,15 @@ def test_a_wrapper_runs_its_console_script_with_the_same_arguments_and_status(
         assert (done.stdout, done.returncode) == ('a b|--ros-args||', 7)
 
 
+def test_who_has_no_ros_is_told_what_to_install(tmp_path: Path) -> None:
+    code = ("import sys; sys.modules['rclpy'] = None; from dmp_cpg_ros.__main__ import main; "
+            "sys.exit(main(['walk', 'amble_60']))")
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, timeout=60,
+                          check=False, cwd=tmp_path, env={**os.environ, 'PYTHONPATH': str(ROOT)})
+    assert done.returncode == 2 and "pip install 'dmp_cpg_ros[ros]'" in done.stderr, done
+    assert done.stderr.count('\n') == 1 and not list(tmp_path.iterdir())
+
+
 # --- what is installed ----------------------------------------------------------------------
 
 
@@ -207,6 +222,46 @@ def test_nothing_is_left_out_of_the_installation_and_nothing_is_left_over() -> N
     library = f'python{sys.version_info[0]}.{sys.version_info[1]}'
     package = PREFIX / 'lib' / library / 'site-packages' / PACKAGE
     assert files(package) == files(ROOT / PACKAGE)
+
+
+def built(folder: Path, what: str) -> Path:
+    """Build a wheel or an sdist of the sources in a folder."""
+    code = f"from setuptools import build_meta; print(build_meta.build_{what}('dist'))"
+    done = subprocess.run([sys.executable, '-c', code], cwd=folder, check=False, timeout=300,
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return folder / 'dist' / done.stdout.splitlines()[-1]
+
+
+def test_a_wheel_has_the_same_files_from_the_checkout_as_from_an_sdist(tmp_path: Path) -> None:
+    pytest.importorskip('setuptools', minversion='70.1')  # those before need the package wheel
+    checkout, unpacked = tmp_path / 'checkout', tmp_path / 'unpacked'
+    unwanted = shutil.ignore_patterns('.*', 'runs', 'build', '__pycache__', '*.egg-info')
+    shutil.copytree(ROOT, checkout, ignore=unwanted)
+    with tarfile.open(built(checkout, 'sdist')) as archive:
+        archive.extractall(unpacked, filter='data')
+    (sources,) = unpacked.iterdir()
+    contents = []
+    for folder in (checkout, sources):
+        with ZipFile(built(folder, 'wheel')) as wheel:
+            contents.append({entry.filename: entry.CRC for entry in wheel.infolist()
+                             if not entry.filename.endswith('/RECORD')})
+    assert contents[0] == contents[1]
+    names = {name.partition('.data/data/')[2] or name for name in contents[0]}
+    shared = {f'share/{PACKAGE}/{path.relative_to(ROOT)}' for folder in ('config', 'launch')
+              for path in (ROOT / folder).rglob('*')
+              if path.is_file() and path.suffix != '.pyc'}
+    scripts = {f'lib/{PACKAGE}/{name}' for name in executables()}
+    modules_ = {str(path.relative_to(ROOT)) for path in modules().values()}
+    assert shared | scripts | modules_ <= names
+
+
+@installed
+def test_no_other_distribution_has_files_of_the_package() -> None:
+    # A package that pip built in the build folder of this one had all of it in its wheel.
+    found = {dist.name for dist in distributions() for file in dist.files or ()
+             if file.parts[0] == PACKAGE and PREFIX in Path(str(dist.locate_file(file))).parents}
+    assert found <= {PACKAGE, PACKAGE.replace('_', '-')}
 
 
 def test_the_makefile_and_ci_are_executable_as_the_readme_says() -> None:
