@@ -69,7 +69,7 @@ STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
 FIGURE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures bench lint install clean
+.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures bench doc lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -121,6 +121,9 @@ paper-figures: $(INSTALLED) ## draw the figures of the paper into build/paper_fi
 bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.bench $(BENCH_ARGS)
 
+doc: $(INSTALLED) $(VENV)/.documentation ## make the documentation as a site: build/site/index.html
+	$(ACTIVATED) NO_MKDOCS_2_WARNING=1 mkdocs --quiet build --strict
+
 lint: $(INSTALLED) ## ruff, mypy and the rules for package.xml
 	$(BIN)/python -m ruff check
 	$(BIN)/python -m mypy
@@ -140,6 +143,10 @@ $(INSTALLED): $(READY) $(SOURCES)
 	@grep -q environment.sh $(BIN)/activate || { \
 	  sed -i 's/^deactivate () {/&\n    ! command -v _dmp_cpg_ros_restore > \/dev\/null || _dmp_cpg_ros_restore/' $(BIN)/activate; \
 	  echo '. "$$VIRTUAL_ENV/../environment.sh"' >> $(BIN)/activate; }
+	@touch $@
+
+$(VENV)/.documentation: $(READY) | $(INSTALLED)
+	@$(INSTALL_WHEEL) "$$(echo $(BUILD)/wheel/*.whl)[doc]"
 	@touch $@
 
 $(READY): setup.py constraints.txt

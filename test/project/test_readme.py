@@ -4,17 +4,23 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
 import subprocess
 import sys
+from functools import cache
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
-from checkout import ROOT, setup_constant
+from checkout import PACKAGE, ROOT, setup_constant
+
+from dmp_cpg_ros.suite_table import instances
 
 DOCUMENTS = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'QUALITY_DECLARATION.md',
-             *sorted((ROOT / 'doc').glob('*.md')))
+             *sorted((ROOT / 'doc').rglob('*.md')))
 """What a reader reads."""
 
 BLOCK = """
@@ -22,6 +28,13 @@ import sys
 for name in ('rclpy', 'mujoco', 'yaml'):
     sys.modules[name] = None
 """
+
+
+def tables_of_parameters() -> dict[str, Any]:
+    """Parameters of every kind of node; needs ROS."""
+    from dmp_cpg_ros.commands import reference
+
+    return reference.tables_of_parameters()
 
 
 def text(document: Path) -> str:
@@ -34,7 +47,7 @@ def blocks(document: Path, language: str) -> list[str]:
 
 
 def test_the_library_runs_without_ros_and_without_mujoco(tmp_path: Path) -> None:
-    (code,) = (code for document in DOCUMENTS for code in blocks(document, 'python'))
+    (code,) = blocks(ROOT / 'doc' / 'library.md', 'python')
     script = tmp_path / 'library.py'
     script.write_text(BLOCK + code, encoding='utf-8')
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True,
@@ -43,6 +56,24 @@ def test_the_library_runs_without_ros_and_without_mujoco(tmp_path: Path) -> None
     assert walking.startswith('lags [0.   0.5  0.75 0.25]')
     assert float(walking.split('speed')[1]) > 5.0
     assert float(resting.split('speed')[1]) < 0.01
+
+
+def test_the_tutorial_prints_what_it_shows(tmp_path: Path) -> None:
+    pytest.importorskip('mujoco')
+    document = ROOT / 'doc' / 'tutorial.md'
+    codes, shown = blocks(document, 'python'), blocks(document, 'text')
+    assert len(codes) == len(shown) == 5
+    script, mark = tmp_path / 'tutorial.py', '-- next block --\n'
+    script.write_text("import sys\nsys.modules['rclpy'] = None\n" + ''.join(
+        f"{code}\nprint({mark!r}, end='')\n" for code in codes), encoding='utf-8')
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True,
+                          check=True, cwd=tmp_path, env={'PYTHONPATH': str(ROOT)})
+    assert done.stdout.split(mark)[:-1] == shown
+
+
+def files(document: Path) -> dict[str, str]:
+    """Contents of the files that it shows, by the title of the block."""
+    return dict(re.findall(r'```\w+ title="([^"]+)"\n(.*?)```', text(document), re.DOTALL))
 
 
 def anchors(document: Path) -> set[str]:
@@ -93,13 +124,96 @@ def as_shown(output: str, shown: str) -> bool:
     return re.fullmatch(pattern, output) is not None
 
 
+def shell_lines(document: Path) -> list[str]:
+    """What it types into a shell, of its own environment."""
+    return [*''.join(blocks(document, 'sh')).splitlines(),
+            *(command for command, _ in transcript(document))]
+
+
+def commands(line: str) -> list[list[str]]:
+    """Words of each command of a line."""
+    words = shlex.split(line.rstrip(' &'), comments=True)
+    found: list[list[str]] = [[]]
+    for word in words:
+        if word in ('&&', '|'):
+            found.append([])
+        else:
+            found[-1].append(word)
+    return found
+
+
 @pytest.mark.parametrize('document', DOCUMENTS, ids=lambda document: document.name)
 def test_commands_in_the_documents_are_executables_of_the_package(document: Path) -> None:
     executables = setup_constant('EXECUTABLES')
     assert isinstance(executables, tuple)
-    lines = ''.join(blocks(document, 'sh')).splitlines()
-    for line in [*lines, *(command for command, _ in transcript(document))]:
-        assert shlex.split(line, comments=True)[0] in {*executables, 'pip', 'make', '.'}, line
+    for line in shell_lines(document):
+        first = commands(line)[0][0]
+        assert first in {*executables, PACKAGE, 'pip', 'make', 'python', '.'}, line
+
+
+@cache
+def help_of(name: str, *words: str) -> str:
+    done = subprocess.run([sys.executable, '-m', PACKAGE, name, *words, '--help'], timeout=60,
+                          capture_output=True, text=True, check=True, env={
+                              **os.environ, 'PYTHONPATH': str(ROOT)})
+    return done.stdout
+
+
+@pytest.mark.parametrize('document', DOCUMENTS, ids=lambda document: document.name)
+def test_options_and_parameters_of_commands_exist(document: Path) -> None:
+    pytest.importorskip('rclpy')
+    executables = setup_constant('EXECUTABLES')
+    assert isinstance(executables, tuple)
+    every_parameter = {name for table in tables_of_parameters().values() for name in table.fields}
+    inline = re.findall(rf"`((?:{'|'.join(executables)}) [^`]+)`", text(document))
+    for line in [*shell_lines(document), *inline]:
+        for command in commands(line):
+            words = command[command[0] == PACKAGE:]
+            if words[0] not in executables:
+                continue
+            shown = help_of(words[0])
+            if words[0] == 'robot_client':
+                shown += help_of(*words[:2]) if words[1] in shown and '-' not in words[1] else ''
+            for option in words[1:]:
+                name, _, assigned = option.partition(':=')
+                if re.fullmatch(r'--[a-z-]+', option):
+                    assert option in shown, line
+                elif assigned:
+                    assert name in every_parameter, line
+
+
+@pytest.mark.parametrize('document', DOCUMENTS, ids=lambda document: document.name)
+def test_names_in_commands_of_ros2_exist(document: Path) -> None:
+    """They are not run: there is no ``ros2`` where the tests are."""
+    pytest.importorskip('rclpy')
+    from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES
+
+    executables = setup_constant('EXECUTABLES')
+    assert isinstance(executables, tuple)
+    tables = tables_of_parameters()
+    nodes = {name: tables[kind.name].fields for kind, name, _ in instances()}
+    launch = (ROOT / 'launch' / 'suite.launch.py').read_text(encoding='utf-8')
+    lines = [line for block in blocks(document, 'bash') for line in block.splitlines()]
+    for line in [*lines, *re.findall(r'`(ros2 [^`]+)`', text(document))]:
+        match [word for word in shlex.split(line, comments=True)
+               if not re.fullmatch(r'--once|-r|\d+', word)]:
+            case ['ros2', 'run', package, name, *arguments] if package == PACKAGE:
+                assert name in {*executables, 'NAME'}, line
+                given = [word.partition(':=')[0] for flag, word in pairwise(arguments)
+                         if flag == '-p']
+                assert set(given) <= set(tables[name].fields if name in tables else given), line
+            case ['ros2', 'launch', package, file, *arguments] if package == PACKAGE:
+                assert (ROOT / 'launch' / file).is_file(), line
+                for argument in arguments:
+                    assert f"'{argument.partition(':=')[0]}'" in launch, line
+            case ['ros2', 'topic', 'pub', name, kind, *_] | ['ros2', 'service', 'call', name, kind,
+                                                             *_]:
+                entry = INTERFACES.get(name[1:]) or INTERFACES[f'~/{name.rpartition("/")[2]}']
+                assert entry.type_name == kind, line
+            case ['ros2', 'topic', _, name, *_]:
+                assert name in INTERFACES or name[1:] in INTERFACES, line
+            case ['ros2', 'param', _, node, name, *_]:
+                assert name in nodes[node.strip('/')], line
 
 
 def test_the_readme_and_the_usage_have_transcripts() -> None:

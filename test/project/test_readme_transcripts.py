@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from ros_processes import NodeProcess, Processes, Ros, reserved_domain
-from test_readme import TRANSCRIPTS, as_shown, transcript
+from test_readme import TRANSCRIPTS, as_shown, files, transcript
 
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
 from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_state_word
@@ -72,8 +72,9 @@ class Reader:
             return ''
         self.ros.spin_until(lambda: not process.running, PATIENCE_S, what=lambda: str(process))
         process.wait()
-        self.changed_ns = self.now_ns
-        self.ros.spin_until(self.settled, PATIENCE_S, what=lambda: str(self.states))
+        if self.background:
+            self.changed_ns = self.now_ns
+            self.ros.spin_until(self.settled, PATIENCE_S, what=lambda: str(self.states))
         return process.output
 
     def end(self) -> None:
@@ -98,6 +99,8 @@ def reader(tmp_path: Path) -> Iterator[Reader]:
 
 @pytest.mark.parametrize('document', TRANSCRIPTS, ids=lambda document: document.name)
 def test_what_the_transcripts_show_is_what_happens(reader: Reader, document: Path) -> None:
+    for name, content in files(document).items():
+        (reader.folder / name).write_text(content, encoding='utf-8')
     happened = [(command, shown, reader.type(command)) for command, shown in transcript(document)]
     assert any(shown for _, shown, _ in happened)
     wrong = [f'$ {command}\n{printed}--- {document.name} shows ---\n{shown}'

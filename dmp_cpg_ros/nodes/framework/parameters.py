@@ -227,12 +227,12 @@ def help_text(node_class: type[SuiteNode]) -> str:
         parts += ['\n'.join([f'{title}:', *lines])] if lines else []
     table, lines = node_class.parameter_table(), ['parameters:']
     for name, field in table.fields.items():
-        notes = (f'default {_yaml(plain(field.default))}', constraint(field),
+        notes = (f'default {as_yaml(plain(field.default))}', constraint(field),
                  'changeable' if name in table.changeable else '')
         lines += [f'  {name}: {describe(field)}', f"      {', '.join(filter(None, notes))}"]
     return '\n\n'.join([*parts, '\n'.join(lines)])
 
 
-def _yaml(value: object) -> str:
+def as_yaml(value: object) -> str:
     """Value as one would type it on the command line."""
     return str(yaml.safe_dump(value, default_flow_style=True, width=1000)).splitlines()[0]

@@ -1,0 +1,173 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""``python -m dmp_cpg_ros.commands.reference``: names of the suite as Markdown, from its tables.
+
+Without an argument all of it, else the sections that are named. ``make doc`` puts them into
+``doc/reference.md``.
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+from dmp_cpg_ros.__main__ import COMMANDS, STUDIES, summary
+from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
+from dmp_cpg_ros.commands.security_policy import LIFECYCLE_SERVICES, PARAMETER_SERVICES
+from dmp_cpg_ros.configuration import config_folders
+from dmp_cpg_ros.core.modes.requests import REQUESTS
+from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS
+from dmp_cpg_ros.core.suite_parameters import OWNER
+from dmp_cpg_ros.nodes.framework.parameters import (
+    ParameterTable,
+    as_yaml,
+    constraint,
+    describe,
+    plain,
+)
+from dmp_cpg_ros.nodes.messages.interfaces import (
+    SERVICES,
+    TOPICS,
+    Interface,
+    published_by,
+    read_by,
+    served_by,
+)
+from dmp_cpg_ros.suite_table import KINDS, RECORDER
+
+SEVERAL = 'several nodes'
+
+
+def tables_of_parameters() -> dict[str, ParameterTable]:
+    """Every kind of node with its parameters."""
+    return {kind.name: getattr(import_module(kind.module), kind.class_name).parameter_table()
+            for kind in KINDS.values()}
+
+
+def executables() -> str:
+    """Commands, studies and nodes."""
+    return _table(('executable', 'does'), (
+        (f'`{name}`', summary(name)) for name in (*COMMANDS, *STUDIES, *KINDS)))
+
+
+def nodes() -> str:
+    """Topics and services of every kind of node."""
+    def names(entries: Iterable[Interface]) -> str:
+        return ', '.join(f'`{entry.name}`' for entry in entries) or '–'
+
+    return _table(('node', 'reads', 'publishes', 'serves'), (
+        (', '.join(f'`{name}`' for name in kind.instances),
+         'all that is recorded' if kind.name == RECORDER else names(read_by(kind.name)),
+         names(published_by(kind.name)), names(served_by(kind.name))) for kind in KINDS.values()))
+
+
+def topics() -> str:
+    """Topics of the suite; those of rclpy itself (``/rosout``, ...) are not among them."""
+    return _table(('topic', 'type', 'from', 'to', 'carries', ''), (
+        (f'`{topic.name}`', f'`{topic.type_name}`', *_ends(topic), topic.meaning, ', '.join((
+            *(['latched'] if topic.latched else []),
+            *([] if topic.recorded else ['not recorded'])))) for topic in TOPICS))
+
+
+def services() -> str:
+    """Services of the suite, then those that rclpy gives to every managed node."""
+    return _table(('service', 'type', 'served by', 'does'), [
+        *((f'`{service.name}`', f'`{service.type_name}`', _ends(service)[0], service.meaning)
+          for service in SERVICES),
+        *((f'`{name}`', f'`{package}`', 'every node', what) for names, package, what in (
+            (PARAMETER_SERVICES, 'rcl_interfaces', 'parameters'),
+            (LIFECYCLE_SERVICES, 'lifecycle_msgs', 'states of a managed node'))
+          for name in names)])
+
+
+def parameters() -> str:
+    """Parameters of the nodes: each stands under the node that owns it, or alone has it."""
+    rows: dict[tuple[str, str, str], list[str]] = {}
+    changeable: set[str] = set()
+    for kind, table in tables_of_parameters().items():
+        changeable |= table.changeable
+        for name, field in table.fields.items():
+            notes = as_yaml(plain(field.default)), constraint(field)
+            valid = f'`{notes[0]}`' + (f', {notes[1]}' if notes[1] else '')
+            rows.setdefault((name, valid, describe(field)), []).append(kind)
+    groups: dict[str, list[tuple[str, ...]]] = {title: [] for title in (*KINDS, SEVERAL)}
+    for (name, valid, text), kinds in rows.items():
+        own = kinds[0] if len(kinds) == 1 else OWNER.get(name, SEVERAL)
+        where = 'every node' if len(kinds) == len(KINDS) else ', '.join(kinds)
+        groups[own].append((f'`{name}`', valid, text, 'yes' if name in changeable else '',
+                            *([where] if own == SEVERAL else [])))
+    return '\n'.join(
+        f'\n### Parameters of {title}\n\n' + _table(
+            ('parameter', 'default, valid', 'meaning', 'changes while it runs',
+             *(['nodes'] if title == SEVERAL else [])), sorted(group))
+        for title, group in groups.items() if group)
+
+
+def events() -> str:
+    """Kinds of events of a scenario."""
+    def meaning(read: Callable[..., Any]) -> str:
+        if isinstance(read, partial):
+            (what,) = read.args
+            return f'`{what}: true` requests it as the service `{what}` does'
+        return (inspect.getdoc(read) or '').split('\n')[0].replace('``', '`').removeprefix('Read ')
+
+    assert set(REQUESTS) <= set(EVENT_KINDS)
+    return _table(('event', 'value'), (
+        (f'`{kind}`', meaning(read)) for kind, read in EVENT_KINDS.items()))
+
+
+def files() -> str:
+    """Files of ``config/``, with the line with which each of them begins."""
+    folder, *_ = config_folders()
+    rows = []
+    for path in sorted(folder.rglob('*.*')):
+        first = path.read_text(encoding='utf-8').splitlines()[0]
+        rows.append((f'`{path.relative_to(folder).as_posix()}`',
+                     first.removeprefix('# ') if first.startswith('#') else ''))
+    return _table(('file', 'begins'), rows)
+
+
+def metrics() -> str:
+    """Numbers of ``metrics.json``."""
+    return _table(('metric', 'unit', 'meaning'), (
+        (f'`{name}`', unit, text) for name, (unit, text) in DEFINITIONS.items()))
+
+
+SECTIONS: dict[str, Callable[[], str]] = {section.__name__: section for section in (
+    executables, nodes, topics, services, parameters, events, files, metrics)}
+"""Sections by their name."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print sections; returns the exit status."""
+    asked = sys.argv[1:] if arguments is None else arguments
+    for name in asked or SECTIONS:
+        if name not in SECTIONS:
+            print(f"reference: there is no section '{name}'; valid are {', '.join(SECTIONS)}",
+                  file=sys.stderr)
+            return 2
+        print(f'## {name.capitalize()}\n\n{SECTIONS[name]()}')
+    return 0
+
+
+def _ends(entry: Interface) -> tuple[str, str]:
+    """Who writes and who reads, or serves and calls."""
+    every = set(KINDS)
+    return tuple('every node' if every <= set(kinds) else ', '.join(
+        f'{kind}{" (sometimes)" if kind in entry.sometimes else ""}' for kind in kinds) or '–'
+        for kinds in (entry.publishers, entry.subscribers))  # type: ignore[return-value]
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    def line(cells: Sequence[str]) -> str:
+        return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |\n"
+
+    return line(head) + line(['---'] * len(head)) + ''.join(map(line, rows))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,119 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The generated reference and a suite that runs name the same topics, services and parameters."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import ros_processes
+from checkout import ROOT
+from rcl_interfaces.srv import ListParameters
+from ros_processes import Processes, Ros, composed_suite
+
+from dmp_cpg_ros.commands import reference
+from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS
+from dmp_cpg_ros.nodes.framework.parameters import FOREIGN_PREFIXES
+from dmp_cpg_ros.nodes.messages.interfaces import SERVICES, TOPICS, Interface
+from dmp_cpg_ros.suite_table import KINDS, instances
+
+shared_domain, shared_ros = ros_processes.shared_domain, ros_processes.shared_ros
+
+OF_RCLPY = re.compile(
+    r'/parameter_events|/rosout|.*/transition_event|/test/.*|.*/get_type_description')
+"""What is there beside the suite: rclpy's own, and the node of the test."""
+
+ALL_OF_IT = {'lock_step': True, 'gated': True, 'voting': True, 'contact_feedback': True}
+"""Parameters with which the suite has every topic."""
+
+
+def documented(section: str) -> set[str]:
+    """What stands in code in the first column of a section's tables."""
+    return set(re.findall(r'^\| `([^`]+)`', reference.SECTIONS[section](), re.MULTILINE))
+
+
+def in_the_graph(entries: tuple[Interface, ...]) -> dict[str, str]:
+    """Full names of interfaces with their types, private ones for each of their nodes."""
+    names = {}
+    for entry in entries:
+        owners = [name for kind in entry.publishers if kind in KINDS
+                  for name in KINDS[kind].instances] if entry.name.startswith('~') else ['']
+        for owner in owners:
+            name = entry.name.replace('~', f'/{owner}')
+            names[name if name.startswith('/') else f'/{name}'] = entry.type_name
+    return names
+
+
+@pytest.fixture(scope='module')
+def suite(shared_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
+    folder: Path = tmp_path_factory.mktemp('suite')
+    with composed_suite(shared_domain, folder, **ALL_OF_IT) as started:
+        started.node('bag_recorder', output=str(folder / 'bag'))
+        yield started
+
+
+def test_the_graph_has_the_topics_of_the_reference_and_no_others(
+        suite: Processes, shared_ros: Ros) -> None:
+    expected = in_the_graph(TOPICS)
+    assert {entry.name for entry in TOPICS} == documented('topics')
+
+    def found() -> dict[str, str]:
+        return {name: types[0] for name, types in shared_ros.node.get_topic_names_and_types()
+                if not OF_RCLPY.fullmatch(name)}
+
+    shared_ros.spin_until(lambda: set(found()) >= set(expected),
+                          what=lambda: str(set(expected) - set(found())))
+    assert found() == expected
+
+
+def test_every_node_has_the_services_of_the_reference_and_no_others(
+        suite: Processes, shared_ros: Ros) -> None:
+    private = {name for name in documented('services') if name.startswith('~')}
+    expected = {f'/{name}' for name in documented('services') - private} | {
+        entry.replace('~', f'/{name}') for _, name, _ in instances() for entry in private}
+    assert set(in_the_graph(SERVICES)) <= expected
+
+    def found() -> set[str]:
+        return {name for name, _ in shared_ros.node.get_service_names_and_types()
+                if not OF_RCLPY.fullmatch(name)}
+
+    shared_ros.spin_until(lambda: found() >= expected, what=lambda: str(expected - found()))
+    assert found() == expected
+
+
+def test_every_node_has_the_parameters_of_the_reference_and_no_others(
+        suite: Processes, shared_ros: Ros) -> None:
+    everything = set()
+    for kind, name, _ in instances():
+        answer = shared_ros.call(ListParameters, f'/{name}/list_parameters',
+                                 ListParameters.Request())
+        found = {each for each in answer.result.names if not each.startswith(FOREIGN_PREFIXES)}
+        assert found == set(reference.tables_of_parameters()[kind.name].fields), name
+        everything |= found
+    assert everything == documented('parameters')
+
+
+def test_every_kind_of_event_is_in_the_reference_and_has_its_example() -> None:
+    assert documented('events') == set(EVENT_KINDS)
+    usage = (ROOT / 'doc' / 'usage.md').read_text(encoding='utf-8')
+    table = usage.partition('## Scenarios')[2].partition('\n## ')[0]
+    rows = [line for line in table.splitlines() if line.startswith('| `')]
+    assert {word for row in rows for word in re.findall(r'`(\w+)`', row.split('|')[1])} == set(
+        EVENT_KINDS)
+
+
+def test_the_page_has_every_section_once() -> None:
+    page = (ROOT / 'doc' / 'reference.md').read_text(encoding='utf-8')
+    assert sorted(re.findall(r'<!-- table: (\w+) -->', page)) == sorted(reference.SECTIONS)
+
+
+def test_a_wrong_section_is_answered_with_the_right_ones(
+        capsys: pytest.CaptureFixture[str]) -> None:
+    assert reference.main(['topic']) == 2
+    assert 'valid are executables, nodes, topics' in capsys.readouterr().err
