@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 import sys
 import tempfile
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 from setuptools import find_packages, setup
@@ -43,6 +44,16 @@ def version() -> str:
     if found is None:
         raise RuntimeError(f"{NAME}/__init__.py has no line __version__ = '...'")
     return found.group(1)
+
+
+def maintainer() -> dict[str, object]:
+    """Who maintains the package and where it lives, from package.xml."""
+    manifest = ElementTree.parse('package.xml').getroot()
+    person = manifest.find('maintainer')
+    if person is None:
+        raise RuntimeError('package.xml names no maintainer')
+    return {'maintainer': person.text, 'maintainer_email': person.get('email'),
+            'project_urls': {url.get('type'): url.text for url in manifest.findall('url')}}
 
 
 def wrappers() -> list[str]:
@@ -83,6 +94,7 @@ setup(
     description='CPG-based quadruped walking with coupled rhythmic movement primitives',
     author='The dmp_cpg_ros authors',
     license='Apache-2.0',
+    **maintainer(),
     python_requires='>=3.10',
     packages=find_packages(include=[NAME, f'{NAME}.*']),
     package_data={NAME: package_data()},

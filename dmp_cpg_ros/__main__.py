@@ -42,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for title, names in (('commands', COMMANDS), ('studies', STUDIES), ('nodes', tuple(KINDS))):
         print(f'\n{title}:')
         for name in names:
-            print(f'  {name:22}{summary(name)}')
+            print(f'  {name:22}{_summary(name)}')
     return BAD_INPUT if given and given[0] not in ('-h', '--help') else 0
 
 
@@ -87,7 +87,7 @@ def _module(name: str) -> str:
     return f'{PACKAGE}.{_folder(name)}.{name}'
 
 
-def summary(name: str) -> str:
+def _summary(name: str) -> str:
     """First line of an executable's module, read without importing what it needs."""
     spec = find_spec(_module(name))
     assert spec is not None and spec.origin is not None

@@ -9,13 +9,14 @@ Without an argument all of it, else the sections that are named. ``make doc`` pu
 from __future__ import annotations
 
 import inspect
+import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from importlib import import_module
 from typing import Any
 
-from dmp_cpg_ros.__main__ import COMMANDS, STUDIES, summary
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.commands.security_policy import LIFECYCLE_SERVICES, PARAMETER_SERVICES
 from dmp_cpg_ros.configuration import config_folders
@@ -49,9 +50,12 @@ def tables_of_parameters() -> dict[str, ParameterTable]:
 
 
 def executables() -> str:
-    """Commands, studies and nodes."""
+    """Commands, studies and nodes, as ``dmp_cpg_ros`` lists them."""
+    listed = subprocess.run([sys.executable, '-m', 'dmp_cpg_ros'], capture_output=True, text=True,
+                            check=True).stdout
     return _table(('executable', 'does'), (
-        (f'`{name}`', summary(name)) for name in (*COMMANDS, *STUDIES, *KINDS)))
+        (f'`{name}`', text) for name, text in re.findall(r'^  (\w+) +(.+)$', listed,
+                                                         re.MULTILINE)))
 
 
 def nodes() -> str:

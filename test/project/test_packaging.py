@@ -21,6 +21,7 @@ import pytest
 from checkout import PACKAGE, ROOT, imports, modules, setup_argument, setup_constant
 
 import dmp_cpg_ros
+from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.suite_table import KINDS
 
 CONTRACT = ('reference_filter', 'canonical_oscillators', 'leg_transformation', 'inhibition',
@@ -106,6 +107,11 @@ def test_names_versions_and_licence_agree() -> None:
     assert texts('name') == [setup_constant('NAME')] == [PACKAGE]
     assert texts('license') == [setup_argument('license')] == ['Apache-2.0']
     assert (ROOT / 'resource' / PACKAGE).is_file()
+    citation = load_yaml(ROOT / 'CITATION.cff')
+    assert (citation['title'], citation['version'], citation['license']) == (
+        PACKAGE, dmp_cpg_ros.__version__, 'Apache-2.0')
+    assert re.search(rf"^{re.escape(released[0])} \({citation['date-released']}\)$", changelog,
+                     re.MULTILINE)
 
 
 def test_every_requirement_has_its_rosdep_key_and_a_tested_version() -> None:

@@ -20,6 +20,7 @@ from checkout import PACKAGE, ROOT, setup_constant
 from dmp_cpg_ros.suite_table import instances
 
 DOCUMENTS = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'QUALITY_DECLARATION.md',
+             ROOT / 'SECURITY.md',
              *sorted((ROOT / 'doc').rglob('*.md')))
 """What a reader reads."""
 
