@@ -206,7 +206,8 @@ def test_names_in_commands_of_ros2_exist(document: Path) -> None:
             case ['ros2', 'launch', package, file, *arguments] if package == PACKAGE:
                 assert (ROOT / 'launch' / file).is_file(), line
                 for argument in arguments:
-                    assert f"'{argument.partition(':=')[0]}'" in launch, line
+                    name = argument.partition(':=')[0]
+                    assert f"'{name}'" in launch or f'{name.upper()},' in launch, line
             case ['ros2', 'topic', 'pub', name, kind, *_] | ['ros2', 'service', 'call', name, kind,
                                                              *_]:
                 entry = INTERFACES.get(name[1:]) or INTERFACES[f'~/{name.rpartition("/")[2]}']
