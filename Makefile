@@ -162,6 +162,8 @@ $(READY): setup.py constraints.txt
 	@grep '^numpy==' $(VENV)/present.txt >> $(VENV)/constraints.txt || true
 	@$(PIP) install --constraint $(VENV)/constraints.txt 'setuptools>=68'
 	@$(MAKE_WHEEL)
+	@# pip may keep an empy from former versions of this file, which packed this package into it
+	@$(if $(findstring ros,$(EXTRAS)),$(INSTALL_WHEEL) --no-cache-dir empy,:)
 	@$(INSTALL_WHEEL) "$$(echo $(BUILD)/wheel/*.whl)[$(EXTRAS)]"
 	@$(BIN)/python -c 'import rclpy' || { echo 'ROS 2 ($(ROS_DISTRO)) is sourced, but $(INTERPRETER) cannot import its rclpy. Name its Python with: make PYTHON=/usr/bin/python3' >&2; exit 1; }
 	@touch $@
