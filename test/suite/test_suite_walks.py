@@ -58,10 +58,14 @@ events:
 
 PUSHED = """\
 name: pushed
-duration: 3.0
+duration: 6.5
 events:
   - {at: 0.4, push: {impulse: [0, -10.7, 0]}}
   - {at: 2.2, push: {impulse: [0, 8, 0], duration: 0.2}}
+  - {at: 3.0, inhibit: false}
+  - {at: 3.0, command: {v_x: 0.8}}
+  - {at: 4.5, push: {impulse: [0, 8, 0]}}
+  - {at: 4.75, inhibit: true}
 """
 
 WITH_CONTACTS = {'contact_feedback': True}
@@ -180,7 +184,7 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
     assert metrics['stop']['measured_s'] == pytest.approx(metrics['stop']['predicted_s'], abs=1e-6)
 
 
-def test_nodes_step_out_of_a_push_as_the_plain_loop_does(
+def test_nodes_answer_pushes_as_the_plain_loop_does(
     processes: Processes, tmp_path: Path
 ) -> None:
     scenario = tmp_path / 'pushed.yaml'
@@ -188,12 +192,17 @@ def test_nodes_step_out_of_a_push_as_the_plain_loop_does(
     run = walked(processes, scenario, tmp_path / 'run', '--lock-step', '--composed')
     recording, (states, ticks) = load_recording(run / 'bag'), plain_run(scenario)
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
+    np.testing.assert_array_equal(recording.reference.value, [tick.r for tick in ticks])
     np.testing.assert_array_equal(
         recording.joints.position, [state.joint_position for state in states[:-1]])
     assert recording.counts['/inhibition_gains'] == recording.counts['/canonical_state']
+    least = min(tick.supervisor.share for tick in ticks)
+    assert least < 1.0 and all(
+        tick.supervisor.share == 1.0 for tick in ticks if tick.supervisor.in_force)
     words = [(event.message, event.values['pushed']) for event in recording.inhibition]
     assert {('releasing', 'true'), ('stepping', 'true'), ('waiting', 'false')} <= set(words)
-    assert all(event.values['requested'] == 'true' for event in recording.inhibition)
+    assert all(event.values['requested'] == 'true' for event in recording.inhibition
+               if event.time < 3.0)
     for event in recording.inhibition:
         measured, bound = event.number('measured_s'), event.number('bound_s')
         if event.message == 'stepping' or (event.message == 'at_rest' and measured):
