@@ -1,22 +1,18 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A group of child processes: started together, watched, ended together, their output kept.
-
-Run as a program it is the beginning of such a child: ``PARENT MODULE [ARGUMENT ...]`` runs a
-module that is asked to end when its parent has ended, in whatever way.
-"""
+"""A group of child processes: started together, watched, ended together, their output kept."""
 
 from __future__ import annotations
 
-import ctypes
 import os
-import runpy
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+
+from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
+from dmp_cpg_ros.core.errors import DmpCpgError
 
 
 class ProcessGroup:
@@ -26,35 +22,32 @@ class ProcessGroup:
     ----------
     logs : Path
         Folder for one file of output per process.
+    server : ForkServer
+        What starts them.
     """
 
-    def __init__(self, logs: Path) -> None:
+    def __init__(self, logs: Path, server: ForkServer) -> None:
         """Start with no process."""
         logs.mkdir(parents=True, exist_ok=True)
-        self._logs = logs
-        self._processes: dict[str, subprocess.Popen[bytes]] = {}
-        self._commands: dict[str, tuple[str, Sequence[str]]] = {}
+        self._logs, self._server = logs, server
+        self._processes: dict[str, Forked] = {}
+        self._commands: dict[str, Sequence[str]] = {}
 
-    def start(self, name: str, module: str, arguments: Sequence[str], *,
-              logged: bool = True) -> None:
-        """Run ``python -m module arguments`` with this copy of the package, in a session of its
-        own so that Ctrl-C reaches this process only; it ends with this process. What is not logged
-        is written where this process writes.
+    def start(self, name: str, command: Sequence[str], *, logged: bool = True) -> None:
+        """Run an executable of this package with arguments, as :meth:`.ForkServer.start`. What is
+        not logged is written where this process writes.
         """
-        self._commands[name] = module, arguments
-        # Matrices of a few rows: threads of the algebra library would only contend for the cores.
-        environment = {'OPENBLAS_NUM_THREADS': '1', **os.environ, 'PYTHONUNBUFFERED': '1'}
+        self._commands[name] = command
         with open(self._logs / f'{name}.log' if logged else os.devnull, 'ab') as log:
-            output = log if logged else None
-            self._processes[name] = subprocess.Popen(
-                [sys.executable, __file__, str(os.getpid()), module, *arguments],
-                stdin=subprocess.DEVNULL, stdout=output,
-                stderr=subprocess.STDOUT if logged else None,
-                start_new_session=True, env=environment)
+            files = (log.fileno(), log.fileno()) if logged else ()
+            try:
+                self._processes[name] = self._server.start(command, *files)
+            except OSError as error:
+                raise DmpCpgError(f'cannot start {name}: {error}') from None
 
     def restart(self, name: str) -> None:
         """Start a process that has ended once more."""
-        self.start(name, *self._commands[name])
+        self.start(name, self._commands[name])
 
     def kill(self, name: str) -> None:
         """End a process that does not answer."""
@@ -96,22 +89,3 @@ class ProcessGroup:
                 process.kill()
                 process.wait()
         return killed
-
-
-PR_SET_PDEATHSIG = 1
-"""Of Linux's ``prctl``: which signal a process gets when the thread that started it ends."""
-
-
-def end_with(parent: int) -> None:
-    """Let this process get SIGTERM when its parent ends; at once when it has ended already."""
-    if sys.platform == 'linux':
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != parent:
-        os.kill(os.getpid(), signal.SIGTERM)
-
-
-if __name__ == '__main__':
-    end_with(int(sys.argv[1]))
-    sys.path[0] = str(Path(__file__).parents[2])  # and not what lies in the working folder
-    del sys.argv[:2]
-    runpy.run_module(sys.argv[0], run_name='__main__', alter_sys=True)

@@ -25,7 +25,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
-from dmp_cpg_ros.commands import composed_suite
+from dmp_cpg_ros.commands.fork_server import ForkServer
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
@@ -34,6 +34,7 @@ from dmp_cpg_ros.nodes.messages.conversions import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
 from dmp_cpg_ros.suite_table import (
+    COMPOSED,
     PROCESSES,
     RECORDER,
     ROBOT,
@@ -140,9 +141,9 @@ def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
     return found
 
 
-def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say, *,
-              lock_step: bool, processes: str, view: bool = False, visualization: bool = False,
-              respawn: bool = False) -> str:
+def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say,
+              server: ForkServer, *, lock_step: bool, processes: str, view: bool = False,
+              visualization: bool = False, respawn: bool = False) -> str:
     """Run the suite from nothing to nothing.
 
     A walk goes on without its recorder, which says at once when it cannot write any more.
@@ -159,6 +160,8 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         Folder for the output of the processes.
     say : callable (time_s, text)
         Told what happens.
+    server : ForkServer
+        What starts the processes; closed as soon as it is not needed any more.
     lock_step : bool
         Whether the robot waits for the targets of every tick.
     processes : str
@@ -186,22 +189,24 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
     InterruptedRunError
         On Ctrl-C, SIGTERM, SIGHUP or SIGQUIT; everything is shut down cleanly all the same.
     """
-    group, views = ProcessGroup(logs), ProcessGroup(logs)
+    group, views = ProcessGroup(logs, server), ProcessGroup(logs, server)
     with _interrupt() as interrupted:
         rclpy.init(args=['walk', *arguments], signal_handler_options=SignalHandlerOptions.NO)
         try:
             if view:  # its address holds a token, which is for the terminal only
-                views.start('live_view', 'dmp_cpg_ros', ['live_view', *arguments], logged=False)
+                views.start('live_view', ['live_view', *arguments], logged=False)
             if visualization:
-                views.start(VISUALIZATION, 'dmp_cpg_ros', [VISUALIZATION, *arguments])
+                views.start(VISUALIZATION, [VISUALIZATION, *arguments])
             kinds = {name: kind.name for kind, name, _ in instances()}
             shared = {RECORDER: (RECORDER,), **PROCESSES[processes]}
             for process, nodes in shared.items():
                 if len(nodes) == 1:
                     node = ('-r', f'__node:={nodes[0]}')
-                    group.start(process, 'dmp_cpg_ros', [kinds[nodes[0]], *arguments, *node])
+                    group.start(process, [kinds[nodes[0]], *arguments, *node])
                 else:
-                    group.start(process, composed_suite.__name__, [*nodes, *arguments])
+                    group.start(process, [COMPOSED, *nodes, *arguments])
+            if not respawn:
+                server.close()
             player = ScenarioPlayer(scenario, tick_ns, lock_step, say)
             executor = execution.make_executor('events')
             executor.add_node(player)

@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dmp_cpg_ros.commands import ros_arguments, run_folder
 from dmp_cpg_ros.commands.certify import running_parameters
@@ -30,6 +30,9 @@ from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.suite import Suite, load_suite
 from dmp_cpg_ros.suite_table import KINDS, RECORDED_WALK, RECORDER, WALKING, namespace_rules
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.commands.fork_server import ForkServer
 
 OK, FAILED, INTERRUPTED = 0, 1, 128
 """Exit statuses: a run that ended well, a fall or a dead node; plus the number of the signal that
@@ -78,10 +81,13 @@ def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
         print(f"walk: '{plan.suite.file}': section '{section}' means no node in namespace "
               f"'{ros.namespace or '/'}'; '/**/{section.rpartition('/')[2]}' would",
               file=sys.stderr)
-    from dmp_cpg_ros.commands.suite_run import alone_in_domain
+    from dmp_cpg_ros.commands.fork_server import ForkServer
 
-    with alone_in_domain(ros.namespace):
-        return _walk(plan)
+    with ForkServer() as server:  # imports what nodes need while this process does
+        from dmp_cpg_ros.commands.suite_run import alone_in_domain
+
+        with alone_in_domain(ros.namespace):
+            return _walk(plan, server)
 
 
 def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _Plan:
@@ -124,7 +130,7 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
     return _Plan(scenario, suite, certificate, overrides, options, ros)
 
 
-def _walk(plan: _Plan) -> int:
+def _walk(plan: _Plan, server: ForkServer) -> int:
     """Run, record and report; returns the exit status."""
     begin, options = time.monotonic(), plan.options
     folder = run_folder.make_run_folder(options.out)
@@ -135,7 +141,7 @@ def _walk(plan: _Plan) -> int:
     print(f'certificate: {plan.certificate.explained()}; {plan.certificate.contraction_grade} '
           f'grade; at rest at most {plan.certificate.time_to_rest:.3f} s after a request',
           flush=True)
-    status = _run(plan, folder)
+    status = _run(plan, folder, server)
     try:
         if (folder / 'bag').is_dir():
             if status > INTERRUPTED:
@@ -180,7 +186,7 @@ def _found(name: str | Path, folder: str) -> Path:
     return find_config(Path(folder) / known if bare else known)
 
 
-def _run(plan: _Plan, folder: Path) -> int:
+def _run(plan: _Plan, folder: Path, server: ForkServer) -> int:
     """Bring the suite up, play, bring it down; returns the exit status."""
     from dmp_cpg_ros.commands.suite_run import InterruptedRunError, run_suite
 
@@ -196,7 +202,7 @@ def _run(plan: _Plan, folder: Path) -> int:
                  *(word for name, to in rules for word in ('-r', f'{name}:={to}'))]
     try:
         unrecorded = run_suite(
-            plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say,
+            plan.scenario, plan.suite.tick_ns, arguments, folder / 'logs', _say, server,
             lock_step=options.lock_step, processes=options.processes,
             view=options.view, visualization=options.visualization, respawn=options.respawn)
         if unrecorded:

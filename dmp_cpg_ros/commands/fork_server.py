@@ -1,0 +1,236 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A process that has imported what nodes need, and forks one whenever it is asked to.
+
+To import rclpy, its messages, NumPy and MuJoCo takes most of a node's start. Ten nodes that are
+forked pay it once; nothing of ROS runs yet where they are forked. Only the tracer that ROS 2 is
+linked with, LTTng, has threads from the first import on, and is told of every fork.
+
+Run as a program, ``PARENT SOCKET PADDING``, it is that process. What it forks becomes a child of
+its parent (``PR_SET_CHILD_SUBREAPER`` of prctl(2)), which waits for it as for any other, and ends
+with that parent, in whatever way it ends. Linux only.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import gc
+import json
+import os
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from types import TracebackType
+
+PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_CHILD_SUBREAPER = 1, 15, 36
+"""Of prctl(2): which signal a process gets when the thread that is its parent ends, its name, and
+whether it adopts the processes that descendants leave behind.
+"""
+
+MOST_BYTES = 100_000
+"""Longest request [bytes]: Linux takes twice that in one message."""
+
+TITLE_BYTES = 4000
+"""Room for the command line that ``ps`` shows [bytes]."""
+
+
+class Forked:
+    """A process that the server has forked, a child of this one.
+
+    Attributes
+    ----------
+    pid : int
+        Its number.
+    """
+
+    def __init__(self, pid: int) -> None:
+        """Note that it runs."""
+        self.pid = pid
+        self._status: int | None = None
+
+    def poll(self) -> int | None:
+        """Exit status, or less a signal's number; None while it runs."""
+        if self._status is None:
+            pid, status = os.waitpid(self.pid, os.WNOHANG)
+            self._status = os.waitstatus_to_exitcode(status) if pid else None
+        return self._status
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Wait for its end; returns as :meth:`poll`, or raises subprocess.TimeoutExpired."""
+        if self.poll() is None:
+            ended = os.pidfd_open(self.pid)
+            try:
+                select.select([ended], [], [], timeout)
+            finally:
+                os.close(ended)
+        status = self.poll()
+        if status is None:
+            raise subprocess.TimeoutExpired(str(self.pid), timeout or 0.0)
+        return status
+
+    def send_signal(self, number: int) -> None:
+        """Send it a signal, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        """End it at once."""
+        self.send_signal(signal.SIGKILL)
+
+
+class ForkServer:
+    """Forks processes that run executables of this package; a context manager.
+
+    It imports while this process goes on, and ends with :meth:`close`; what it has forked goes on.
+    """
+
+    def __init__(self, folder: str | None = None) -> None:
+        """Start the server, in a working folder."""
+        _prctl(PR_SET_CHILD_SUBREAPER, 1)
+        # Matrices of a few rows: threads of the algebra library would only contend for the cores.
+        self._environment = {'OPENBLAS_NUM_THREADS': '1', **os.environ, 'PYTHONUNBUFFERED': '1'}
+        self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            self._server = subprocess.Popen(
+                [sys.executable, '-W', 'ignore::DeprecationWarning:__main__',  # of the tracer
+                 __file__, str(os.getpid()), str(theirs.fileno()), ' ' * TITLE_BYTES],
+                stdin=subprocess.DEVNULL, start_new_session=True, cwd=folder,
+                pass_fds=(theirs.fileno(),), env=self._environment)
+
+    def start(self, command: Sequence[str], output: int = 1, errors: int = 2, *,
+              environment: Mapping[str, str] | None = None) -> Forked:
+        """Run ``python -m dmp_cpg_ros command`` in a session of its own, so that Ctrl-C reaches
+        this process only; it ends with this process.
+
+        Parameters
+        ----------
+        command : sequence of str
+            Name of the executable and its arguments.
+        output, errors : int
+            Descriptors of files to which it writes.
+        environment : mapping of str to str, optional
+            Variables that it finds changed or added; default: those of this process.
+
+        Raises
+        ------
+        OSError
+            If it cannot, because the server has ended perhaps.
+        """
+        changes = {name: value for name, value in (environment or os.environ).items()
+                   if self._environment.get(name) != value}
+        request = json.dumps([list(command), changes]).encode()
+        socket.send_fds(self._socket, [request], [output, errors])
+        if answer := self._socket.recv(64):
+            return Forked(int(answer))
+        raise ChildProcessError('the fork server has ended')
+
+    def close(self) -> None:
+        """End the server, which has nothing to finish."""
+        self._socket.close()
+        self._server.kill()
+        self._server.wait()
+
+    def __enter__(self) -> ForkServer:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None,
+                 traceback: TracebackType | None) -> None:
+        self.close()
+
+
+def _prctl(option: int, value: int | bytes) -> None:
+    ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
+
+
+def _serve(parent: int, requests: socket.socket) -> None:
+    """Fork for every request until there are no more; returns in what was forked, ready to run."""
+    _import_what_nodes_need()
+    _tell_tracer()
+    gc.collect()
+    gc.freeze()  # the collector of a child would otherwise write to, and so copy, all of it
+    while True:
+        message, files, _, _ = socket.recv_fds(requests, MOST_BYTES, 2)
+        if not message:
+            os._exit(0)
+        adopted, go = os.pipe()
+        said, say = os.pipe()
+        middle = os.fork()
+        if not middle:
+            os.close(go)
+            if pid := os.fork():
+                os.write(say, str(pid).encode())
+                os._exit(0)
+            os.read(adopted, 1)  # which ends when the server, the last that could write, says so
+            for descriptor in (adopted, said, say, requests.detach()):
+                os.close(descriptor)
+            return _become(parent, files, *json.loads(message))
+        os.waitpid(middle, 0)  # whose child is the parent's from now on
+        for descriptor in (go, adopted, say, *files):
+            os.close(descriptor)
+        requests.send(os.read(said, 64))
+        os.close(said)
+
+
+def _import_what_nodes_need() -> None:
+    """Import it; what cannot be imported is for the node to say."""
+    from dmp_cpg_ros.suite_table import SUITE_TABLE
+
+    for module in (*(kind.module for kind in SUITE_TABLE), 'dmp_cpg_ros.nodes.framework.execution',
+                   'dmp_cpg_ros.commands.composed_suite'):
+        with contextlib.suppress(Exception):
+            import_module(module)
+
+
+def _tell_tracer() -> None:
+    """Call before and after every fork what ``liblttng-ust-fork.so`` would."""
+    maps = Path('/proc/self/maps').read_text(encoding='utf-8')
+    former = ctypes.create_string_buffer(1024)  # a set of signals
+    for path in set(re.findall(r'/\S+/liblttng-ust[-.]\S+', maps)):
+        library = ctypes.CDLL(path)
+        for name in ('lttng_ust', 'ust'):  # since 2.13, and before
+            if hasattr(library, f'{name}_before_fork'):
+                os.register_at_fork(
+                    before=partial(library[f'{name}_before_fork'], former),
+                    after_in_parent=partial(library[f'{name}_after_fork_parent'], former),
+                    after_in_child=partial(library[f'{name}_after_fork_child'], former))
+                break
+
+
+def _become(parent: int, files: Sequence[int], command: Sequence[str],
+            changes: Mapping[str, str]) -> None:
+    """Be the process that was asked for: its session, files, environment, arguments, name."""
+    os.setsid()
+    for number, descriptor in enumerate(files, 1):
+        os.dup2(descriptor, number)
+        os.close(descriptor)
+    _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGTERM)
+    os.environ.update(changes)
+    _show([sys.executable, __file__, str(parent), *command])
+    _prctl(PR_SET_NAME, command[0].encode()[:15])
+    sys.argv = list(command)
+
+
+def _show(words: Sequence[str]) -> None:
+    """Let ``ps`` show a command line, as far as there is room, in the place of this program's."""
+    with contextlib.suppress(OSError, ValueError):
+        status = Path('/proc/self/stat').read_text(encoding='utf-8')
+        begin, end = map(int, status.rpartition(')')[2].split()[45:47])
+        if begin:
+            shown = b'\0'.join(map(os.fsencode, words))[:end - begin - 1]
+            ctypes.memmove(begin, shown.ljust(end - begin, b'\0'), end - begin)
+
+
+if __name__ == '__main__':
+    sys.path[0] = str(Path(__file__).parents[2])  # and not what lies in the working folder
+    _serve(int(sys.argv[1]), socket.socket(fileno=int(sys.argv[2])))
+    sys.exit(import_module('dmp_cpg_ros.__main__').run(sys.argv[0]))

@@ -1,0 +1,83 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the fork server starts is as if it had been started alone."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import ros_processes
+
+from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
+
+ros_domain = ros_processes.ros_domain
+WAIT_S = ros_processes.DEADLINE_S
+NODE = ('leg_transformation', '--ros-args', '-p', 'leg:=fl', '-p', 'autostart:=false')
+
+
+@pytest.fixture(scope='module')
+def server() -> Iterator[ForkServer]:
+    with ForkServer() as started:
+        yield started
+
+
+@pytest.fixture
+def node(server: ForkServer, ros_domain: int, tmp_path: Path) -> Iterator[Forked]:
+    with (tmp_path / 'output').open('wb') as output:
+        process = server.start(NODE, output.fileno(), output.fileno())
+    yield process
+    process.kill()
+    process.wait(WAIT_S)
+
+
+def command_of(process: Forked) -> list[str]:
+    """What ``ps`` shows."""
+    words = Path(f'/proc/{process.pid}/cmdline').read_text(encoding='utf-8')
+    return words.rstrip('\0').split('\0')
+
+
+def test_it_is_a_child_in_a_session_of_its_own_and_ps_shows_its_command(node: Forked) -> None:
+    ros_processes.wait_until(lambda: tuple(command_of(node)[-len(NODE):]) == NODE,
+                             what=lambda: str(command_of(node)))
+    status = Path(f'/proc/{node.pid}/stat').read_text(encoding='utf-8').rpartition(')')[2].split()
+    assert status[1:4] == [str(os.getpid()), str(node.pid), str(node.pid)]
+    assert str(os.getpid()) in command_of(node)
+
+
+def test_signals_reach_it_and_its_end_is_known(node: Forked) -> None:
+    with pytest.raises(subprocess.TimeoutExpired):
+        node.wait(0.0)
+    assert node.poll() is None
+    node.kill()
+    assert node.wait(WAIT_S) == node.poll() == -signal.SIGKILL
+    node.send_signal(signal.SIGINT)  # nobody else has its number yet; nothing is sent
+
+
+def test_it_does_what_its_command_does_alone(server: ForkServer, tmp_path: Path) -> None:
+    narrow = {'COLUMNS': '50'}
+    with (tmp_path / 'output').open('wb') as output:
+        process = server.start(['certify', '--help'], output.fileno(), environment=narrow)
+    alone = subprocess.run([sys.executable, '-m', 'dmp_cpg_ros', 'certify', '--help'],
+                           env={**os.environ, **narrow}, capture_output=True, check=True)
+    assert process.wait(WAIT_S) == 0
+    assert (tmp_path / 'output').read_bytes() == alone.stdout != b''
+    with (tmp_path / 'errors').open('wb') as errors:
+        refused = server.start(['certify', '--no-such-option'], 1, errors.fileno())
+    assert refused.wait(WAIT_S) == 2
+    assert b'--no-such-option' in (tmp_path / 'errors').read_bytes()
+
+
+def test_a_server_that_has_ended_says_so() -> None:
+    with ForkServer() as ended:
+        pass
+    with pytest.raises(OSError):
+        ended.start(NODE)
