@@ -14,6 +14,7 @@ import sys
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
+from functools import lru_cache
 from itertools import count
 from math import inf
 from pathlib import Path
@@ -31,6 +32,9 @@ _PARAMETERS_KEY = 'ros__parameters'
 
 LARGEST_FILE = 2**18
 """Longest file that is read [B]."""
+
+SHORT = 2**15
+"""Texts whose parse is kept are shorter [characters]."""
 
 DEEPEST = 32
 """Deepest nesting of mappings and lists."""
@@ -161,7 +165,7 @@ def parse_yaml(text: str, where: str) -> Any:
     if len(text) > LARGEST_FILE:
         raise DataError(f'{where} is longer than {LARGEST_FILE} characters')
     try:
-        node = _Composer(text).get_single_node()
+        node = _kept(text) if len(text) < SHORT else _Composer(text).get_single_node()
         return None if node is None else _value(node)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
@@ -239,6 +243,12 @@ class _Composer(yaml.SafeLoader):
         node = super().compose_node(parent, index)
         self._depth -= 1
         return node
+
+
+@lru_cache(maxsize=16)
+def _kept(text: str) -> yaml.Node | None:
+    """Parse a text that is parsed again: all nodes of a process read the same few files."""
+    return _Composer(text).get_single_node()
 
 
 def _value(node: yaml.Node) -> Any:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import gc
+import inspect
 import json
 import os
 import re
@@ -35,8 +36,13 @@ PR_SET_PDEATHSIG, PR_SET_NAME, PR_SET_CHILD_SUBREAPER = 1, 15, 36
 whether it adopts the processes that descendants leave behind.
 """
 
-MOST_BYTES = 100_000
-"""Longest request [bytes]: Linux takes twice that in one message."""
+MOST_BYTES = 200_000
+"""Longest request [bytes]: Linux takes a little more in one message."""
+
+OWN = {'OPENBLAS_NUM_THREADS': '1', 'PYTHONUNBUFFERED': '1'}
+"""Variables that have these values unless they are set: matrices have a few rows only, for which
+threads of the algebra library would contend for the cores; what nodes say is read at once.
+"""
 
 TITLE_BYTES = 4000
 """Room for the command line that ``ps`` shows [bytes]."""
@@ -95,15 +101,13 @@ class ForkServer:
     def __init__(self, folder: str | None = None) -> None:
         """Start the server, in a working folder."""
         _prctl(PR_SET_CHILD_SUBREAPER, 1)
-        # Matrices of a few rows: threads of the algebra library would only contend for the cores.
-        self._environment = {'OPENBLAS_NUM_THREADS': '1', **os.environ, 'PYTHONUNBUFFERED': '1'}
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
             self._server = subprocess.Popen(
                 [sys.executable, '-W', 'ignore::DeprecationWarning:__main__',  # of the tracer
                  __file__, str(os.getpid()), str(theirs.fileno()), ' ' * TITLE_BYTES],
                 stdin=subprocess.DEVNULL, start_new_session=True, cwd=folder,
-                pass_fds=(theirs.fileno(),), env=self._environment)
+                pass_fds=(theirs.fileno(),), env={**OWN, **os.environ})
 
     def start(self, command: Sequence[str], output: int = 1, errors: int = 2, *,
               environment: Mapping[str, str] | None = None) -> Forked:
@@ -117,16 +121,15 @@ class ForkServer:
         output, errors : int
             Descriptors of files to which it writes.
         environment : mapping of str to str, optional
-            Variables that it finds changed or added; default: those of this process.
+            Its environment; default: that of this process.
 
         Raises
         ------
         OSError
             If it cannot, because the server has ended perhaps.
         """
-        changes = {name: value for name, value in (environment or os.environ).items()
-                   if self._environment.get(name) != value}
-        request = json.dumps([list(command), changes]).encode()
+        wanted = os.environ if environment is None else environment
+        request = json.dumps([list(command), {**OWN, **wanted}]).encode()
         socket.send_fds(self._socket, [request], [output, errors])
         if answer := self._socket.recv(64):
             return Forked(int(answer))
@@ -152,26 +155,28 @@ def _prctl(option: int, value: int | bytes) -> None:
 
 def _serve(parent: int, requests: socket.socket) -> None:
     """Fork for every request until there are no more; returns in what was forked, ready to run."""
-    _import_what_nodes_need()
-    _tell_tracer()
+    _prepare()
     gc.collect()
     gc.freeze()  # the collector of a child would otherwise write to, and so copy, all of it
     while True:
         message, files, _, _ = socket.recv_fds(requests, MOST_BYTES, 2)
         if not message:
             os._exit(0)
+        command, environment = json.loads(message)
+        _read_ahead(command)
         adopted, go = os.pipe()
         said, say = os.pipe()
         middle = os.fork()
         if not middle:
             os.close(go)
-            if pid := os.fork():
-                os.write(say, str(pid).encode())
+            if os.fork():
                 os._exit(0)
             os.read(adopted, 1)  # which ends when the server, the last that could write, says so
+            _become(parent, files, command, environment)
+            os.write(say, str(os.getpid()).encode())
             for descriptor in (adopted, said, say, requests.detach()):
                 os.close(descriptor)
-            return _become(parent, files, *json.loads(message))
+            return
         os.waitpid(middle, 0)  # whose child is the parent's from now on
         for descriptor in (go, adopted, say, *files):
             os.close(descriptor)
@@ -179,14 +184,36 @@ def _serve(parent: int, requests: socket.socket) -> None:
         os.close(said)
 
 
-def _import_what_nodes_need() -> None:
-    """Import it; what cannot be imported is for the node to say."""
+def _prepare() -> None:
+    """Import what nodes need, and fill what they would fill; what is wrong is for them to say."""
     from dmp_cpg_ros.suite_table import SUITE_TABLE
 
-    for module in (*(kind.module for kind in SUITE_TABLE), 'dmp_cpg_ros.nodes.framework.execution',
-                   'dmp_cpg_ros.commands.composed_suite'):
-        with contextlib.suppress(Exception):
-            import_module(module)
+    with contextlib.suppress(Exception):
+        for name in (*(kind.module for kind in SUITE_TABLE), 'dmp_cpg_ros.robot.mujoco_robot',
+                     'dmp_cpg_ros.nodes.framework.execution', 'numpy.random',
+                     'dmp_cpg_ros.commands.composed_suite'):
+            import_module(name)
+        from lifecycle_msgs.srv import ChangeState
+        from rclpy.type_support import check_for_type_support
+
+        from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES
+        from dmp_cpg_ros.robot.model_reader import load_description
+        from dmp_cpg_ros.suite import load_gaits
+
+        for message in (ChangeState, *(interface.type for interface in INTERFACES.values())):
+            check_for_type_support(message)
+        load_description()
+        load_gaits()
+        inspect.getframeinfo(sys._getframe())  # looks through all modules; every first log does
+    _tell_tracer()
+
+
+def _read_ahead(arguments: Sequence[str]) -> None:
+    """Parse the parameter files of a command, which the next commands name, too."""
+    from dmp_cpg_ros.nodes.framework.parameters import shared_names
+
+    with contextlib.suppress(Exception):
+        shared_names(arguments)
 
 
 def _tell_tracer() -> None:
@@ -205,7 +232,7 @@ def _tell_tracer() -> None:
 
 
 def _become(parent: int, files: Sequence[int], command: Sequence[str],
-            changes: Mapping[str, str]) -> None:
+            environment: Mapping[str, str]) -> None:
     """Be the process that was asked for: its session, files, environment, arguments, name."""
     os.setsid()
     for number, descriptor in enumerate(files, 1):
@@ -214,7 +241,8 @@ def _become(parent: int, files: Sequence[int], command: Sequence[str],
     _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGTERM)
-    os.environ.update(changes)
+    os.environ.clear()
+    os.environ.update(environment)
     _show([sys.executable, __file__, str(parent), *command])
     _prctl(PR_SET_NAME, command[0].encode()[:15])
     sys.argv = list(command)

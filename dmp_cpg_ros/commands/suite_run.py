@@ -67,7 +67,7 @@ REST_NS = 4_000_000_000
 SETTLED_S = 0.3
 """Time without a new message after which the recording counts as complete [s]."""
 
-LOOK_S = 1.5
+LOOK_S = 1.0
 """How long the graph is searched for nodes of another suite [s]: discovery takes its time."""
 
 FIRST_WORD_S = 3.0

@@ -46,8 +46,7 @@ def command_of(process: Forked) -> list[str]:
 
 
 def test_it_is_a_child_in_a_session_of_its_own_and_ps_shows_its_command(node: Forked) -> None:
-    ros_processes.wait_until(lambda: tuple(command_of(node)[-len(NODE):]) == NODE,
-                             what=lambda: str(command_of(node)))
+    assert tuple(command_of(node)[-len(NODE):]) == NODE
     status = Path(f'/proc/{node.pid}/stat').read_text(encoding='utf-8').rpartition(')')[2].split()
     assert status[1:4] == [str(os.getpid()), str(node.pid), str(node.pid)]
     assert str(os.getpid()) in command_of(node)
@@ -63,11 +62,11 @@ def test_signals_reach_it_and_its_end_is_known(node: Forked) -> None:
 
 
 def test_it_does_what_its_command_does_alone(server: ForkServer, tmp_path: Path) -> None:
-    narrow = {'COLUMNS': '50'}
+    narrow = {**os.environ, 'COLUMNS': '50'}
     with (tmp_path / 'output').open('wb') as output:
         process = server.start(['certify', '--help'], output.fileno(), environment=narrow)
     alone = subprocess.run([sys.executable, '-m', 'dmp_cpg_ros', 'certify', '--help'],
-                           env={**os.environ, **narrow}, capture_output=True, check=True)
+                           env=narrow, capture_output=True, check=True)
     assert process.wait(WAIT_S) == 0
     assert (tmp_path / 'output').read_bytes() == alone.stdout != b''
     with (tmp_path / 'errors').open('wb') as errors:

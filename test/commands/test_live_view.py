@@ -82,7 +82,7 @@ class Client:
 
 @pytest.fixture(scope='module')
 def client(suite: Processes) -> Client:
-    client = Client(suite.python('-m', 'dmp_cpg_ros.commands.live_view'))
+    client = Client(suite.executable('live_view'))
     client.scene()
     return client
 
@@ -219,7 +219,7 @@ def lock_step_messages(folder: Path, *, looked_on: bool) -> list[bytes]:
     """Last messages of the oscillators and of the joints after a second in lock-step."""
     with reserved_domain() as domain, composed_suite(
             domain, folder, lock_step=True, gated=True, start_inhibited=False) as suite:
-        view = Client(suite.python('-m', 'dmp_cpg_ros.commands.live_view')) if looked_on else None
+        view = Client(suite.executable('live_view')) if looked_on else None
         ros, opener = Ros(domain), interface('mujoco_robot/advance_until')
         try:
             topics = [interface(name) for name in ('canonical_state', 'joint_states')]
@@ -260,13 +260,13 @@ def test_in_lock_step_it_looks_on_and_changes_nothing(tmp_path: Path) -> None:
 def test_without_a_suite_it_says_so() -> None:
     with reserved_domain() as domain:
         alone = Processes(domain)
-        process = alone.python('-m', 'dmp_cpg_ros.commands.live_view', '--wait', '0.5')
+        process = alone.executable('live_view', '--wait', '0.5')
         assert process.wait(PATIENCE_S) == 1, process
         assert 'live_view: no suite answers' in process.output
 
 
 def test_a_view_that_ends_lets_go(client: Client, suite: Processes, ros: Ros) -> None:
-    second = Client(suite.python('-m', 'dmp_cpg_ros.commands.live_view'))
+    second = Client(suite.executable('live_view'))
     second.scene()
     assert second.address != client.address
     commands = heard(ros, 'cmd_vel')

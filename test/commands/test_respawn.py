@@ -34,8 +34,8 @@ def walk(processes: Processes, folder: Path, duration_s: float, *arguments: str)
     scenario = folder / 'kills.yaml'
     scenario.write_text(json.dumps({'name': 'kills', 'duration': duration_s, 'events': [
         {'at': 0.3, 'command': {'v_x': 0.4}}]}), encoding='utf-8')
-    return processes.python('-m', 'dmp_cpg_ros', 'walk', str(scenario), '--no-report', '--out',
-                            str(folder / 'run'), *arguments)
+    return processes.executable('walk', str(scenario), '--no-report', '--out',
+                                str(folder / 'run'), *arguments)
 
 
 def send(process: NodeProcess, node: str, number: int) -> None:

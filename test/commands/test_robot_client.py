@@ -26,19 +26,24 @@ import yaml
 from ros_processes import NodeProcess, Processes, Ros, composed_suite, reserved_domain, wait_until
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
-from dmp_cpg_ros.nodes.messages.conversions import read_body_mode, read_state_word
+from dmp_cpg_ros.nodes.messages.conversions import (
+    DRIVE_MODES,
+    read_body_mode,
+    read_drive_mode,
+    read_state_word,
+)
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.suite_table import WALKING_NODES
 
 shared_domain, suite, ros = (
     ros_processes.shared_domain, ros_processes.shared_suite, ros_processes.shared_ros)
 
-CLIENT = ('-m', 'dmp_cpg_ros.commands.robot_client', '--wait', '20')
+CLIENT = ('robot_client', '--wait', '20')
 
 
 def said(processes: Processes, *arguments: str, status: int = 0) -> str:
     """What the client prints, by default when all goes well."""
-    return told(processes.python(*CLIENT, *arguments), status)
+    return told(processes.executable(*CLIENT, *arguments), status)
 
 
 def refused(processes: Processes, *arguments: str, status: int = 1) -> str:
@@ -63,6 +68,14 @@ def await_stop(ros: Ros, word: str, name: str = 'inhibition_state') -> None:
                    what=lambda: word)
 
 
+def await_following(ros: Ros, name: str = 'drive_mode') -> None:
+    """Wait until the robot follows its legs, which come up after it has begun to wait for them."""
+    topic = interface('drive_mode')
+    drives = ros.collect(topic.type, name, topic.reader_qos)
+    ros.spin_until(lambda: drives and read_drive_mode(drives[-1]) == DRIVE_MODES[0],
+                   what=lambda: f'{drives}')
+
+
 def await_mode(ros: Ros, mode: str) -> None:
     """Wait for a mode of the body."""
     topic = interface('body_mode')
@@ -73,8 +86,9 @@ def await_mode(ros: Ros, mode: str) -> None:
 def test_without_a_suite_it_says_where_it_looked() -> None:
     with reserved_domain() as empty:
         process = subprocess.run(
-            [sys.executable, *CLIENT[:2], '--wait', '0.5', 'inhibit'], check=False, text=True,
-            capture_output=True, timeout=60, env={**os.environ, 'ROS_DOMAIN_ID': str(empty)})
+            [sys.executable, '-m', 'dmp_cpg_ros', CLIENT[0], '--wait', '0.5', 'inhibit'],
+            check=False, text=True, capture_output=True, timeout=60,
+            env={**os.environ, 'ROS_DOMAIN_ID': str(empty)})
     assert process.returncode == 1
     assert f'no suite answers in ROS domain {empty}: nobody offers' in process.stderr
     assert 'start one with walk' in process.stderr
@@ -87,10 +101,11 @@ def test_a_suite_in_a_namespace_is_found_there_and_elsewhere_named(
                              interface('reference').reader_qos)
     with composed_suite(shared_domain, tmp_path, '-r', '__ns:=/robot1') as suite:
         await_stop(ros, 'at_rest', 'robot1/inhibition_state')
-        elsewhere = suite.python(*CLIENT, '--wait', '10', 'inhibit')
+        await_following(ros, 'robot1/drive_mode')
+        elsewhere = suite.executable(*CLIENT, '--wait', '10', 'inhibit')
         answer = said(suite, 'resume', '--ros-args', '-r', '__ns:=/robot1')
         assert answer.startswith('walking in')
-        suite.python(*CLIENT, '--namespace', 'robot1', 'cmd_vel', '0.3')
+        suite.executable(*CLIENT, '--namespace', 'robot1', 'cmd_vel', '0.3')
         ros.spin_until(lambda: any(entry.twist.linear.x > 0.2 for entry in references))
         assert 'ready' in said(suite, '--namespace', '/robot1', 'nodes')
         assert '--namespace /robot1' in told(elsewhere)
@@ -106,7 +121,7 @@ def test_all_nodes_are_ready(suite: Processes) -> None:
 def test_a_request_is_asked_once_and_its_answer_printed(
         suite: Processes, ros: Ros, request: pytest.FixtureRequest) -> None:
     # A command starts the gait, and keeps the automatic stop away.
-    driving = suite.python(*CLIENT, 'cmd_vel', '0.2')
+    driving = suite.executable(*CLIENT, 'cmd_vel', '0.2')
     request.addfinalizer(driving.kill)
     await_stop(ros, 'walking')
     for command, verb, word in (
@@ -124,7 +139,7 @@ def test_a_velocity_reaches_the_reference_and_ends_with_zero(suite: Processes, r
     references = ros.collect(interface('reference').type, 'reference',
                              interface('reference').reader_qos)
     said(suite, 'resume')
-    client = suite.python(*CLIENT, 'cmd_vel', '-0.2', '0.05', '0.1', '--rate', '20')
+    client = suite.executable(*CLIENT, 'cmd_vel', '-0.2', '0.05', '0.1', '--rate', '20')
     ros.spin_until(
         lambda: sent and references and abs(references[-1].twist.linear.x + 0.2) < 0.01)
     twist = references[-1].twist
@@ -167,7 +182,7 @@ def test_a_push_is_taken_once(suite: Processes, ros: Ros) -> None:
 
 def test_parameters_are_read_set_and_refused_with_the_reason(suite: Processes) -> None:
     owner = 'canonical_oscillators'
-    nobody = suite.python(*CLIENT, '--wait', '10', 'param', 'get', 'oscillators', 'rho')
+    nobody = suite.executable(*CLIENT, '--wait', '10', 'param', 'get', 'oscillators', 'rho')
     assert 'cadence_scale' in said(suite, 'param', 'list', owner).splitlines()
     assert said(suite, 'param', 'set', owner, 'rho', '9') == 'Set parameter successful'
     assert said(suite, 'param', 'get', f'/{owner}', 'rho') == '9.0'
@@ -180,7 +195,7 @@ def test_parameters_are_read_set_and_refused_with_the_reason(suite: Processes) -
 
 
 def test_a_message_is_printed_as_yaml(suite: Processes) -> None:
-    nothing = suite.python(*CLIENT, '--wait', '10', 'echo', 'joint_stats', '--once')
+    nothing = suite.executable(*CLIENT, '--wait', '10', 'echo', 'joint_stats', '--once')
     (message, _) = yaml.safe_load_all(said(suite, 'echo', 'joint_states', '--once'))
     assert len(message['name']) == len(message['position']) == 3 * len(LEGS)
     assert 'joint_states' in told(nothing)
@@ -199,8 +214,9 @@ class Terminal:
         self.inside = inside
         self.output = ''
         self.process = subprocess.Popen(
-            [sys.executable, *CLIENT, *arguments], stdin=inside, stdout=inside, stderr=inside,
-            env=processes.environment, start_new_session=True)
+            [sys.executable, '-m', 'dmp_cpg_ros', *CLIENT, *arguments],
+            stdin=inside, stdout=inside, stderr=inside, env=processes.environment,
+            start_new_session=True)
 
     def read(self) -> None:
         if select.select([self.end], [], [], 0.02)[0]:
@@ -261,8 +277,8 @@ def test_a_terminated_teleop_leaves_the_terminal_as_it_was(terminal: Terminal) -
 
 
 def test_keys_need_a_terminal(suite: Processes) -> None:
-    process = subprocess.run([sys.executable, *CLIENT, 'teleop'], env=suite.environment,
-                             stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                             timeout=90, check=False)
+    process = subprocess.run([sys.executable, '-m', 'dmp_cpg_ros', *CLIENT, 'teleop'],
+                             env=suite.environment, stdin=subprocess.DEVNULL,
+                             capture_output=True, text=True, timeout=90, check=False)
     assert process.returncode == 1
     assert 'terminal' in process.stderr

@@ -75,8 +75,8 @@ def test_one_vote_does_not_stop_the_nodes_and_three_do(
         processes: Processes, tmp_path: Path) -> None:
     scenario, out = tmp_path / 'votes.yaml', tmp_path / 'run'
     scenario.write_text(SCENARIO, encoding='utf-8')
-    process = processes.python('-m', 'dmp_cpg_ros.commands.walk', str(scenario), '--lock-step',
-                               '--composed', '--no-report', '--out', str(out))
+    process = processes.executable('walk', str(scenario), '--lock-step',
+                                   '--composed', '--no-report', '--out', str(out))
     assert process.wait(RUN_S) == 0, process
     recording, ticks = load_recording(out / 'bag'), plain_run(scenario)
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])

@@ -61,8 +61,8 @@ RUN_S = 240.0
 def start(processes: Processes, text: str, folder: Path, *options: str) -> NodeProcess:
     scenario = folder / 'scenario.yaml'
     scenario.write_text(text, encoding='utf-8')
-    return processes.python('-m', 'dmp_cpg_ros.commands.walk', str(scenario), '--no-report',
-                            '--out', str(folder / 'run'), *options)
+    return processes.executable('walk', str(scenario), '--no-report',
+                                '--out', str(folder / 'run'), *options)
 
 
 def plain_run(scenario_file: Path) -> tuple[list[RobotState], list[Any]]:

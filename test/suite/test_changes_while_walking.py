@@ -63,9 +63,9 @@ def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
     plain.write_text(SCENARIO.format(refused='', leg=leg), encoding='utf-8')
     settings = [item for name, value in OVERRIDES.items()
                 for item in ('--set', f'{name}:={value}')]
-    process = processes.python('-m', 'dmp_cpg_ros.commands.walk', str(asked), '--lock-step',
-                               '--processes', 'blocks', '--no-report', '--out',
-                               str(tmp_path / 'run'), *settings)
+    process = processes.executable('walk', str(asked), '--lock-step',
+                                   '--processes', 'blocks', '--no-report', '--out',
+                                   str(tmp_path / 'run'), *settings)
     assert process.wait(240.0) == 0, process
     said = process.output
     refusals = re.findall(r'refused: (.*)', said)

@@ -85,9 +85,8 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def start_walk(processes: Processes, scenario: Path, out: Path, *options: str) -> NodeProcess:
-    return processes.python(
-        '-m',
-        'dmp_cpg_ros.commands.walk',
+    return processes.executable(
+        'walk',
         str(scenario),
         '--no-report',
         '--out',
@@ -295,9 +294,7 @@ def test_ctrl_c_ends_the_run_with_a_readable_bag(
 def test_bad_input_is_refused_with_what_is_valid(
     processes: Processes, tmp_path: Path, arguments: tuple[str, ...], text: str
 ) -> None:
-    process = processes.python(
-        '-m', 'dmp_cpg_ros.commands.walk', *arguments, '--out', str(tmp_path / 'run')
-    )
+    process = processes.executable('walk', *arguments, '--out', str(tmp_path / 'run'))
     assert process.wait() == 2
     assert text in process.output
 

@@ -43,13 +43,12 @@ def test_a_walk_is_learned_from_its_recording_and_walked_again(
     scenario.write_text(SCENARIO, encoding='utf-8')
 
     def walk(name: str, *options: str) -> int:
-        return processes.python(
-            '-m', 'dmp_cpg_ros.commands.walk', str(scenario), '--no-report', '--lock-step',
+        return processes.executable(
+            'walk', str(scenario), '--no-report', '--lock-step',
             '--composed', '--out', str(tmp_path / name), *options).wait(RUN_S)
 
     assert walk('shown') == 0
-    learned = processes.python('-m', 'dmp_cpg_ros.commands.learn', str(tmp_path / 'shown'),
-                               '--motion', str(file))
+    learned = processes.executable('learn', str(tmp_path / 'shown'), '--motion', str(file))
     assert learned.wait(RUN_S) == 0, learned
     assert walk('played', '--motion', str(file)) == 0
     shown, played = (json.loads((tmp_path / name / 'metrics.json').read_text(encoding='utf-8'))

@@ -187,8 +187,8 @@ class RobotTiming:
                 'latency_ms_p50': half, 'latency_ms_p99': most}
 
 
-ASK_AGAIN_S = 2.0
-"""Time after which a request without an answer is repeated [s]."""
+ASK_AGAIN_S = 0.25, 2.0
+"""Time after which a request without an answer is repeated, at first and at most [s]."""
 
 
 NO_ANSWER = 'it does not answer'
@@ -233,24 +233,27 @@ class ReadinessOfOthers:
         """Create the clients."""
         self._node = node
         self._clients = {name: node.create_client(Trigger, f'{name}/ready') for name in names}
-        self._asked: dict[str, tuple[float, Future]] = {}
+        self._asked: dict[str, tuple[float, float, Future]] = {}
         self._said: dict[str, str] = {}
 
     def missing(self) -> list[str]:
         """Take answers and ask again, without waiting; returns who has not said yes, and why."""
         for name, client in list(self._clients.items()):
-            asked_s, future = self._asked.get(name, (-math.inf, Future()))
+            asked_s, patience_s, future = self._asked.get(name, (-math.inf, 0.0, Future()))
             answer = future.result() if future.done() else None
             if answer is not None and answer.success:
                 self._node.destroy_client(self._clients.pop(name))
                 continue
             if answer is not None:
                 self._said[name] = answer.message
-            # A response is lost where the server does not know the client yet.
-            lost = time.monotonic() > asked_s + ASK_AGAIN_S
-            if (answer is not None or lost) and client.service_is_ready():
+            # A response is lost where the server does not know the client yet; it is late where
+            # the machine is busy, and then the next one is waited for longer.
+            now, (first_s, most_s) = time.monotonic(), ASK_AGAIN_S
+            if (answer is not None or now > asked_s + patience_s) and client.service_is_ready():
+                patience_s = min(2.0 * patience_s, most_s) if answer is None else 0.0
                 client.remove_pending_request(future)
-                self._asked[name] = time.monotonic(), client.call_async(Trigger.Request())
+                self._asked[name] = (now, max(first_s, patience_s),
+                                     client.call_async(Trigger.Request()))
         return [f'{name}: {self._said.get(name, NO_ANSWER)}' for name in self._clients]
 
 
