@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # The same examples in every run, and no limit on the time of one: machines differ.
@@ -21,3 +22,15 @@ _shell = subprocess.run(
     ['sh', '-c', '. "$0" && env -0', str(Path(__file__).parent.parent / 'environment.sh')],
     env={**os.environ, 'VIRTUAL_ENV': sys.prefix}, capture_output=True, text=True, check=True)
 os.environ.update(line.split('=', 1) for line in _shell.stdout.split('\0') if line)
+
+LONG = ('suite', 'commands', 'studies', 'nodes')
+"""Folders whose tests walk or start processes, those that take longest first."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with what takes long: workers that share the tests then end at the same time."""
+    def rank(item: pytest.Item) -> int:
+        folder = item.path.relative_to(Path(__file__).parent).parts[0]
+        return LONG.index(folder) if folder in LONG else len(LONG)
+
+    items.sort(key=rank)

@@ -188,24 +188,38 @@ def _prepare() -> None:
     """Import what nodes need, and fill what they would fill; what is wrong is for them to say."""
     from dmp_cpg_ros.suite_table import SUITE_TABLE
 
-    with contextlib.suppress(Exception):
-        for name in (*(kind.module for kind in SUITE_TABLE), 'dmp_cpg_ros.robot.mujoco_robot',
-                     'dmp_cpg_ros.nodes.framework.execution', 'numpy.random',
-                     'dmp_cpg_ros.commands.composed_suite'):
+    for name in (*(kind.module for kind in SUITE_TABLE), 'dmp_cpg_ros.robot.mujoco_robot',
+                 'dmp_cpg_ros.nodes.framework.execution', 'numpy.random',
+                 'dmp_cpg_ros.commands.composed_suite'):
+        with contextlib.suppress(Exception):
             import_module(name)
-        from lifecycle_msgs.srv import ChangeState
-        from rclpy.type_support import check_for_type_support
-
-        from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES
-        from dmp_cpg_ros.robot.model_reader import load_description
-        from dmp_cpg_ros.suite import load_gaits
-
-        for message in (ChangeState, *(interface.type for interface in INTERFACES.values())):
-            check_for_type_support(message)
-        load_description()
-        load_gaits()
-        inspect.getframeinfo(sys._getframe())  # looks through all modules; every first log does
+    for fill in (load_type_supports, read_own_files):
+        with contextlib.suppress(Exception):
+            fill()
+    # rclpy names the line of a log message; for its first one it looks through all modules.
+    inspect.getframeinfo(sys._getframe())
     _tell_tracer()
+
+
+def load_type_supports() -> None:
+    """Load what publishers, readers and services of the suite's messages need."""
+    from lifecycle_msgs.srv import ChangeState
+    from rclpy.type_support import check_for_type_support
+
+    from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES
+
+    for message in (ChangeState, *(interface.type for interface in INTERFACES.values())):
+        if hasattr(type(message), '_TYPE_SUPPORT'):  # and not a stand-in for one that is missing
+            check_for_type_support(message)
+
+
+def read_own_files() -> None:
+    """Parse the package's robot and gaits; what was parsed is kept."""
+    from dmp_cpg_ros.robot.model_reader import load_description
+    from dmp_cpg_ros.suite import load_gaits
+
+    load_description()
+    load_gaits()
 
 
 def _read_ahead(arguments: Sequence[str]) -> None:

@@ -17,6 +17,7 @@ pytest.importorskip('rclpy')
 
 import ros_processes
 
+from dmp_cpg_ros.commands import fork_server
 from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
 
 ros_domain = ros_processes.ros_domain
@@ -73,6 +74,11 @@ def test_it_does_what_its_command_does_alone(server: ForkServer, tmp_path: Path)
         refused = server.start(['certify', '--no-such-option'], 1, errors.fileno())
     assert refused.wait(WAIT_S) == 2
     assert b'--no-such-option' in (tmp_path / 'errors').read_bytes()
+
+
+def test_what_it_prepares_for_nodes_is_there() -> None:
+    fork_server.load_type_supports()
+    fork_server.read_own_files()
 
 
 def test_a_server_that_has_ended_says_so() -> None:
