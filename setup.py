@@ -111,6 +111,8 @@ setup(
         'mujoco>=3.2.7',
         'rosbags>=0.10',
         'mcap>=1.1',
+        'lz4>=4.0',
+        'zstandard>=0.18',
         'PyYAML>=6.0',
         'matplotlib>=3.6',
         'pillow>=9.4',

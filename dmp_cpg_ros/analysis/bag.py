@@ -4,7 +4,8 @@
 
 The usual readers refuse an MCAP file that was not closed, for it has no summary, and one with
 channels that are not ROS's. Such a file is read as a stream, record by record, up to where it
-breaks off, and written anew. The file itself stays as it is.
+breaks off, and written anew. The file itself stays as it is. What is packed may be hostile: all
+that is unpacked of a file is bounded by its size.
 """
 
 from __future__ import annotations
@@ -12,28 +13,35 @@ from __future__ import annotations
 import fcntl
 import filecmp
 import hashlib
+import heapq
 import logging
 import os
 import re
 import struct
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from pathlib import Path
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
+from zlib import crc32
 
+import lz4.frame
+import zstandard
 from mcap.exceptions import McapError
-from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC, Writer
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-from dmp_cpg_ros.configuration import naming, numbered
-from dmp_cpg_ros.core.errors import DataError, MissingFileError
+from dmp_cpg_ros.configuration import load_yaml, naming, numbered
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError, MissingFileError
 from dmp_cpg_ros.core.parameters import LONGEST_SHOWN, shown
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -41,6 +49,12 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 """Definitions of the messages that are read; those in a bag are not trusted."""
 
 STORAGE_SUFFIXES = ('.mcap', '.db3')
+
+PACKED_SUFFIX = '.zstd'
+"""Of storage files that are compressed as a whole."""
+
+Received = tuple[Connection, int, bytes]
+"""Connection, record time [ns] and bytes of a message."""
 
 DIGESTED = ('canonical_state', 'joint_states', 'joint_targets')
 """Topics whose payloads have digests."""
@@ -60,7 +74,7 @@ def find_bag(path: Path | str) -> Path:
     if not path.exists():
         raise MissingFileError(f"'{path}' does not exist; name a bag's or a run's folder")
     if path.is_file():
-        if path.suffix in STORAGE_SUFFIXES:
+        if _is_storage(path):
             return path
         if path.suffix == '.yaml':
             path = path.parent
@@ -88,14 +102,11 @@ def opened(bag: Path) -> Iterator[AnyReader]:
         together.
     """
     with ExitStack() as stack, naming(bag):
+        files = [closed(unpacked(file, stack), bag, stack) for file in _parts(bag)]
         try:
-            reader = _reader([bag])
-        except DataError as damage:
-            files = [closed(file, bag, stack) for file in _parts(bag, damage)]
-            try:
-                reader = _reader(files)
-            except DataError:
-                reader = _reader([ros_part(file, stack) for file in files])
+            reader = _reader(files)
+        except DataError:
+            reader = _reader([ros_part(file, stack) for file in files])
         stack.callback(reader.close)
         yield reader
 
@@ -105,15 +116,148 @@ def base_name(topic: str) -> str:
     return topic.rsplit('/', 1)[-1]
 
 
-def recorded(reader: AnyReader, connections: Collection[Connection]
-             ) -> Iterator[tuple[Connection, int, bytes]]:
+def recorded(reader: AnyReader, connections: Collection[Connection]) -> Iterator[Received]:
     """Messages of some connections with their record times [ns], as they were recorded; raises
-    DataError where the bag is damaged.
+    DataError where the bag is damaged or unpacks into too much.
     """
     try:
-        yield from reader.messages(connections) if connections else ()
+        parts = [_of_storage(of.storage, connections) for of in reader.readers]
+        yield from parts[0] if len(parts) == 1 else heapq.merge(*parts, key=lambda of: of[1])
     except Exception as error:
         raise DataError(f'the bag is damaged: {told(error)}') from error
+
+
+def _of_storage(storage: Any, connections: Collection[Connection]) -> Iterator[Received]:
+    """Messages of one file."""
+    wanted = {(of.topic, of.msgtype): of for of in connections}
+    known = {of.id: wanted[of.topic, of.msgtype] for of in storage.connections
+             if (of.topic, of.msgtype) in wanted}
+    if not known:
+        return
+    unpack = Unpacker(storage.path)
+    messages = (_of_mcap(storage.bio, known, unpack) if storage.path.suffix == '.mcap' else
+                ((known[of.id], time, raw) for of, time, raw in storage.messages(
+                    [of for of in storage.connections if of.id in known])))
+    for connection, time, raw in messages:
+        if raw[:4] == zstandard.FRAME_HEADER:  # CDR begins with 0
+            raw = unpack(raw, 'zstd')
+        yield connection, time, raw
+
+
+def _of_mcap(file: BinaryIO, known: dict[int, Connection], unpack: Unpacker
+             ) -> Iterator[Received]:
+    """Messages of an MCAP file by record time; those of one time as they lie there."""
+    waiting: list[tuple[int, int, bytes]] = []
+    blocks = sorted(_blocks(file), key=lambda block: block.start_ns)
+    for number, block in enumerate(blocks):
+        file.seek(block.offset)
+        data = file.read(block.size)
+        if block.packing:
+            data = unpack(data, block.packing)
+        if len(data) != block.unpacked_size or block.crc not in (0, crc32(data)):
+            raise DataError(f'the chunk at byte {block.offset} is not what was written')
+        waiting += _messages(data, known)
+        waiting.sort(key=lambda message: message[0])
+        border = blocks[number + 1].start_ns if number + 1 < len(blocks) else None
+        count = len(waiting)
+        if border is not None:
+            while count and waiting[count - 1][0] >= border:
+                count -= 1
+        yield from ((known[channel], time, raw) for time, channel, raw in waiting[:count])
+        del waiting[:count]
+
+
+def _messages(records: bytes, known: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+    """Record times [ns], channels and bytes of the messages among some records."""
+    at, end = 0, len(records)
+    while at + _RECORD.size <= end:  # no message is shorter
+        kind, size, channel, _, time, _ = _RECORD.unpack_from(records, at)
+        past = at + 9 + size
+        if past > end:
+            raise DataError('a record is longer than its chunk')
+        if kind == Opcode.MESSAGE and channel in known:
+            yield time, channel, records[at + _RECORD.size : past]
+        at = past
+
+
+class _Block(NamedTuple):
+    """Place of consecutive records in a file, which may be packed."""
+
+    start_ns: int
+    offset: int
+    size: int
+    unpacked_size: int
+    crc: int
+    packing: str
+
+
+_RECORD = struct.Struct('<BQHIQQ')
+"""Kind and length of any record; channel, number, record time, publish time of a message."""
+
+
+def _blocks(file: BinaryIO) -> Iterator[_Block]:
+    """Chunks of an MCAP file, and messages that are in none."""
+    at, end = len(MCAP0_MAGIC), file.seek(0, os.SEEK_END)
+    while at + _RECORD.size <= end:
+        file.seek(at)
+        kind, size, _, _, time, _ = _RECORD.unpack(file.read(_RECORD.size))
+        if kind == Opcode.DATA_END:
+            return
+        if kind == Opcode.MESSAGE:
+            yield _Block(time, at, 9 + size, 9 + size, 0, '')
+        elif kind == Opcode.CHUNK:
+            file.seek(at + 9)
+            start, _, unpacked_size, crc, length = struct.unpack('<QQQII', file.read(32))
+            packing = file.read(length).decode()
+            packed, = struct.unpack('<Q', file.read(8))
+            yield _Block(start, file.tell(), packed, unpacked_size, crc, packing)
+        at += 9 + size
+
+
+PACKINGS: dict[str, Callable[[BinaryIO], Any]] = {
+    'zstd': lambda file: zstandard.ZstdDecompressor().stream_reader(
+        file, read_across_frames=True, closefd=False),
+    'lz4': lz4.frame.LZ4FrameFile}
+"""Readers of packed bytes, by the names that MCAP has for them."""
+
+DAMAGE = (zstandard.ZstdError, EOFError, MemoryError, OverflowError, RuntimeError, ValueError)
+"""What is raised by packed bytes that are damaged."""
+
+MOST_UNPACKED = 2**26, 100
+"""Bytes that a file may unpack into: so many, and so many for each of its own."""
+
+
+class Unpacker:
+    """Unpacks what is packed in one file, all in all no more than ``MOST_UNPACKED``.
+
+    Parameters
+    ----------
+    file : Path
+        The file.
+    """
+
+    def __init__(self, file: Path) -> None:
+        """Nothing is unpacked yet."""
+        some, times = MOST_UNPACKED
+        self._most = self._left = some + times * file.stat().st_size
+
+    def __call__(self, packed: bytes, packing: str) -> bytes:
+        """Unpacked bytes; raises as :meth:`copy` does."""
+        target = BytesIO()
+        self.copy(BytesIO(packed), target, packing)
+        return target.getvalue()
+
+    def copy(self, source: BinaryIO, target: BinaryIO, packing: str) -> None:
+        """Unpack into a file; raises DataError when it is too much, and ``DAMAGE``."""
+        if packing not in PACKINGS:
+            raise ValueError(f"packing '{packing}' is not known; valid are {', '.join(PACKINGS)}")
+        with PACKINGS[packing](source) as stream:
+            while piece := stream.read(2**20):
+                self._left -= len(piece)
+                if self._left < 0:
+                    raise DataError(f'it unpacks into more than {self._most} bytes, which are '
+                                    'more than a recording of its size holds')
+                target.write(piece)
 
 
 def decoded(reader: AnyReader, connections: Collection[Connection], skipped: Counter[str],
@@ -131,20 +275,25 @@ def decoded(reader: AnyReader, connections: Collection[Connection], skipped: Cou
         names them at the end.
     """
     for connection, bag_ns, raw in recorded(reader, connections):
-        message = _message(raw, connection)
+        message = message_of(raw, connection.msgtype)
         if message is None:
             skipped[connection.topic] += 1
         else:
             yield connection, bag_ns, message
+    warn_of(skipped)
+
+
+def warn_of(skipped: Counter[str]) -> None:
+    """Name the topics of messages that were left out, if there are any."""
     if skipped:
         listed = ', '.join(f'{count} on {topic}' for topic, count in sorted(skipped.items()))
-        logging.getLogger(__name__).warning('left out what cannot be decoded: %s', listed)
+        _LOG.warning('left out what cannot be decoded: %s', listed)
 
 
-def _message(raw: bytes, connection: Connection) -> Any | None:
-    """Message that some bytes are; None when they are none."""
+def message_of(raw: bytes, kind: str) -> Any | None:
+    """Message of a type that some bytes are; None when they are none."""
     try:
-        return STORE.deserialize_cdr(raw, connection.msgtype)
+        return STORE.deserialize_cdr(raw, kind)
     except (SerdeError, ArithmeticError, LookupError, MemoryError, ValueError, struct.error):
         return None
 
@@ -168,13 +317,18 @@ def told(error: Exception) -> str:
     return shown(error) if len(str(error)) > LONGEST_SHOWN else str(error) or repr(error)
 
 
-def _parts(bag: Path, damage: DataError) -> list[Path]:
-    """Files of a bag whose metadata are of no help."""
+def _parts(bag: Path) -> list[Path]:
+    """Files of a bag: those that its metadata name, or that are named as parts are."""
     files = [bag] if bag.is_file() else _storage_files(bag)
     if not files:
-        raise damage
+        raise DataError(f"'{bag}' cannot be read: it has metadata, but no *.mcap and no *.db3")
+    with suppress(DmpCpgError, LookupError, TypeError):
+        described = load_yaml(bag / 'metadata.yaml')['rosbag2_bagfile_information']
+        named = [bag / PurePath(name).name for name in described['relative_file_paths']]
+        if named and set(named) <= set(files):
+            return named
     split = re.compile(rf'{re.escape(bag.resolve().name)}_(\d+)')
-    numbers = [split.fullmatch(file.stem) for file in files]
+    numbers = [split.fullmatch(file.name.split('.', 1)[0]) for file in files]
     if len(files) > 1 and not all(numbers):
         raise DataError(
             f"'{bag}' holds {len(files)} recordings and no usable metadata.yaml that makes them "
@@ -183,7 +337,11 @@ def _parts(bag: Path, damage: DataError) -> list[Path]:
 
 
 def _storage_files(folder: Path) -> list[Path]:
-    return sorted(file for file in folder.iterdir() if file.suffix in STORAGE_SUFFIXES)
+    return sorted(file for file in folder.iterdir() if _is_storage(file))
+
+
+def _is_storage(file: Path) -> bool:
+    return file.name.removesuffix(PACKED_SUFFIX).endswith(STORAGE_SUFFIXES)
 
 
 def payload_digests(path: Path | str) -> dict[str, str]:
@@ -213,7 +371,8 @@ def payload_digests(path: Path | str) -> dict[str, str]:
         used = [c for c in reader.connections if base_name(c.topic) in DIGESTED]
         for connection, _, raw in recorded(reader, used):
             key = base_name(connection.topic)
-            message = None if key == 'joint_states' else _message(raw, connection)
+            message = (None if key == 'joint_states'
+                       else message_of(raw, connection.msgtype))
             # One publisher per leg; they interleave as they like.
             if message is not None and key == 'joint_targets':
                 first = message.name[0] if message.name else 'unnamed'
@@ -231,6 +390,19 @@ _LOG = logging.getLogger(__name__)
 
 ROS_SCHEMAS = ('ros2msg', 'ros2idl', 'omgidl')
 """Encodings of definitions that readers of ROS know."""
+
+
+def unpacked(file: Path, stack: ExitStack) -> Path:
+    """Return a file that is not packed, or a temporary copy that is not; raises DataError."""
+    if file.suffix != PACKED_SUFFIX:
+        return file
+    copy = _scratch(None, stack) / file.stem
+    try:
+        with file.open('rb') as source, copy.open('wb') as target:
+            Unpacker(file).copy(source, target, 'zstd')
+    except (OSError, *DAMAGE) as error:
+        raise DataError(f"'{file}' cannot be unpacked: {told(error)}") from error
+    return copy
 
 
 def closed(file: Path, bag: Path, stack: ExitStack) -> Path:
@@ -254,7 +426,7 @@ def closed(file: Path, bag: Path, stack: ExitStack) -> Path:
     DataError
         If it holds no complete message, is still being recorded, or cannot be copied.
     """
-    if file.suffix != '.mcap' or _is_closed(file):
+    if _is_whole(file):
         return file
     bag = bag.resolve()
     try:
@@ -288,12 +460,29 @@ def ros_part(file: Path, stack: ExitStack) -> Path:
     return copy
 
 
-def _is_closed(file: Path) -> bool:
-    """Whether an MCAP file ends as one that was closed."""
+_FOOTER = struct.Struct('<BQQQI8s')
+_INDEX = {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.STATISTICS}
+
+
+def _is_whole(file: Path) -> bool:
+    """Whether a storage file is not packed and, if it is of MCAP, has what readers look for at
+    its end; without, they would unpack it.
+    """
+    if file.suffix != '.mcap':
+        return file.suffix != PACKED_SUFFIX
     with file.open('rb') as stream:
-        size = stream.seek(0, os.SEEK_END)
-        stream.seek(max(0, size - len(MCAP0_MAGIC)))
-        return stream.read() == MCAP0_MAGIC
+        end = max(0, stream.seek(0, os.SEEK_END) - _FOOTER.size)
+        stream.seek(end)
+        footer = stream.read()
+        if len(footer) < _FOOTER.size or not footer.endswith(MCAP0_MAGIC):
+            return False
+        at, kinds = _FOOTER.unpack(footer)[2], set[int]()
+        while 0 < at < end:
+            stream.seek(at)
+            kind, size = struct.unpack('<BQ', stream.read(9))
+            kinds.add(kind)
+            at += 9 + size
+    return kinds >= _INDEX and Opcode.CHUNK not in kinds
 
 
 def _scratch(folder: Path | None, stack: ExitStack) -> Path:
@@ -316,7 +505,7 @@ def _copy(source: Path, target: Path, *, ros_only: bool) -> int:
         with source.open('rb') as file, target.open('wb') as copy:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
             writer = Writer(copy)
-            for record in _complete_records(file):
+            for record in _complete_records(file, Unpacker(source)):
                 match record:
                     case Header():
                         writer.start('ros2' if ros_only else record.profile)
@@ -349,9 +538,18 @@ def _copy(source: Path, target: Path, *, ros_only: bool) -> int:
     return count
 
 
-def _complete_records(file: BinaryIO) -> Iterator[McapRecord]:
+def _complete_records(file: BinaryIO, unpack: Unpacker) -> Iterator[McapRecord]:
     """Records up to where the file breaks off."""
     try:
-        yield from StreamReader(file).records
-    except (McapError, EOFError, MemoryError, OverflowError, ValueError, struct.error):
+        for record in StreamReader(file, emit_chunks=True).records:
+            if not isinstance(record, Chunk):
+                yield record
+                continue
+            if record.compression:
+                record = replace(record, data=unpack(record.data, record.compression),
+                                 compression='')
+            yield from breakup_chunk(record)
+    except DataError:  # unpacks into too much
+        raise
+    except (McapError, struct.error, *DAMAGE):
         return

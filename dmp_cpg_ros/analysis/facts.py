@@ -54,7 +54,9 @@ def facts(metrics: Mapping[str, Any], lock_step: bool | None = None) -> list[Fac
     list of Fact
         In the order of importance.
     """
-    return [*_walking(metrics), *_stops(metrics), *_timing(metrics['timing'], lock_step),
+    missing = metrics['recording']['missing_topics']
+    return [*([Fact('Nothing was recorded on', ', '.join(missing), None)] if missing else []),
+            *_walking(metrics), *_stops(metrics), *_timing(metrics['timing'], lock_step),
             *_certificate(metrics)]
 
 

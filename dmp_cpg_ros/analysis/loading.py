@@ -13,38 +13,161 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import Connection
 
 from dmp_cpg_ros import layouts
 from dmp_cpg_ros.analysis import recording
-from dmp_cpg_ros.analysis.bag import base_name, decoded, find_bag, opened
+from dmp_cpg_ros.analysis.bag import base_name, find_bag, message_of, opened, recorded, warn_of
+from dmp_cpg_ros.analysis.decoding import Alike, alike
 from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent
 from dmp_cpg_ros.configuration import naming
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
+ROWS_OF, WORDS = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
+
 TOPICS = {
-    'sensor_msgs/msg/JointState': ('joint_states', 'joint_targets', 'joint_work',
+    ROWS_OF: ('joint_states', 'joint_targets', 'joint_work',
                                    'canonical_state', 'foot_contacts', 'posture_feedback'),
     'nav_msgs/msg/Odometry': ('ground_truth', 'odom', 'estimated_odom'),
     'geometry_msgs/msg/TwistStamped': ('reference', 'cmd_vel'),
     'geometry_msgs/msg/Twist': ('cmd_vel',),
-    'diagnostic_msgs/msg/DiagnosticArray': ('inhibition_state', 'body_mode', 'diagnostics'),
+    WORDS: ('inhibition_state', 'body_mode', 'diagnostics'),
     'rosgraph_msgs/msg/Clock': ('clock',),
     'std_msgs/msg/String': ('robot_description',),
 }
 """Topics without namespace that are read, by their types of message."""
 
 
-class Received(NamedTuple):
-    """A message with its record time and its stamp [ns], which is 0 where it has none."""
+FIELDS = {'joint_work': ('position', 'effort'), 'canonical_state': ('position', 'velocity'),
+          'foot_contacts': ('effort',), 'posture_feedback': ('position',)}
+"""Fields of joint states that are read; of all others all."""
 
-    bag_ns: int
+ALL_FIELDS = ('position', 'velocity', 'effort')
+
+ROWS = {*JOINT_NAMES, *LEGS, *(f'{leg}_foot' for leg in LEGS), *layouts.OSCILLATOR_ROWS,
+        layouts.CADENCE_ROW, *layouts.MODE_ROWS}
+"""Names in joint states that are read, besides those of gaits."""
+
+_POSE, _TWIST = 'pose.pose.', 'twist.twist.'
+COLUMNS = {
+    'nav_msgs/msg/Odometry': (
+        *(f'{_POSE}position.{axis}' for axis in 'xyz'),
+        *(f'{_POSE}orientation.{axis}' for axis in 'xyzw'),
+        *(f'{_TWIST}{part}.{axis}' for part in ('linear', 'angular') for axis in 'xyz')),
+    'geometry_msgs/msg/TwistStamped': (
+        'twist.linear.x', 'twist.linear.y', 'twist.angular.z'),
+    'geometry_msgs/msg/Twist': ('linear.x', 'linear.y', 'angular.z'),
+    'rosgraph_msgs/msg/Clock': ()}
+"""Numbers of the other messages that are read."""
+
+AT_ONCE = 1024
+"""Messages of a topic that are decoded together."""
+
+
+class Received(NamedTuple):
+    """A message with its stamp [ns]."""
+
     stamp: int
     message: Any
 
 
-Messages = Sequence[Received]
+class Block(NamedTuple):
+    """Messages of a topic: record times and stamps (n,) [ns], 0 without; numbers (n, k), or
+    (n, fields, k) of k names.
+    """
+
+    bag_ns: NDArray[np.int64]
+    stamp: NDArray[np.int64]
+    values: Array
+
+
+class Topic:
+    """What is read from a topic, as it comes.
+
+    Parameters
+    ----------
+    name : str
+        Without namespace.
+
+    Attributes
+    ----------
+    blocks : dict of (tuple of str, str) to list of Block
+        By the names that are read and, for former gaits, the frame.
+    messages : list of Received
+        Those whose words are read.
+    skipped : Counter
+        Messages that could not be decoded, by topics with namespace.
+    """
+
+    def __init__(self, name: str) -> None:
+        """Nothing has come."""
+        self.fields = FIELDS.get(name, ALL_FIELDS)
+        self.blocks: dict[tuple[tuple[str, ...], str], list[Block]] = defaultdict(list)
+        self.messages: list[Received] = []
+        self.skipped = Counter[str]()
+        self._waiting: dict[tuple[str, str], list[tuple[int, bytes]]] = defaultdict(list)
+
+    def take(self, connection: Connection, bag_ns: int, raw: bytes) -> None:
+        """Take a message."""
+        waiting = self._waiting[connection.topic, connection.msgtype]
+        waiting.append((bag_ns, raw))
+        if len(waiting) == AT_ONCE:
+            self._decode(connection.topic, connection.msgtype)
+
+    def finish(self) -> None:
+        """Decode what has come."""
+        for key in list(self._waiting):
+            self._decode(*key)
+
+    def joined(self, values: int = 0) -> Block:
+        """All messages in the order of their record times, with so many numbers of each."""
+        blocks = [block for of in self.blocks.values() for block in of]
+        bag_ns, stamp = (np.concatenate([np.empty(0, np.int64), *(of[k] for of in blocks)])
+                         for k in (0, 1))
+        order = np.argsort(bag_ns, kind='stable')
+        numbers = np.concatenate([np.empty((0, values)), *(of.values for of in blocks if values)])
+        return Block(bag_ns[order], stamp[order], numbers[order] if values else numbers)
+
+    def _decode(self, topic: str, kind: str) -> None:
+        waiting = self._waiting.pop((topic, kind))
+        if kind == WORDS:
+            messages = [message_of(raw, kind) for _, raw in waiting]
+            self.messages += [Received(_stamp_ns(of), of) for of in messages if of is not None]
+            self._skip(topic, messages.count(None))
+            return
+        bag_ns = np.array([time for time, _ in waiting], np.int64)
+        parts: dict[tuple[tuple[str, ...], str], list[tuple[Any, ...]]] = defaultdict(list)
+        for group in alike([raw for _, raw in waiting], kind):
+            key, values = self._numbers(kind, group)
+            parts[key].append((group.rows, _stamps(group), values))
+        for key, of in parts.items():
+            rows, stamp, values = (np.concatenate(part) for part in zip(*of, strict=True))
+            order = np.argsort(rows)
+            self.blocks[key].append(Block(bag_ns[rows[order]], stamp[order], values[order]))
+            waiting = waiting[len(rows):]
+        self._skip(topic, len(waiting))
+
+    def _skip(self, topic: str, count: int) -> None:
+        if count:
+            self.skipped[topic] += count
+
+    def _numbers(self, kind: str, group: Alike) -> tuple[tuple[tuple[str, ...], str], Array]:
+        """Names, frame and numbers of some messages."""
+        count = len(group.rows)
+        if kind != ROWS_OF:
+            columns = [group.numbers(name).astype(float) for name in COLUMNS[kind]]
+            return ((), ''), np.concatenate(columns or [np.empty((count, 0))], axis=1)
+        names = group.first.name
+        kept = [k for k, name in enumerate(names)
+                if name in ROWS or name.startswith(layouts.GAIT_PREFIX)]
+        values = np.full((count, len(self.fields), len(kept)), np.nan)
+        for k, field in enumerate(self.fields):
+            if len(getattr(group.first, field)) == len(names):  # a message may leave a field out
+                values[:, k] = group.numbers(field)[:, kept]
+        return (tuple(names[k] for k in kept), group.first.header.frame_id), values
 
 
 def load_recording(path: Path | str) -> Recording:
@@ -72,35 +195,35 @@ def load_recording(path: Path | str) -> Recording:
 
 
 def _loaded(bag: Path) -> Recording:
-    messages: dict[str, list[Received]] = defaultdict(list)
-    skipped = Counter[str]()
     with opened(bag) as reader:
         robots = sorted(topic for topic in reader.topics if base_name(topic) == 'joint_states')
         if len(robots) > 1:
             raise DataError(f'the bag holds {", ".join(robots)}; record one robot per bag')
         used = [c for c in reader.connections if base_name(c.topic) in TOPICS.get(c.msgtype, ())]
-        for connection, bag_ns, message in decoded(reader, used, skipped):
-            received = Received(bag_ns, _stamp_ns(message), message)
-            messages[base_name(connection.topic)].append(received)
+        topics = {name: Topic(name) for names in TOPICS.values() for name in names}
+        for connection, bag_ns, raw in recorded(reader, used):
+            topics[base_name(connection.topic)].take(connection, bag_ns, raw)
         counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}
-    # Bags of others have one odometry, and in old ones of this suite it is the truth.
-    truth, estimate = (('ground_truth', 'odom') if messages['ground_truth']
-                       else ('odom', 'estimated_odom'))
-    joints = _joint_names(messages['robot_description'])
-    time, work, _, peak_effort = _table(messages['joint_work'], joints)
+    skipped = Counter[str]()
+    for topic in topics.values():
+        topic.finish()
+        skipped += topic.skipped
+    warn_of(skipped)
+    commands, arrivals = _on_robot_clock(topics), _arrivals(topics)
     return Recording(
-        joints=recording.JointSeries(*_table(messages['joint_states'], joints)),
-        targets=recording.JointSeries(*_table(messages['joint_targets'], joints)),
-        work=recording.WorkSeries(time, work, peak_effort),
-        canonical=_canonical(messages['canonical_state']),
-        reference=recording.VelocitySeries(*_rows(messages['reference'], _velocity, (3,))),
-        commands=recording.VelocitySeries(*_rows(_on_robot_clock(messages), _velocity, (3,))),
-        odometry=_odometry(messages[truth]), estimate=_odometry(messages[estimate]),
-        feet=_feet(messages['foot_contacts']),
-        inhibition=_changes(messages['inhibition_state'], lambda e: (e.message, e.values)),
-        modes=_modes(messages), statuses=_by_name(messages['diagnostics']),
-        arrivals=_arrivals(messages['joint_states'], messages['joint_targets']),
-        counts=counts, undecodable=dict(skipped))
+        joints=recording.JointSeries(*_table(topics['joint_states'], JOINT_NAMES)),
+        targets=recording.JointSeries(*_table(topics['joint_targets'], JOINT_NAMES)),
+        work=recording.WorkSeries(*_table(topics['joint_work'], JOINT_NAMES)),
+        canonical=_canonical(topics['canonical_state']),
+        reference=recording.VelocitySeries(*_rows(topics['reference'].joined(3), (3,))),
+        commands=recording.VelocitySeries(*_rows(commands, (3,))),
+        odometry=recording.OdometrySeries(*_rows(topics['odom'].joined(13), (3, 4, 3, 3))),
+        estimate=recording.OdometrySeries(
+            *_rows(topics['estimated_odom'].joined(13), (3, 4, 3, 3))),
+        feet=_feet(topics['foot_contacts']),
+        inhibition=_changes(topics['inhibition_state'].messages, lambda e: (e.message, e.values)),
+        modes=_modes(topics), statuses=_by_name(topics['diagnostics'].messages),
+        arrivals=arrivals, counts=counts, undecodable=dict(skipped))
 
 
 def _joint_names(descriptions: Messages) -> tuple[str, ...]:
@@ -111,96 +234,86 @@ def _joint_names(descriptions: Messages) -> tuple[str, ...]:
 
 
 def _stamp_ns(message: Any) -> int:
-    stamp = message.header.stamp if hasattr(message, 'header') else getattr(message, 'clock', None)
-    return 0 if stamp is None else int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+    return int(message.header.stamp.sec) * 1_000_000_000 + int(message.header.stamp.nanosec)
 
 
-def _velocity(message: Any) -> tuple[float, ...]:
-    twist = getattr(message, 'twist', message)
-    return twist.linear.x, twist.linear.y, twist.angular.z
+def _stamps(group: Alike) -> NDArray[np.int64]:
+    """Stamps (n,) [ns], 0 where the type has none."""
+    path = next((path for path in ('header.stamp', 'clock') if group.has(f'{path}.sec')), None)
+    if path is None:
+        return np.zeros(len(group.rows), np.int64)
+    seconds, rest = (group.numbers(f'{path}.{part}')[:, 0].astype(np.int64)
+                     for part in ('sec', 'nanosec'))
+    return seconds * 1_000_000_000 + rest
 
 
-def _odometry(messages: Messages) -> recording.OdometrySeries:
-    return recording.OdometrySeries(*_rows(messages, _motion, (3, 4, 3, 3)))
-
-
-def _motion(message: Any) -> tuple[float, ...]:
-    place, turn = message.pose.pose.position, message.pose.pose.orientation
-    v, omega = message.twist.twist.linear, message.twist.twist.angular
-    return (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w, v.x, v.y, v.z,
-            omega.x, omega.y, omega.z)
-
-
-def _on_robot_clock(messages: Mapping[str, Messages]) -> Messages:
+def _on_robot_clock(topics: Mapping[str, Topic]) -> Block:
     """Commands with stamps of the robot's clock: a sender's may be of another clock.
 
     The bag's record time may be wall time: each command gets the stamp of the tick that was
     recorded last before it. A bag without ticks keeps its own time.
     """
-    ticks = messages['joint_states'] or messages['clock']
-    commands = [command._replace(stamp=command.bag_ns) for command in messages['cmd_vel']]
-    if not ticks:
-        return commands
-    before = np.searchsorted([tick.bag_ns for tick in ticks],
-                             [command.bag_ns for command in commands], side='right') - 1
-    return [command._replace(stamp=ticks[max(row, 0)].stamp)
-            for command, row in zip(commands, before, strict=True)]
+    commands, ticks = topics['cmd_vel'].joined(3), topics['joint_states'].joined()
+    if not ticks.stamp.size:
+        ticks = topics['clock'].joined()
+    if not ticks.stamp.size:
+        return commands._replace(stamp=commands.bag_ns)
+    before = np.searchsorted(ticks.bag_ns, commands.bag_ns, side='right') - 1
+    return commands._replace(stamp=ticks.stamp[np.maximum(before, 0)])
 
 
-def _rows(messages: Messages, row: Callable[[Any], tuple[float, ...]], widths: Sequence[int],
-          ) -> list[Array]:
+def _rows(block: Block, widths: Sequence[int]) -> list[Array]:
     """Times and columns in the order of the stamps; of one stamp the last counts."""
-    rows = {of.stamp: row(of.message) for of in sorted(messages, key=lambda of: of.stamp)}
-    values = np.array(list(rows.values()), dtype=float).reshape(-1, sum(widths))
-    stamps = np.array(list(rows), dtype=np.int64)
+    stamps, last = np.unique(block.stamp[::-1], return_index=True)
+    values = block.values[::-1][last].reshape(-1, sum(widths))
     return [stamps / 1e9, *np.split(values, np.cumsum(widths)[:-1], axis=1)]
 
 
-def _table(messages: Messages, names: Sequence[str]) -> list[Array]:
-    """Increasing stamps (n,) [s], and the positions, velocities and efforts (n, k).
+def _table(topic: Topic, names: Sequence[str]) -> list[Array]:
+    """Increasing stamps (n,) [s], and the fields of the topic (n, k).
 
     The columns are the k names; others in the messages are ignored. Messages of several publishers
     that each bear some of the names (the four legs on ``joint_targets``) are merged where their
     stamps agree. NaN stands where no message held a value; of messages with one stamp and one name
     the last counts.
     """
-    groups: dict[tuple[str, ...], list[Received]] = defaultdict(list)
-    for received in messages:
-        groups[tuple(received.message.name)].append(received)
-    groups = {held: group for held, group in groups.items() if set(names) & set(held)}
-    stamps = np.unique(np.array([of.stamp for group in groups.values() for of in group], np.int64))
-    table = {field: np.full((len(stamps), len(names)), np.nan)
-             for field in ('position', 'velocity', 'effort')}
-    for held, group in groups.items():
-        rows = np.searchsorted(stamps, [of.stamp for of in group])
+    groups = {key: blocks for key, blocks in topic.blocks.items() if set(names) & set(key[0])}
+    stamps = np.unique(np.concatenate(
+        [np.empty(0, np.int64), *(of.stamp for blocks in groups.values() for of in blocks)]))
+    table = [np.full((len(stamps), len(names)), np.nan) for _ in topic.fields]
+    for (held, _), blocks in groups.items():
         sources = [source for source, name in enumerate(held) if name in names]
         columns = [names.index(held[source]) for source in sources]
-        missing = np.full(len(held), np.nan)  # a message may leave a field out
-        for field, values in table.items():
-            arrays = (getattr(of.message, field) for of in group)
-            block = np.array([a if len(a) == len(held) else missing for a in arrays], dtype=float)
-            values[rows[:, None], columns] = block[:, sources]
-    return [stamps / 1e9, *table.values()]
+        for block in blocks:
+            rows = np.searchsorted(stamps, block.stamp)
+            for k, values in enumerate(table):
+                values[rows[:, None], columns] = block.values[:, k, sources]
+    return [stamps / 1e9, *table]
 
 
-def _canonical(messages: Messages) -> recording.CanonicalSeries:
-    time, x, x_dot, _ = _table(messages, layouts.OSCILLATOR_ROWS)
-    gaits, shape = _gaits(messages), (-1, len(LEGS), 2)
+def _canonical(topic: Topic) -> recording.CanonicalSeries:
+    time, x, x_dot = _table(topic, layouts.OSCILLATOR_ROWS)
+    gaits, shape = _gaits(topic), (-1, len(LEGS), 2)
     return recording.CanonicalSeries(
         time, x.reshape(shape), x_dot.reshape(shape), gaits if len(gaits) == len(time) else ())
 
 
-def _gaits(messages: Messages) -> tuple[GaitShares, ...]:
+def _gaits(topic: Topic) -> tuple[GaitShares, ...]:
     """Gait in force of each canonical state, in the order of the stamps."""
-    rows = [name for name in dict.fromkeys(name for of in messages for name in of.message.name)
+    rows = [name for name in dict.fromkeys(name for names, _ in topic.blocks for name in names)
             if name.startswith(layouts.GAIT_PREFIX)]
     if not rows:
-        texts = {of.stamp: of.message.header.frame_id for of in messages}
+        texts = {stamp: frame for (_, frame), blocks in topic.blocks.items() for block in blocks
+                 for stamp in block.stamp.tolist()}
         return tuple(_former_gait(texts[stamp]) for stamp in sorted(texts)) if all(
             texts.values()) else ()
-    _, shares, rates, _ = _table(messages, [*rows, layouts.CADENCE_ROW])
-    return tuple(layouts.read_gait_rows(rows, *of)
-                 for of in zip(shares.tolist(), rates.tolist(), strict=True))
+    _, shares, rates = _table(topic, [*rows, layouts.CADENCE_ROW])
+    bits = np.concatenate([shares, rates], axis=1).view(np.int64)  # tells -0.0 from 0.0
+    begins = np.flatnonzero((np.diff(bits, axis=0, prepend=~bits[:1]) != 0).any(axis=1))
+    lengths = np.diff([*begins, len(bits)])
+    return tuple(gait for begin, length in zip(begins, lengths.tolist(), strict=True)
+                 for gait in (layouts.read_gait_rows(
+                     rows, shares[begin].tolist(), rates[begin].tolist()),) * length)
 
 
 @cache
@@ -218,20 +331,24 @@ def _former_gait(text: str) -> GaitShares:
         raise DataError(f"gait '{text}' of a canonical state cannot be read: {error}") from None
 
 
-def _feet(messages: Messages) -> recording.FootForceSeries:
-    time, *_, force = _table(messages, LEGS)
+def _feet(topic: Topic) -> recording.FootForceSeries:
+    time, force = _table(topic, LEGS)
     if not time.size:
-        time, *_, force = _table(messages, [f'{leg}_foot' for leg in LEGS])
+        time, force = _table(topic, [f'{leg}_foot' for leg in LEGS])
     return recording.FootForceSeries(time, force)
 
 
-def _arrivals(states: Messages, targets: Messages) -> recording.ArrivalSeries:
-    last = {target.stamp: target.bag_ns for target in targets}
-    times = [(state.stamp, state.bag_ns, last.get(state.stamp, np.nan)) for state in states]
-    return recording.ArrivalSeries(*np.array(times, dtype=float).reshape(-1, 3).T / 1e9)
+def _arrivals(topics: Mapping[str, Topic]) -> recording.ArrivalSeries:
+    states, targets = topics['joint_states'].joined(), topics['joint_targets'].joined()
+    known, last = np.unique(targets.stamp[::-1], return_index=True)
+    answer = np.full(len(states.stamp), np.nan)
+    if known.size:
+        row = np.minimum(np.searchsorted(known, states.stamp), known.size - 1)
+        answer = np.where(known[row] == states.stamp, targets.bag_ns[::-1][last][row], np.nan)
+    return recording.ArrivalSeries(states.stamp / 1e9, states.bag_ns / 1e9, answer / 1e9)
 
 
-def _statuses(messages: Messages) -> Iterator[tuple[str, StatusEvent]]:
+def _statuses(messages: Sequence[Received]) -> Iterator[tuple[str, StatusEvent]]:
     """Every status with its name."""
     for received in messages:
         for status in received.message.status:
@@ -240,24 +357,25 @@ def _statuses(messages: Messages) -> Iterator[tuple[str, StatusEvent]]:
                 {pair.key: pair.value for pair in status.values})
 
 
-def _by_name(messages: Messages) -> dict[str, tuple[StatusEvent, ...]]:
+def _by_name(messages: Sequence[Received]) -> dict[str, tuple[StatusEvent, ...]]:
     histories: dict[str, list[StatusEvent]] = defaultdict(list)
     for name, event in _statuses(messages):  # robot/node, where the robot has a namespace
         histories[base_name(name)].append(event)
     return {name: tuple(history) for name, history in histories.items()}
 
 
-def _changes(messages: Messages, what: Callable[[StatusEvent], Any]) -> tuple[StatusEvent, ...]:
+def _changes(messages: Sequence[Received], what: Callable[[StatusEvent], Any],
+             ) -> tuple[StatusEvent, ...]:
     """The first of the events in a row that say the same."""
     events = (event for _, event in _statuses(messages))
     return tuple(next(same) for _, same in groupby(events, what))
 
 
-def _modes(messages: Mapping[str, Messages]) -> tuple[StatusEvent, ...]:
+def _modes(topics: Mapping[str, Topic]) -> tuple[StatusEvent, ...]:
     """When which mode of the body began."""
-    time, position, *_ = _table(messages['posture_feedback'], layouts.MODE_ROWS)
+    time, position = _table(topics['posture_feedback'], layouts.MODE_ROWS)
     if not time.size:  # a recording from before modes were states
-        return _changes(messages['body_mode'], lambda event: event.message)
+        return _changes(topics['body_mode'].messages, lambda event: event.message)
     modes = position.argmax(axis=1)
     first = np.flatnonzero(np.diff(modes, prepend=-1))
     return tuple(StatusEvent(float(time[k]), 0, layouts.MODE_ROWS[modes[k]].partition('/')[2], {})

@@ -8,7 +8,7 @@ an array with no rows, so that every query works on every recording.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sized
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypeVar
 
@@ -244,6 +244,18 @@ class Recording:
     def diagnostics(self) -> dict[str, StatusEvent]:
         """The last status of every name on ``/diagnostics``."""
         return {name: history[-1] for name, history in self.statuses.items() if history}
+
+    @property
+    def missing(self) -> list[str]:
+        """Topics that the analysis reads and of which nothing was recorded."""
+        read: dict[str, Sized] = {
+            'joint_states': self.joints.time, 'joint_targets': self.targets.time,
+            'joint_work': self.work.time, 'canonical_state': self.canonical.time,
+            'cmd_vel': self.commands.time, 'reference': self.reference.time,
+            'odom': self.odometry.time, 'estimated_odom': self.estimate.time,
+            'foot_contacts': self.feet.time, 'inhibition_state': self.inhibition,
+            'diagnostics': self.statuses}
+        return [topic for topic, of in read.items() if not len(of)]
 
     @property
     def span(self) -> tuple[float, float]:

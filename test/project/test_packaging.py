@@ -34,6 +34,8 @@ DEPENDENCIES = {
     'mujoco': ('python3-mujoco-pip', 'mujoco'),
     'rosbags': ('python3-rosbags-pip', 'rosbags'),
     'mcap': ('mcap-ros2-support', 'mcap'),
+    'lz4': ('mcap-ros2-support', 'lz4'),
+    'zstandard': ('mcap-ros2-support', 'zstandard'),
     'PyYAML': ('python3-yaml', 'yaml'),
     'matplotlib': ('python3-matplotlib', 'matplotlib'),
     'pillow': ('python3-pil', 'PIL'),

@@ -19,6 +19,7 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
     'robot.peak_torque_share': ('',
         'largest torque of a joint over its limit, of every physics step where joint_work tells'),
     'robot.down_at_start': ('', 'whether the robot lay fallen when the recording began'),
+    'recording.missing_topics': ('', 'topics that are read and of which nothing was recorded'),
     'recording.undecodable_messages': ('',
         'messages on topics that the analysis reads that could not be decoded and were left out'),
     'robot.foot_slip_m': ('m',

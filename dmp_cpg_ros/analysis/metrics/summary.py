@@ -213,7 +213,8 @@ def compute_metrics(
         'start': _summary([_start(recording, start)
                            for start in episodes.episodes(recording, episodes.STARTING)]),
         'timing': timing_metrics(recording),
-        'recording': {'undecodable_messages': sum(recording.undecodable.values())},
+        'recording': {'undecodable_messages': sum(recording.undecodable.values()),
+                      'missing_topics': recording.missing or None},
         'certificate': None if certificate is None else list(certificate)}
 
 
