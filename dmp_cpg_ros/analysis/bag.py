@@ -19,10 +19,11 @@ import os
 import re
 import struct
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from io import BytesIO
+from operator import itemgetter
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO, NamedTuple
@@ -122,9 +123,12 @@ def recorded(reader: AnyReader, connections: Collection[Connection]) -> Iterator
     """
     try:
         parts = [_of_storage(of.storage, connections) for of in reader.readers]
-        yield from parts[0] if len(parts) == 1 else heapq.merge(*parts, key=lambda of: of[1])
+        yield from parts[0] if len(parts) == 1 else heapq.merge(*parts, key=_TIME)
     except Exception as error:
         raise DataError(f'the bag is damaged: {told(error)}') from error
+
+
+_TIME = itemgetter(1)
 
 
 def _of_storage(storage: Any, connections: Collection[Connection]) -> Iterator[Received]:
@@ -135,19 +139,18 @@ def _of_storage(storage: Any, connections: Collection[Connection]) -> Iterator[R
     if not known:
         return
     unpack = Unpacker(storage.path)
-    messages = (_of_mcap(storage.bio, known, unpack) if storage.path.suffix == '.mcap' else
-                ((known[of.id], time, raw) for of, time, raw in storage.messages(
-                    [of for of in storage.connections if of.id in known])))
-    for connection, time, raw in messages:
-        if raw[:4] == zstandard.FRAME_HEADER:  # CDR begins with 0
-            raw = unpack(raw, 'zstd')
-        yield connection, time, raw
+    if storage.path.suffix == '.mcap':
+        for messages in _of_mcap(storage.bio, known, unpack):
+            yield from messages
+        return
+    for of, time, raw in storage.messages([of for of in storage.connections if of.id in known]):
+        yield known[of.id], time, unpack(raw, 'zstd') if raw[:1] == _PACKED else raw
 
 
 def _of_mcap(file: BinaryIO, known: dict[int, Connection], unpack: Unpacker
-             ) -> Iterator[Received]:
+             ) -> Iterator[list[Received]]:
     """Messages of an MCAP file by record time; those of one time as they lie there."""
-    waiting: list[tuple[int, int, bytes]] = []
+    waiting: list[Received] = []
     blocks = sorted(_blocks(file), key=lambda block: block.start_ns)
     for number, block in enumerate(blocks):
         file.seek(block.offset)
@@ -156,28 +159,38 @@ def _of_mcap(file: BinaryIO, known: dict[int, Connection], unpack: Unpacker
             data = unpack(data, block.packing)
         if len(data) != block.unpacked_size or block.crc not in (0, crc32(data)):
             raise DataError(f'the chunk at byte {block.offset} is not what was written')
-        waiting += _messages(data, known)
-        waiting.sort(key=lambda message: message[0])
-        border = blocks[number + 1].start_ns if number + 1 < len(blocks) else None
+        waiting += _messages(data, known, unpack)
+        waiting.sort(key=_TIME)
         count = len(waiting)
-        if border is not None:
-            while count and waiting[count - 1][0] >= border:
+        if number + 1 < len(blocks):
+            while count and waiting[count - 1][1] >= blocks[number + 1].start_ns:
                 count -= 1
-        yield from ((known[channel], time, raw) for time, channel, raw in waiting[:count])
-        del waiting[:count]
+        yield waiting[:count]
+        waiting = waiting[count:]
 
 
-def _messages(records: bytes, known: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
-    """Record times [ns], channels and bytes of the messages among some records."""
-    at, end = 0, len(records)
+def _messages(records: bytes, known: Mapping[int, Connection], unpack: Unpacker
+              ) -> list[Received]:
+    """Messages among some records."""
+    found: list[Received] = []
+    at, end, read = 0, len(records), _RECORD.unpack_from
     while at + _RECORD.size <= end:  # no message is shorter
-        kind, size, channel, _, time, _ = _RECORD.unpack_from(records, at)
+        kind, size, channel, _, time, _ = read(records, at)
         past = at + 9 + size
         if past > end:
             raise DataError('a record is longer than its chunk')
-        if kind == Opcode.MESSAGE and channel in known:
-            yield time, channel, records[at + _RECORD.size : past]
+        if kind == _MESSAGE and channel in known:
+            raw = records[at + _RECORD.size : past]
+            found.append((known[channel], time,
+                          unpack(raw, 'zstd') if raw[:1] == _PACKED else raw))
         at = past
+    return found
+
+
+_MESSAGE = Opcode.MESSAGE.value
+
+_PACKED = zstandard.FRAME_HEADER[:1]
+"""A message that is packed does not begin with the 0 of CDR."""
 
 
 class _Block(NamedTuple):

@@ -82,10 +82,10 @@ def running_intervals(recording: Recording) -> list[tuple[float, float]]:
 
 
 def within(time: Array, intervals: list[tuple[float, float]]) -> NDArray[np.bool_]:
-    """Which times (n,) lie in one of some half-open intervals, boolean ndarray (n,)."""
+    """Which growing times (n,) lie in one of some half-open intervals, boolean ndarray (n,)."""
     inside = np.zeros(len(time), dtype=bool)
-    for start, end in intervals:
-        inside |= (time >= start) & (time < end)
+    for first, past in np.searchsorted(time, np.array(intervals).reshape(-1, 2)):
+        inside[first:past] = True
     return inside
 
 
@@ -95,18 +95,13 @@ def changing_intervals(recording: Recording) -> list[tuple[float, float]]:
     return spans(recording.canonical.time, changing)
 
 
-def _turns(recording: Recording) -> Array:
-    """Growing phase of oscillator fl, ndarray (n,) in cycles."""
-    return np.unwrap(phase(recording.canonical.x[:, 0])) / (2.0 * np.pi)
-
-
 def cycle_starts(recording: Recording, start: float, end: float) -> Array:
     """Times in an interval at which oscillator fl passes phase 0, ndarray (m,) [s]."""
     time = recording.canonical.time
-    inside = (time >= start) & (time <= end)
-    if np.count_nonzero(inside) < 2:
+    inside = slice(np.searchsorted(time, start), np.searchsorted(time, end, side='right'))
+    turns, time = recording.canonical.turns[inside], time[inside]
+    if len(time) < 2:
         return np.array([])
-    turns, time = _turns(recording)[inside], time[inside]
     if not abs(turns[-1] - turns[0]) <= len(turns):  # a cycle takes more than one sample
         return np.array([])
     whole = np.arange(np.ceil(turns[0]), np.floor(turns[-1]) + 1.0)
@@ -118,7 +113,7 @@ def cycle_count(recording: Recording, start: float, end: float) -> float:
     time = recording.canonical.time
     if not time.size:
         return 0.0
-    return float(np.diff(np.interp([start, end], time, _turns(recording))).item())
+    return float(np.diff(np.interp([start, end], time, recording.canonical.turns)).item())
 
 
 def gait_period(recording: Recording) -> float | None:
@@ -195,7 +190,8 @@ def gait_rows(recording: Recording, context: RunContext) -> list[GaitRow] | None
         return None
     shares = recording.canonical.gaits or (shares_of(context.gait),) * count
     known = KnownGaits({**context.gaits, context.gait.name: context.gait})
-    borders = [0, *(k for k in range(1, count) if shares[k] != shares[k - 1]), count]
+    borders = [0, *(k for k in range(1, count) if shares[k] is not shares[k - 1]
+                    and shares[k] != shares[k - 1]), count]
     try:
         return [GaitRow(slice(first, past), known.in_force(shares[first]))
                 for first, past in zip(borders, borders[1:], strict=False)]
@@ -230,7 +226,10 @@ def planned_stance(recording: Recording, context: RunContext) -> tuple[NDArray[n
     r = held(reference.time, reference.value, recording.canonical.time)
     duty, position = np.empty(len(phi)), np.empty(phi.shape)
     for rows, gait in found:
-        duty[rows] = [gait.duty(scale.foot_speed(*value), scale) for value in r[rows]]
+        changes = np.flatnonzero((np.diff(r[rows], axis=0, prepend=np.nan) != 0.0).any(axis=1))
+        duty[rows] = np.repeat(
+            [gait.duty(scale.foot_speed(*value), scale) for value in r[rows][changes].tolist()],
+            np.diff([*changes, rows.stop - rows.start]))
         position[rows] = gait.cycle_position(phi[rows])
     return np.abs(position) >= 0.5 * (1.0 - duty[:, None]), duty
 

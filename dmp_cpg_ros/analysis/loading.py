@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-import re
+import mmap
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from rosbags.interfaces import Connection
 
 from dmp_cpg_ros import layouts
 from dmp_cpg_ros.analysis import recording
@@ -63,11 +62,14 @@ COLUMNS = {
     'rosgraph_msgs/msg/Clock': ()}
 """Numbers of the other messages that are read."""
 
-AT_ONCE = 1024
+RARE = (layouts.GAIT_PREFIX, layouts.CADENCE_ROW, layouts.MODE_ROWS[0].partition('/')[0])
+"""Beginnings of the names whose numbers seldom change: only their changes are kept."""
+
+AT_ONCE = 4096
 """Messages of a topic that are decoded together."""
 
 
-class Received(NamedTuple):
+class Stamped(NamedTuple):
     """A message with its stamp [ns]."""
 
     stamp: int
@@ -84,75 +86,116 @@ class Block(NamedTuple):
     values: Array
 
 
+class Blocks:
+    """Blocks of like messages, kept in few large ones that give their memory back."""
+
+    def __init__(self) -> None:
+        """There are none."""
+        self._kept: list[Block] = []
+        self._count = 0
+
+    def add(self, block: Block) -> None:
+        """Copy a block of at most ``AT_ONCE`` messages."""
+        past = self._count + len(block.stamp)
+        if not self._kept or past > len(self._kept[-1].stamp):
+            self._trim()
+            rows = AT_ONCE << min(len(self._kept), 6)
+            self._kept.append(Block(*(_mapped(rows, of) for of in block)))
+            self._count, past = 0, len(block.stamp)
+        for mine, of in zip(self._kept[-1], block, strict=True):
+            mine[self._count : past] = of
+        self._count = past
+
+    def all(self) -> list[Block]:
+        """Return the large blocks."""
+        self._trim()
+        return self._kept
+
+    def _trim(self) -> None:
+        if self._kept:
+            self._kept[-1] = _cut(self._kept[-1], slice(self._count))
+
+
+def _cut(block: Block, rows: Any) -> Block:
+    """Some rows of a block."""
+    return Block(block.bag_ns[rows], block.stamp[rows], block.values[rows])
+
+
+def _mapped(rows: int, like: Any) -> Any:
+    """Array with so many rows like some, on pages that go when it does."""
+    shape = (rows, *like.shape[1:])
+    pages = mmap.mmap(-1, max(1, like.itemsize * int(np.prod(shape))))
+    return np.frombuffer(pages, like.dtype, int(np.prod(shape))).reshape(shape)
+
+
 class Topic:
     """What is read from a topic, as it comes.
 
     Parameters
     ----------
-    name : str
-        Without namespace.
+    fields : sequence of str
+        Of joint states, those that are read.
 
     Attributes
     ----------
-    blocks : dict of (tuple of str, str) to list of Block
+    blocks : dict of (tuple of str, str) to Blocks
         By the names that are read and, for former gaits, the frame.
-    messages : list of Received
+    messages : list of Stamped
         Those whose words are read.
     skipped : Counter
         Messages that could not be decoded, by topics with namespace.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, fields: Sequence[str]) -> None:
         """Nothing has come."""
-        self.fields = FIELDS.get(name, ALL_FIELDS)
-        self.blocks: dict[tuple[tuple[str, ...], str], list[Block]] = defaultdict(list)
-        self.messages: list[Received] = []
+        self.fields = fields
+        self.blocks: dict[tuple[tuple[str, ...], str], Blocks] = defaultdict(Blocks)
+        self.messages: list[Stamped] = []
         self.skipped = Counter[str]()
-        self._waiting: dict[tuple[str, str], list[tuple[int, bytes]]] = defaultdict(list)
 
-    def take(self, connection: Connection, bag_ns: int, raw: bytes) -> None:
-        """Take a message."""
-        waiting = self._waiting[connection.topic, connection.msgtype]
-        waiting.append((bag_ns, raw))
-        if len(waiting) == AT_ONCE:
-            self._decode(connection.topic, connection.msgtype)
-
-    def finish(self) -> None:
-        """Decode what has come."""
-        for key in list(self._waiting):
-            self._decode(*key)
+    def take(self, topic: str, kind: str, times: Sequence[int], raws: Sequence[bytes]) -> None:
+        """Take messages of one type, of a topic with namespace, and their record times [ns]."""
+        count = len(raws)
+        if kind == WORDS:
+            messages = [of for raw in raws if (of := message_of(raw, kind)) is not None]
+            self.messages += [Stamped(_stamp_ns(of), of) for of in messages]
+            count -= len(messages)
+        else:
+            count -= self._take_numbers(kind, np.array(times, np.int64), raws)
+        if count:
+            self.skipped[topic] += count
 
     def joined(self, values: int = 0) -> Block:
         """All messages in the order of their record times, with so many numbers of each."""
-        blocks = [block for of in self.blocks.values() for block in of]
+        blocks = [block for of in self.blocks.values() for block in of.all()]
         bag_ns, stamp = (np.concatenate([np.empty(0, np.int64), *(of[k] for of in blocks)])
                          for k in (0, 1))
         order = np.argsort(bag_ns, kind='stable')
         numbers = np.concatenate([np.empty((0, values)), *(of.values for of in blocks if values)])
         return Block(bag_ns[order], stamp[order], numbers[order] if values else numbers)
 
-    def _decode(self, topic: str, kind: str) -> None:
-        waiting = self._waiting.pop((topic, kind))
-        if kind == WORDS:
-            messages = [message_of(raw, kind) for _, raw in waiting]
-            self.messages += [Received(_stamp_ns(of), of) for of in messages if of is not None]
-            self._skip(topic, messages.count(None))
-            return
-        bag_ns = np.array([time for time, _ in waiting], np.int64)
+    def _take_numbers(self, kind: str, bag_ns: NDArray[np.int64], raws: Sequence[bytes]) -> int:
+        """Take numbers; returns of how many messages."""
         parts: dict[tuple[tuple[str, ...], str], list[tuple[Any, ...]]] = defaultdict(list)
-        for group in alike([raw for _, raw in waiting], kind):
+        taken = 0
+        for group in alike(raws, kind):
             key, values = self._numbers(kind, group)
             parts[key].append((group.rows, _stamps(group), values))
+            taken += len(group.rows)
         for key, of in parts.items():
             rows, stamp, values = (np.concatenate(part) for part in zip(*of, strict=True))
             order = np.argsort(rows)
-            self.blocks[key].append(Block(bag_ns[rows[order]], stamp[order], values[order]))
-            waiting = waiting[len(rows):]
-        self._skip(topic, len(waiting))
-
-    def _skip(self, topic: str, count: int) -> None:
-        if count:
-            self.skipped[topic] += count
+            block = _cut(Block(bag_ns[rows], stamp, values), order)
+            names = key[0]
+            rare = np.array([of.startswith(RARE) for of in names], dtype=bool)
+            if rare.any():
+                self.blocks[tuple(np.array(names)[rare]), ''].add(
+                    _changes_of(block._replace(values=block.values[..., rare])))
+                block = block._replace(values=block.values[..., ~rare])
+                key = tuple(np.array(names)[~rare]), ''
+            if key[0] or not names:
+                self.blocks[key].add(block)
+        return taken
 
     def _numbers(self, kind: str, group: Alike) -> tuple[tuple[tuple[str, ...], str], Array]:
         """Names, frame and numbers of some messages."""
@@ -170,13 +213,26 @@ class Topic:
         return (tuple(names[k] for k in kept), group.first.header.frame_id), values
 
 
-def load_recording(path: Path | str) -> Recording:
+def _changes_of(block: Block) -> Block:
+    """Messages of a block whose numbers differ from those before."""
+    bits = np.ascontiguousarray(block.values).view(np.int64)  # tells -0.0 from 0.0
+    kept = (np.diff(bits, axis=0, prepend=~bits[:1]) != 0).any(axis=(1, 2))
+    if (np.diff(block.stamp) < 0).any():
+        return block
+    return _cut(block, kept)
+
+
+def load_recording(path: Path | str, *, only: Mapping[str, Sequence[str]] | None = None
+                   ) -> Recording:
     """Read a recording.
 
     Parameters
     ----------
     path : path-like
         A rosbag2 folder (MCAP or SQLite), one file of it, or a run's folder with ``bag/`` inside.
+    only : mapping of str to sequence of str, optional
+        Fields that are read of a topic of joint states, where that is not all of them; the others
+        are NaN and take no memory.
 
     Returns
     -------
@@ -191,38 +247,48 @@ def load_recording(path: Path | str) -> Recording:
         that cannot be decoded are no error: they are left out, counted and warned of.
     """
     with naming(path):
-        return _loaded(find_bag(path))
+        return _loaded(find_bag(path), {**FIELDS, **(only or {})})
 
 
-def _loaded(bag: Path) -> Recording:
+def _loaded(bag: Path, fields: Mapping[str, Sequence[str]]) -> Recording:
     with opened(bag) as reader:
         robots = sorted(topic for topic in reader.topics if base_name(topic) == 'joint_states')
         if len(robots) > 1:
             raise DataError(f'the bag holds {", ".join(robots)}; record one robot per bag')
         used = [c for c in reader.connections if base_name(c.topic) in TOPICS.get(c.msgtype, ())]
-        topics = {name: Topic(name) for names in TOPICS.values() for name in names}
+        topics = {name: Topic(fields.get(name, ALL_FIELDS))
+                  for names in TOPICS.values() for name in names}
+        waiting: dict[str, tuple[list[int], list[bytes]]] = {of.topic: ([], []) for of in used}
+        kinds = {of.topic: of.msgtype for of in used}
         for connection, bag_ns, raw in recorded(reader, used):
-            topics[base_name(connection.topic)].take(connection, bag_ns, raw)
+            times, raws = waiting[connection.topic]
+            times.append(bag_ns)
+            raws.append(raw)
+            if len(raws) == AT_ONCE:
+                topics[base_name(connection.topic)].take(
+                    connection.topic, connection.msgtype, times, raws)
+                waiting[connection.topic] = [], []
+        for name, (times, raws) in waiting.items():
+            topics[base_name(name)].take(name, kinds[name], times, raws)
         counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}
     skipped = Counter[str]()
     for topic in topics.values():
-        topic.finish()
         skipped += topic.skipped
     warn_of(skipped)
     commands, arrivals = _on_robot_clock(topics), _arrivals(topics)
+    modes = _modes(topics)
     return Recording(
-        joints=recording.JointSeries(*_table(topics['joint_states'], JOINT_NAMES)),
-        targets=recording.JointSeries(*_table(topics['joint_targets'], JOINT_NAMES)),
+        joints=_joints(topics.pop('joint_states')), targets=_joints(topics.pop('joint_targets')),
         work=recording.WorkSeries(*_table(topics['joint_work'], JOINT_NAMES)),
         canonical=_canonical(topics['canonical_state']),
         reference=recording.VelocitySeries(*_rows(topics['reference'].joined(3), (3,))),
         commands=recording.VelocitySeries(*_rows(commands, (3,))),
-        odometry=recording.OdometrySeries(*_rows(topics['odom'].joined(13), (3, 4, 3, 3))),
+        odometry=recording.OdometrySeries(*_rows(topics.pop('odom').joined(13), (3, 4, 3, 3))),
         estimate=recording.OdometrySeries(
             *_rows(topics['estimated_odom'].joined(13), (3, 4, 3, 3))),
         feet=_feet(topics['foot_contacts']),
         inhibition=_changes(topics['inhibition_state'].messages, lambda e: (e.message, e.values)),
-        modes=_modes(topics), statuses=_by_name(topics['diagnostics'].messages),
+        modes=modes, statuses=_by_name(topics['diagnostics'].messages),
         arrivals=arrivals, counts=counts, undecodable=dict(skipped))
 
 
@@ -277,43 +343,55 @@ def _table(topic: Topic, names: Sequence[str]) -> list[Array]:
     stamps agree. NaN stands where no message held a value; of messages with one stamp and one name
     the last counts.
     """
-    groups = {key: blocks for key, blocks in topic.blocks.items() if set(names) & set(key[0])}
+    groups = {key: topic.blocks.pop(key).all() for key in list(topic.blocks)
+              if set(names) & set(key[0])}
     stamps = np.unique(np.concatenate(
         [np.empty(0, np.int64), *(of.stamp for blocks in groups.values() for of in blocks)]))
-    table = [np.full((len(stamps), len(names)), np.nan) for _ in topic.fields]
+    is_whole = len(groups) == 1 and set(names) <= set(next(iter(groups))[0])
+    table = [np.empty((len(stamps), len(names))) for _ in topic.fields]
+    for values in table:
+        if not is_whole:
+            values[:] = np.nan
     for (held, _), blocks in groups.items():
         sources = [source for source, name in enumerate(held) if name in names]
         columns = [names.index(held[source]) for source in sources]
-        for block in blocks:
+        while blocks:  # what is in the table is given back at once
+            block = blocks.pop(0)
             rows = np.searchsorted(stamps, block.stamp)
             for k, values in enumerate(table):
                 values[rows[:, None], columns] = block.values[:, k, sources]
     return [stamps / 1e9, *table]
 
 
+def _joints(topic: Topic) -> recording.JointSeries:
+    time, *values = _table(topic, JOINT_NAMES)
+    unread = np.broadcast_to(np.nan, (len(time), len(JOINT_NAMES)))
+    return recording.JointSeries(
+        time, **{**dict.fromkeys(ALL_FIELDS, unread), **dict(zip(topic.fields, values,
+                                                                 strict=True))})
+
+
 def _canonical(topic: Topic) -> recording.CanonicalSeries:
+    frames = {stamp: frame for (names, frame), blocks in topic.blocks.items() if frame
+              for block in blocks.all() for stamp in (block.stamp / 1e9).tolist()}
     time, x, x_dot = _table(topic, layouts.OSCILLATOR_ROWS)
-    gaits, shape = _gaits(topic), (-1, len(LEGS), 2)
-    return recording.CanonicalSeries(
-        time, x.reshape(shape), x_dot.reshape(shape), gaits if len(gaits) == len(time) else ())
+    shape = (-1, len(LEGS), 2)
+    return recording.CanonicalSeries(time, x.reshape(shape), x_dot.reshape(shape),
+                                     _gaits(topic, time, frames))
 
 
-def _gaits(topic: Topic) -> tuple[GaitShares, ...]:
-    """Gait in force of each canonical state, in the order of the stamps."""
+def _gaits(topic: Topic, time: Array, frames: Mapping[float, str]) -> tuple[GaitShares, ...]:
+    """Gait in force at each time, by rows or, in former recordings, by frames; or none."""
     rows = [name for name in dict.fromkeys(name for names, _ in topic.blocks for name in names)
             if name.startswith(layouts.GAIT_PREFIX)]
     if not rows:
-        texts = {stamp: frame for (_, frame), blocks in topic.blocks.items() for block in blocks
-                 for stamp in block.stamp.tolist()}
-        return tuple(_former_gait(texts[stamp]) for stamp in sorted(texts)) if all(
-            texts.values()) else ()
-    _, shares, rates = _table(topic, [*rows, layouts.CADENCE_ROW])
-    bits = np.concatenate([shares, rates], axis=1).view(np.int64)  # tells -0.0 from 0.0
-    begins = np.flatnonzero((np.diff(bits, axis=0, prepend=~bits[:1]) != 0).any(axis=1))
-    lengths = np.diff([*begins, len(bits)])
-    return tuple(gait for begin, length in zip(begins, lengths.tolist(), strict=True)
-                 for gait in (layouts.read_gait_rows(
-                     rows, shares[begin].tolist(), rates[begin].tolist()),) * length)
+        known = all(frames.get(of) for of in time.tolist())
+        return tuple(_former_gait(frames[of]) for of in time.tolist()) if known else ()
+    changed, *numbers = _table(topic, [*rows, layouts.CADENCE_ROW])
+    gaits = [layouts.read_gait_rows(rows, *of)
+             for of in zip(*(part.tolist() for part in numbers), strict=True)]
+    return tuple(gaits[row] for row in
+                 (np.searchsorted(changed, time, side='right') - 1).clip(0).tolist())
 
 
 @cache
@@ -348,7 +426,7 @@ def _arrivals(topics: Mapping[str, Topic]) -> recording.ArrivalSeries:
     return recording.ArrivalSeries(states.stamp / 1e9, states.bag_ns / 1e9, answer / 1e9)
 
 
-def _statuses(messages: Sequence[Received]) -> Iterator[tuple[str, StatusEvent]]:
+def _statuses(messages: Sequence[Stamped]) -> Iterator[tuple[str, StatusEvent]]:
     """Every status with its name."""
     for received in messages:
         for status in received.message.status:
@@ -357,14 +435,14 @@ def _statuses(messages: Sequence[Received]) -> Iterator[tuple[str, StatusEvent]]
                 {pair.key: pair.value for pair in status.values})
 
 
-def _by_name(messages: Sequence[Received]) -> dict[str, tuple[StatusEvent, ...]]:
+def _by_name(messages: Sequence[Stamped]) -> dict[str, tuple[StatusEvent, ...]]:
     histories: dict[str, list[StatusEvent]] = defaultdict(list)
     for name, event in _statuses(messages):  # robot/node, where the robot has a namespace
         histories[base_name(name)].append(event)
     return {name: tuple(history) for name, history in histories.items()}
 
 
-def _changes(messages: Sequence[Received], what: Callable[[StatusEvent], Any],
+def _changes(messages: Sequence[Stamped], what: Callable[[StatusEvent], Any],
              ) -> tuple[StatusEvent, ...]:
     """The first of the events in a row that say the same."""
     events = (event for _, event in _statuses(messages))

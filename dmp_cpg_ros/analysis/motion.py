@@ -14,7 +14,6 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.recording import Array, OdometrySeries, Recording, Series, taken
 from dmp_cpg_ros.core.robot_model import world
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
-from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 
 
 def rotations(quaternion: Array) -> Array:
@@ -75,6 +74,9 @@ def integral(time: Array, values: Array) -> Array:
 
 def mean_between(time: Array, values: Array, start: float, end: float) -> Array:
     """Time averages of (n, k) over [start, end], ndarray (k,)."""
+    first, past = np.searchsorted(time, (start, end), side='right')
+    near = slice(max(first - 1, 0), past + 1)
+    time, values = time[near], values[near]
     ends = np.array([np.interp((start, end), time, of) for of in integral(time, values).T])
     return (ends[:, 1] - ends[:, 0]) / (end - start)
 
@@ -165,8 +167,18 @@ def feet_in_world(leg: LegGeometry, q: Array, odometry: OdometrySeries) -> Array
 
 def feet_in_base(leg: LegGeometry, q: Array) -> Array:
     """Foot positions of a leg's joint angles: (n, 3) → (n, 3) [m]."""
-    kinematics = LegKinematics(leg)
-    return np.array([kinematics.foot_in_base(row) for row in q]).reshape(-1, 3)
+    roll, hip, knee = (leg.axis_sign * q).T
+    x, z = _about_y(knee, leg.shank[0], leg.shank[2])
+    x, z = _about_y(hip, leg.thigh[0] + x, leg.thigh[2] + z)
+    x, y, z = np.array([x, np.zeros(len(x)), z]) + leg.hip_offset[:, None]
+    y, c, s = y + leg.thigh[1] + leg.shank[1], np.cos(roll), np.sin(roll)
+    return leg.hip_in_base + np.stack([x, c * y - s * z, s * y + c * z], axis=1)
+
+
+def _about_y(angle: Array, x: Any, z: Any) -> tuple[Array, Array]:
+    """Coordinates x and z after a rotation about y [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return c * x + s * z, c * z - s * x
 
 
 def shank_rate_in_base(leg: LegGeometry, q: Array, q_dot: Array) -> Array:

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sized
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
 
+from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
@@ -93,6 +95,11 @@ class CanonicalSeries(Series):
     x: Array = no_rows(N_LEGS, 2)
     x_dot: Array = no_rows(N_LEGS, 2)
     gaits: tuple[GaitShares, ...] = ()
+
+    @cached_property
+    def turns(self) -> Array:
+        """Growing phase of oscillator fl, ndarray (n,) in cycles."""
+        return np.unwrap(phase(self.x[:, 0])) / (2.0 * np.pi)
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def analyze_run(
     earlier = {} if run is None or parameters is not None else read_json(run / 'manifest.json')
     if certificate is None and run is not None:
         certificate = read_json(run / 'metrics.json').get('certificate')
-    recording = load_recording(bag)
+    recording = load_recording(bag, only={'joint_targets': ('position',)})
     if parameters is None:
         parameters = earlier.get('parameters')
     context, robot_path = run_context(parameters, robot_file)

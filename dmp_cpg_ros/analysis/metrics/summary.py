@@ -19,7 +19,7 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.episodes import Episode
 from dmp_cpg_ros.analysis.metrics import robot
 from dmp_cpg_ros.analysis.motion import held, mean_between
-from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent
+from dmp_cpg_ros.analysis.recording import Array, Recording, StatusEvent, taken
 from dmp_cpg_ros.core.canonical.phase import phase, wrapped
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.suite_table import ROBOT
@@ -78,9 +78,9 @@ def _first(episode: Episode, key: str) -> float | None:
 
 def _body_at_rest(
         recording: Recording, request: float, window: tuple[float, float]) -> dict[str, Any]:
-    odometry = recording.odometry
-    since, rows = (episodes.within(odometry.time, [(start, window[1])])
-                   for start in (request, window[0]))
+    odometry = taken(recording.odometry, slice(*np.searchsorted(
+        recording.odometry.time, (request, window[1]))))
+    since, rows = (odometry.time >= start for start in (request, window[0]))
     if not rows.any():
         return {'body_speed_at_rest_m_s': None, 'body_still_after_s': None, 'displacement_m': None}
     speed = np.linalg.norm(odometry.velocity_in_base, axis=1)
