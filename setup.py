@@ -128,6 +128,8 @@ setup(
         'doc': ['mkdocs-material>=9.5'],
         # Films as MP4; without, they are GIFs.
         'video': ['imageio-ffmpeg>=0.4.9'],
+        # Recordings as Parquet; analyze --parquet says so without.
+        'parquet': ['pyarrow>=14'],
     },
     entry_points={
         'console_scripts': [f'{NAME} = {NAME}.__main__:main',

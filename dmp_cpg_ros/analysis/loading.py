@@ -222,8 +222,8 @@ def _changes_of(block: Block) -> Block:
     return _cut(block, kept)
 
 
-def load_recording(path: Path | str, *, only: Mapping[str, Sequence[str]] | None = None
-                   ) -> Recording:
+def load_recording(path: Path | str, *, only: Mapping[str, Sequence[str]] | None = None,
+                   tell: Callable[[str], None] = lambda text: None) -> Recording:
     """Read a recording.
 
     Parameters
@@ -233,6 +233,8 @@ def load_recording(path: Path | str, *, only: Mapping[str, Sequence[str]] | None
     only : mapping of str to sequence of str, optional
         Fields that are read of a topic of joint states, where that is not all of them; the others
         are NaN and take no memory.
+    tell : callable (str), optional
+        Is told how far it is.
 
     Returns
     -------
@@ -247,10 +249,11 @@ def load_recording(path: Path | str, *, only: Mapping[str, Sequence[str]] | None
         that cannot be decoded are no error: they are left out, counted and warned of.
     """
     with naming(path):
-        return _loaded(find_bag(path), {**FIELDS, **(only or {})})
+        return _loaded(find_bag(path), {**FIELDS, **(only or {})}, tell)
 
 
-def _loaded(bag: Path, fields: Mapping[str, Sequence[str]]) -> Recording:
+def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str], None]
+            ) -> Recording:
     with opened(bag) as reader:
         robots = sorted(topic for topic in reader.topics if base_name(topic) == 'joint_states')
         if len(robots) > 1:
@@ -259,7 +262,8 @@ def _loaded(bag: Path, fields: Mapping[str, Sequence[str]]) -> Recording:
         topics = {name: Topic(fields.get(name, ALL_FIELDS))
                   for names in TOPICS.values() for name in names}
         waiting: dict[str, tuple[list[int], list[bytes]]] = {of.topic: ([], []) for of in used}
-        kinds = {of.topic: of.msgtype for of in used}
+        kinds, total = {of.topic: of.msgtype for of in used}, sum(of.msgcount for of in used)
+        taken = 0
         for connection, bag_ns, raw in recorded(reader, used):
             times, raws = waiting[connection.topic]
             times.append(bag_ns)
@@ -268,6 +272,8 @@ def _loaded(bag: Path, fields: Mapping[str, Sequence[str]]) -> Recording:
                 topics[base_name(connection.topic)].take(
                     connection.topic, connection.msgtype, times, raws)
                 waiting[connection.topic] = [], []
+                taken += AT_ONCE
+                tell(f'reading: {taken:,} of {total:,} messages')
         for name, (times, raws) in waiting.items():
             topics[base_name(name)].take(name, kinds[name], times, raws)
         counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}

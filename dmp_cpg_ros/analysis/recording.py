@@ -8,9 +8,11 @@ an array with no rows, so that every query works on every recording.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sized
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from itertools import product
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,15 +22,15 @@ from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
-N_JOINTS, N_LEGS = len(JOINT_NAMES), len(LEGS)
-
-
 Rows = TypeVar('Rows', bound='Series')
 
 
-def no_rows(*shape: int) -> Any:
-    """Field of a dataclass that is an array without rows, ndarray (0, *shape), by default."""
-    return field(default_factory=lambda: np.empty((0, *shape)))
+def no_rows(*axes: Sequence[str], unit: str = '') -> Any:
+    """Field of a dataclass that is an array without rows by default, with the names along its
+    other axes and its unit, as they stand in names of columns.
+    """
+    return field(default_factory=lambda: np.empty((0, *map(len, axes))),
+                 metadata={'axes': axes, 'unit': unit})
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Series:
         [s]
     """
 
-    time: Array = no_rows()
+    time: Array = no_rows(unit='s')
 
 
 def taken(series: Rows, rows: Any) -> Rows:
@@ -59,9 +61,9 @@ class JointSeries(Series):
         [rad], [rad/s], [N m] in the order of ``JOINT_NAMES``; NaN where a message held no value.
     """
 
-    position: Array = no_rows(N_JOINTS)
-    velocity: Array = no_rows(N_JOINTS)
-    effort: Array = no_rows(N_JOINTS)
+    position: Array = no_rows(JOINT_NAMES, unit='rad')
+    velocity: Array = no_rows(JOINT_NAMES, unit='rad_s')
+    effort: Array = no_rows(JOINT_NAMES, unit='n_m')
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,8 @@ class WorkSeries(Series):
         Largest size of the torque since the row before [N m].
     """
 
-    work: Array = no_rows(N_JOINTS)
-    peak_effort: Array = no_rows(N_JOINTS)
+    work: Array = no_rows(JOINT_NAMES, unit='j')
+    peak_effort: Array = no_rows(JOINT_NAMES, unit='n_m')
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,8 @@ class CanonicalSeries(Series):
         Gait in which the phases are to be read, one per state; empty where it was not recorded.
     """
 
-    x: Array = no_rows(N_LEGS, 2)
-    x_dot: Array = no_rows(N_LEGS, 2)
+    x: Array = no_rows(LEGS, '12')
+    x_dot: Array = no_rows(LEGS, '12', unit='per_s')
     gaits: tuple[GaitShares, ...] = ()
 
     @cached_property
@@ -112,7 +114,7 @@ class VelocitySeries(Series):
         v_x, v_y [m/s], γ [rad/s].
     """
 
-    value: Array = no_rows(3)
+    value: Array = no_rows(('v_x_m_s', 'v_y_m_s', 'gamma_rad_s'))
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,10 @@ class OdometrySeries(Series):
         [m/s], [rad/s]
     """
 
-    position_in_world: Array = no_rows(3)
-    quaternion: Array = no_rows(4)
-    velocity_in_base: Array = no_rows(3)
-    rate_in_base: Array = no_rows(3)
+    position_in_world: Array = no_rows('xyz', unit='m')
+    quaternion: Array = no_rows('xyzw')
+    velocity_in_base: Array = no_rows('xyz', unit='m_s')
+    rate_in_base: Array = no_rows('xyz', unit='rad_s')
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ class FootForceSeries(Series):
         [N], in the order of ``LEGS``.
     """
 
-    force: Array = no_rows(N_LEGS)
+    force: Array = no_rows(LEGS, unit='n')
 
 
 @dataclass(frozen=True)
@@ -189,8 +191,8 @@ class ArrivalSeries(Series):
         stamp (NaN without). They are on whatever clock the recorder used.
     """
 
-    state: Array = no_rows()
-    targets: Array = no_rows()
+    state: Array = no_rows(unit='s')
+    targets: Array = no_rows(unit='s')
 
     @property
     def on_wall_clock(self) -> bool:
@@ -200,7 +202,8 @@ class ArrivalSeries(Series):
 
 @dataclass(frozen=True)
 class Recording:
-    """One run.
+    """One run: :meth:`load` reads it, its attributes are arrays in SI units, and :meth:`tables`
+    names every column.
 
     Attributes
     ----------
@@ -247,6 +250,41 @@ class Recording:
     counts: Mapping[str, int] = field(default_factory=dict)
     undecodable: Mapping[str, int] = field(default_factory=dict)
 
+    @classmethod
+    def load(cls, path: Path | str) -> Recording:
+        """Read a recording, see :func:`~dmp_cpg_ros.analysis.loading.load_recording`."""
+        from dmp_cpg_ros.analysis.loading import load_recording
+
+        return load_recording(path)
+
+    def tables(self) -> dict[str, dict[str, Any]]:
+        """Columns of all that was recorded, by table and by name.
+
+        Returns
+        -------
+        dict of str to dict of str to ndarray (n,) or list of str
+            Tables are named as the attributes are. Columns are named by quantity, frame, joint or
+            axis, and unit, such as ``position_fl_hip_rad``; states and words of the nodes are
+            texts.
+        """
+        found: dict[str, dict[str, Any]] = {
+            of.name: _columns(series) for of in fields(self)
+            if isinstance(series := getattr(self, of.name), Series) and len(series.time)}
+        if gaits := self.canonical.gaits:
+            found['canonical'] |= {
+                'gait': [of.before for of in gaits], 'next_gait': [of.after for of in gaits],
+                'share_of_next_gait': np.array([of.share for of in gaits]),
+                'cadence_scale': np.array([of.cadence_scale for of in gaits])}
+        told = {'inhibition': [('', of) for of in self.inhibition],
+                'modes': [('', of) for of in self.modes],
+                'statuses': [(name, of) for name, history in self.statuses.items()
+                             for of in history]}
+        return found | {name: {
+            'time_s': np.array([of.time for _, of in events]), 'name': [of for of, _ in events],
+            'message': [of.message for _, of in events],
+            'values': [', '.join(f'{key}={value}' for key, value in of.values.items())
+                       for _, of in events]} for name, events in told.items() if events}
+
     @property
     def diagnostics(self) -> dict[str, StatusEvent]:
         """The last status of every name on ``/diagnostics``."""
@@ -271,3 +309,17 @@ class Recording:
                                            self.reference, self.feet, self.targets)]
         ends = [float(axis[row]) for axis in axes if axis.size for row in (0, -1)]
         return min(ends, default=0.0), max(ends, default=0.0)
+
+
+def _columns(series: Series) -> dict[str, Array]:
+    """Columns of a series by their names."""
+    found = {}
+    for of in fields(series):
+        if 'axes' in of.metadata:
+            values, quantity = getattr(series, of.name), of.name if of.name != 'value' else ''
+            for place in product(*(range(len(axis)) for axis in of.metadata['axes'])):
+                names = [axis[k] for axis, k in zip(of.metadata['axes'], place, strict=True)]
+                name = '_'.join(filter(None, [quantity, *names, of.metadata['unit']]))
+                at = (slice(None), *place)
+                found[name] = values[at]
+    return found

@@ -21,6 +21,7 @@ from dmp_cpg_ros.analysis.figures import drawings, style
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.strict_json import to_json
+from dmp_cpg_ros.analysis.tables import as_text, flattened
 
 CATALOGUE = (
     drawings.target_kinematics, drawings.canonical_states, drawings.phase_portrait,
@@ -174,22 +175,5 @@ def label(key: str) -> str:
 
 
 def _text(value: Any) -> str:
-    """Value as HTML: four significant digits, yes and no, a dash for nothing."""
-    if value is None or isinstance(value, bool):
-        return {None: '–', True: 'yes', False: 'no'}[value]
-    if isinstance(value, float):
-        return f'{value:.4g}'
-    if isinstance(value, (list, tuple)):
-        return ', '.join(_text(entry) for entry in value)
-    return escape(str(value))
-
-
-def flattened(values: Mapping[str, Any], prefix: str = '') -> dict[str, Any]:
-    """Nested values by dotted names; lists of mappings are left out."""
-    flat: dict[str, Any] = {}
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            flat.update(flattened(value, f'{prefix}{key}.'))
-        elif not (isinstance(value, list) and any(isinstance(entry, Mapping) for entry in value)):
-            flat[f'{prefix}{key}'] = value
-    return flat
+    """Value as HTML."""
+    return escape(as_text(value))

@@ -165,7 +165,7 @@ class RunResults:
 def write_results(
         folder: Path, recording: Recording, context: RunContext, manifest: Mapping[str, Any],
         certificate: Sequence[Any] | None = None, draw: Draw | None = None,
-        report: bool = True) -> RunResults:
+        report: bool = True, tell: Callable[[str], None] = lambda text: None) -> RunResults:
     """Write everything that a run's folder holds besides its bag.
 
     Parameters
@@ -186,12 +186,15 @@ def write_results(
     report : bool
         Whether to draw figures and write the report; the two JSON files are written in any case,
         and first.
+    tell : callable (str), optional
+        Is told how far it is.
 
     Returns
     -------
     RunResults
     """
     folder.mkdir(parents=True, exist_ok=True)
+    tell('metrics')
     metrics: dict[str, Any] = plain(compute_metrics(recording, context, certificate))
     facts: dict[str, Any] = plain(manifest)
     write_json(folder / 'metrics.json', metrics)
@@ -200,7 +203,9 @@ def write_results(
         return RunResults(folder, metrics, facts)
     from dmp_cpg_ros.analysis.report import render, write_figures
 
+    tell('figures')
     figures = write_figures(recording, context, folder / 'figures')
+    tell('pictures and report')
     pictures = {} if draw is None else write_pictures(recording, context, folder / 'figures', draw)
     page = folder / 'report.html'
     page.write_text(render(*_headings(recording, context, facts), metrics, facts, figures,

@@ -6,8 +6,10 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +18,19 @@ from dmp_cpg_ros.analysis.context import find_parameter
 from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.manifest import build_manifest
+from dmp_cpg_ros.analysis.recording import Recording
 from dmp_cpg_ros.analysis.run import RunResults, write_results
+from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.analysis.tables import (
+    as_text,
+    markdown_table,
+    side_by_side,
+    write_csv,
+    write_parquet,
+)
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.commands.run_folder import picture_taker, read_json, run_context
+from dmp_cpg_ros.core.errors import ParameterError
 
 BAG_ALONE = {'note': 'made from a bag alone: versions, commit and host are those of the analysis'}
 
@@ -28,7 +40,8 @@ def analyze_run(
         robot_file: Path | str | None = None, parameters: Mapping[str, Any] | None = None,
         certificate: Sequence[Any] | None = None, seeds: Mapping[str, int] | None = None,
         lock_step: bool | None = None, pictures: bool = True, report: bool = True,
-        **manifest_facts: Any) -> RunResults:
+        export: Callable[[Recording], None] | None = None,
+        tell: Callable[[str], None] = lambda text: None, **manifest_facts: Any) -> RunResults:
     """Analyze a run and write its folder.
 
     Parameters
@@ -51,6 +64,10 @@ def analyze_run(
         Whether the run was in lock-step; its manifest then has digests.
     pictures, report : bool
         Whether to take pictures of the robot; whether to draw figures and write the report at all.
+    export : callable (Recording), optional
+        Gets the recording with everything that is in it.
+    tell : callable (str), optional
+        Is told how far it is.
     **manifest_facts
         More for the manifest, such as ``scenario``.
 
@@ -68,7 +85,11 @@ def analyze_run(
     earlier = {} if run is None or parameters is not None else read_json(run / 'manifest.json')
     if certificate is None and run is not None:
         certificate = read_json(run / 'metrics.json').get('certificate')
-    recording = load_recording(bag, only={'joint_targets': ('position',)})
+    recording = load_recording(
+        bag, only=None if export else {'joint_targets': ('position',)}, tell=tell)
+    if export is not None:
+        tell('tables')
+        export(recording)
     if parameters is None:
         parameters = earlier.get('parameters')
     context, robot_path = run_context(parameters, robot_file)
@@ -81,7 +102,8 @@ def analyze_run(
     bag = bag.resolve()
     beside = bag.with_name(f'{bag.name if bag.is_dir() else bag.stem}_analysis')
     folder = Path(out) if out is not None else run or beside
-    return write_results(folder, recording, context, manifest, certificate, draw, report)
+    return write_results(folder, recording, context, manifest, certificate, draw, report,
+                         tell)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -89,25 +111,81 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format='%(levelname)s: %(message)s', level=logging.WARNING)
     parser = argparse.ArgumentParser(
         prog='analyze',
-        description='Make figures, metrics.json, manifest.json and report.html of a recorded run.')
+        description='Make figures, metrics.json, manifest.json and report.html of a recorded run; '
+        'of several runs metrics.json and manifest.json of each, and one table with the runs side '
+        'by side.')
     add = parser.add_argument
-    add('bag', metavar='BAG_OR_RUN', type=Path,
+    add('bags', metavar='BAG_OR_RUN', type=Path, nargs='+',
         help="rosbag2 folder or file (MCAP or SQLite), or a run's folder with bag/ inside")
     add('--out', metavar='DIR', type=Path,
-        help="where to write (default: the run's folder; for a bare bag NAME_analysis beside it)")
+        help="where to write (default: the run's folder; for a bare bag NAME_analysis beside it); "
+        'of several runs, the table as comparison.md and comparison.json')
     add('--robot', metavar='FILE', type=Path,
         help="the robot's YAML file (default: the one that the run's manifest names, else the "
         "package's own)")
     add('--no-pictures', action='store_true', help='take no pictures of the robot')
+    add('--csv', metavar='DIR', type=Path,
+        help='write what was recorded as tables in DIR: NAME.csv')
+    add('--parquet', metavar='DIR', type=Path, help='the same as NAME.parquet; needs pyarrow')
     return run_command(parser, arguments, _analyze)
 
 
 def _analyze(options: argparse.Namespace, _: RosArguments) -> int:
-    results = analyze_run(options.bag, out=options.out, robot_file=options.robot,
-                          pictures=not options.no_pictures)
+    def export(recording: Recording) -> None:
+        for folder, write in ((options.csv, write_csv), (options.parquet, write_parquet)):
+            if folder is not None:
+                write(recording, folder)
+
+    if len(options.bags) > 1:
+        return _compare(options)
+    results = analyze_run(options.bags[0], out=options.out, robot_file=options.robot,
+                          pictures=not options.no_pictures, tell=Progress(),
+                          export=export if options.csv or options.parquet else None)
     print_facts(results, results.manifest.get('lock_step'))
     print(f'report: {results.report}')
     return 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    """Several runs side by side."""
+    if options.csv or options.parquet:
+        raise ParameterError('--csv and --parquet write the tables of one run')
+    runs = {}
+    parent = Path(os.path.commonpath([path.absolute().parent for path in options.bags]))
+    for path in options.bags:
+        tell = Progress(f'{path}: ')
+        results = analyze_run(path, robot_file=options.robot, report=False, tell=tell)
+        runs[str(path.absolute().relative_to(parent))] = results.metrics
+    head, rows = side_by_side(runs)
+    table = markdown_table(head, [[as_text(cell) for cell in row] for row in rows])
+    print(table)
+    if options.out is not None:
+        options.out.mkdir(parents=True, exist_ok=True)
+        (options.out / 'comparison.md').write_text(f'{table}\n', encoding='utf-8')
+        write_json(options.out / 'comparison.json', runs)
+    return 0
+
+
+class Progress:
+    """Tells on stderr how far long work is: after some seconds, and not too often.
+
+    Parameters
+    ----------
+    of : str
+        What stands before.
+    """
+
+    SILENT_S, EVERY_S = 3.0, 5.0
+
+    def __init__(self, of: str = '') -> None:
+        """The work begins."""
+        self._of, self._next = of, time.monotonic() + self.SILENT_S
+
+    def __call__(self, text: str) -> None:
+        """Tell."""
+        if time.monotonic() >= self._next:
+            print(f'{self._of}{text}', file=sys.stderr, flush=True)
+            self._next = time.monotonic() + self.EVERY_S
 
 
 def print_facts(results: RunResults, lock_step: bool | None) -> None:

@@ -6,19 +6,11 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from dmp_cpg_ros.analysis.strict_json import write_json
-
-
-def markdown_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Markdown table with columns of even width, from headings and one cell per column."""
-    widths = [max(map(len, cells)) for cells in zip(columns, *rows, strict=True)]
-    rule = ['-' * width for width in widths]
-    return '\n'.join(f"| {' | '.join(map(str.ljust, row, widths))} |"
-                     for row in (columns, rule, *rows))
+from dmp_cpg_ros.analysis.tables import markdown_table as markdown_table
 
 
 def percent(part: float, whole: float) -> str:

@@ -16,7 +16,7 @@ MESSAGES = {'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs', 'lifecycle
             'rcl_interfaces', 'rosgraph_msgs', 'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs',
             'visualization_msgs'}
 ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', *MESSAGES}
-RECORDS = {'rosbags', 'mcap', 'lz4', 'zstandard'}
+RECORDS = {'rosbags', 'mcap', 'lz4', 'zstandard', 'pyarrow'}
 FIGURES = {'matplotlib'}
 FILMS = {'PIL', 'imageio_ffmpeg'}
 EVERYTHING = {'numpy', 'scipy', 'yaml', 'mujoco', *ROS, *RECORDS, *FIGURES, *FILMS}
