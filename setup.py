@@ -83,7 +83,7 @@ def package_data() -> list[str]:
     """The type marker, the report's style, all of models/ and page/, relative to the package."""
     package = Path(NAME)
     found = sorted(path for folder in ('models', 'page') for path in (package / folder).rglob('*'))
-    return ['py.typed', 'analysis/report.css', *(
+    return ['py.typed', 'analysis/report.css', 'analysis/report.js', *(
         str(path.relative_to(package)) for path in found
         if path.is_file() and path.suffix not in ('.py', '.pyc'))]
 

@@ -65,11 +65,16 @@ MARKS = {True: ('good', '✓ holds'), False: ('bad', '✗ does not hold'), None:
 UNITS = {'_m_s': 'm/s', '_s': 's', '_m': 'm', '_n': 'N'}
 """Endings of keys that name a unit."""
 
-CSS = Path(__file__).with_suffix('.css').read_text(encoding='utf-8')
+CSS, SCRIPT = (Path(__file__).with_suffix(kind).read_text(encoding='utf-8')
+               for kind in ('.css', '.js'))
+
+FOLDED = ('Steady speeds', 'Metrics', 'Injected failures', 'Certificate', 'Manifest')
+"""Sections that are opened by a click."""
 
 
 def render(title: str, subtitle: str, metrics: Mapping[str, Any], manifest: Mapping[str, Any],
-           figures: Mapping[str, Path], pictures: Mapping[str, tuple[Path, str]]) -> str:
+           figures: Mapping[str, Path], pictures: Mapping[str, tuple[Path, str]],
+           story: str = '') -> str:
     """Return the report as HTML text; pictures are inside it.
 
     Parameters
@@ -82,6 +87,8 @@ def render(title: str, subtitle: str, metrics: Mapping[str, Any], manifest: Mapp
         PNG files by the names of the catalogue.
     pictures : mapping of str to (Path, str)
         PNG files and captions by name.
+    story : str
+        Figure at the top, as HTML.
     """
     shown = ''.join(_figure(path, caption) for path, caption in pictures.values())
     listed = manifest.get('failures')
@@ -102,16 +109,17 @@ def render(title: str, subtitle: str, metrics: Mapping[str, Any], manifest: Mapp
         'Manifest': _manifest(manifest)}
     ids = {name: name.lower().replace(' ', '_') for name, content in sections.items() if content}
     links = ''.join(f'<a href="#{of}">{name}</a>' for name, of in ids.items())
-    body = ''.join(f'<section id="{of}"><h2>{name}</h2>{sections[name]}</section>\n'
-                   for name, of in ids.items())
+    body = ''.join(
+        f'<details id="{of}"{"" if name in FOLDED else " open"}><summary><h2>{name}</h2></summary>'
+        f'{sections[name]}</details>\n' for name, of in ids.items())
     title, created = escape(title), escape(str(manifest.get('created', '')))
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<title>{title}</title><style>{CSS}</style></head>\n<body><main>'
         f'<header><h1>{title}</h1><p class="subtitle">{escape(subtitle)}</p></header>'
-        f'<nav>{links}</nav>\n{body}<footer>dmp_cpg_ros · {created}</footer>'
-        '</main></body></html>\n')
+        f'<nav>{links}</nav>\n{story}\n{body}<footer>dmp_cpg_ros · {created}</footer></main>'
+        f'<script>{SCRIPT}</script></body></html>\n')
 
 
 def _summary(metrics: Mapping[str, Any], manifest: Mapping[str, Any]) -> str:
@@ -142,8 +150,8 @@ def _figure(png: Path, title: str, caption: str = '') -> str:
     """Picture with title and caption; the URI carries the picture itself."""
     data = base64.b64encode(png.read_bytes()).decode('ascii')
     words = f'<b>{escape(title)}.</b> {escape(caption)}' if caption else escape(title)
-    return (f'<figure><img alt="{escape(title)}" src="data:image/png;base64,{data}">'
-            f'<figcaption>{words}</figcaption></figure>')
+    return (f'<figure><div><img alt="{escape(title)}" src="data:image/png;base64,{data}" '
+            f'title="click to enlarge"></div><figcaption>{words}</figcaption></figure>')
 
 
 def _records(records: Sequence[Mapping[str, Any]], note: str = '') -> str:

@@ -202,6 +202,7 @@ def write_results(
     if not report:
         return RunResults(folder, metrics, facts)
     from dmp_cpg_ros.analysis.report import render, write_figures
+    from dmp_cpg_ros.analysis.story import story
 
     tell('figures')
     figures = write_figures(recording, context, folder / 'figures')
@@ -209,7 +210,7 @@ def write_results(
     pictures = {} if draw is None else write_pictures(recording, context, folder / 'figures', draw)
     page = folder / 'report.html'
     page.write_text(render(*_headings(recording, context, facts), metrics, facts, figures,
-                           pictures), encoding='utf-8')
+                           pictures, story(recording, metrics)), encoding='utf-8')
     return RunResults(folder, metrics, facts, page, pictures)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 import pytest
+from browser import browser, find_browser
 from synthetic_bag import write_bag
 from synthetic_walk import SyntheticWalk, robot
 
@@ -23,9 +24,11 @@ from dmp_cpg_ros.analysis.facts import facts
 from dmp_cpg_ros.analysis.metrics.definitions import DEFINITIONS
 from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
-from dmp_cpg_ros.analysis.recording import Recording, StatusEvent
-from dmp_cpg_ros.analysis.report import CATALOGUE, flattened, label, write_figures
+from dmp_cpg_ros.analysis.recording import Recording, StatusEvent, VelocitySeries
+from dmp_cpg_ros.analysis.report import CATALOGUE, FOLDED, SCRIPT, label, write_figures
 from dmp_cpg_ros.analysis.run import RunResults, moments, write_pictures, write_results
+from dmp_cpg_ros.analysis.story import MOST_POINTS, story
+from dmp_cpg_ros.analysis.tables import flattened
 from dmp_cpg_ros.commands.analyze import analyze_run, main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares
@@ -140,10 +143,73 @@ def test_the_report_fetches_nothing(results: RunResults) -> None:
     parser.feed(text)
     assert parser.found
     assert all(value.startswith(('data:image/png;base64,', '#')) for value in parser.found)
-    assert not {'script', 'link', 'iframe', 'object', 'embed'} & set(parser.tags)
+    assert not {'link', 'iframe', 'object', 'embed'} & set(parser.tags)
+    assert parser.tags.count('script') == 1
+    assert not re.search(r'fetch|XMLHttp|WebSocket|import|eval|innerHTML', SCRIPT)
     assert not re.search(r'url\(|@import|https?:', text)
     links = {value[1:] for value in parser.found if value.startswith('#')}
     assert links <= set(re.findall(r'id="(\w+)"', text))
+
+
+def shapes(html: str, kind: str) -> list[dict[str, float]]:
+    return [{key: float(value) for key, value in re.findall(r'(\w+)="(-?[\d.]+)"', found)}
+            for found in re.findall(rf'<\w+ class="{kind}"([^>]*)/>', html)]
+
+
+def test_the_story_tells_what_was_promised_and_kept(
+        walked: Recording, context: RunContext) -> None:
+    metrics = compute_metrics(walked, context)
+    html, (stop,) = story(walked, metrics), metrics['stop']['all']
+    (kept,), (bound, predicted) = shapes(html, 'kept'), shapes(html, 'promised')
+    assert kept['x'] == bound['x'] == pytest.approx(stop['request_s'], abs=1e-3)
+    assert kept['width'] == pytest.approx(stop['measured_s'], abs=1e-3)
+    assert bound['width'] == pytest.approx(stop['bound_s'], abs=1e-3)
+    assert predicted['x1'] == pytest.approx(stop['request_s'] + stop['predicted_s'], abs=1e-3)
+    assert all(f'polyline class="{name}"' in html
+               for name in ('commanded', 'reference', 'walked'))
+    stop['measured_s'] = stop['bound_s'] + 0.1
+    assert shapes(story(walked, metrics), 'kept broken')
+    assert story(Recording(), compute_metrics(Recording())) == ''
+
+
+def test_a_long_story_has_few_points_and_keeps_its_extremes(context: RunContext) -> None:
+    time = np.arange(0.0, 400.0, 0.004)
+    value = np.zeros((len(time), 3))
+    value[77_777, 0], value[50_001, 0] = 0.9, -0.7
+    recording = dataclasses.replace(Recording(), reference=VelocitySeries(time, value))
+    html = story(recording, compute_metrics(recording, context))
+    (points,) = re.findall(r'points="([^"]*)"', html)
+    speeds = [float(point.partition(',')[2]) for point in points.split()]
+    assert len(speeds) <= MOST_POINTS
+    assert (max(speeds), min(speeds)) == (0.9, -0.7)
+
+
+@pytest.mark.skipif(find_browser() is None, reason='no Chromium here')
+def test_the_report_zooms_and_unfolds(results: RunResults) -> None:
+    view = "document.querySelector('.story svg').getAttribute('viewBox').split(' ').map(Number)"
+    with browser(find_browser() or '') as page:
+        page.open(f'file://{results.report}')
+        whole = page.evaluate(view)
+        x, y = page.centre('.story .plot')
+        for kind, at in (('Pressed', x), ('Moved', x + 50), ('Released', x + 100)):
+            page.mouse(kind, at, y)
+        start, _, width, _ = page.evaluate(view)
+        assert start == pytest.approx(whole[0] + 0.5 * whole[2], rel=0.02)
+        assert 0.05 * whole[2] < width < 0.2 * whole[2]
+        assert page.evaluate("document.querySelectorAll('.times span').length") > 2
+        page.evaluate("document.querySelector('.story .plot').ondblclick()")
+        assert page.evaluate(view) == whole
+        is_wide = "document.querySelector('#figures img').clientWidth"
+        before = page.evaluate(is_wide)
+        page.click('#figures img')
+        assert page.evaluate(is_wide) > 1.5 * before
+        for name in FOLDED:
+            folded = f"document.getElementById('{name.lower().replace(' ', '_')}')"
+            if page.evaluate(f'{folded} !== null'):
+                assert page.evaluate(f'{folded}.open') is False
+        page.evaluate("location.hash = '#metrics'")
+        page.until("document.getElementById('metrics').open")
+        assert not page.problems
 
 
 def test_the_report_shows_figures_pictures_certificate_and_escapes(results: RunResults) -> None:
@@ -185,7 +251,7 @@ def test_texts_of_a_recording_are_no_markup(context: RunContext, tmp_path: Path)
     written = write_results(tmp_path, changed, context, manifest, certificate, no_pictures)
     assert written.report is not None
     page = written.report.read_text(encoding='utf-8')
-    assert '<script' not in page
+    assert page.count('<script') == 1 and f'<script>{SCRIPT}</script>' in page
     assert '&lt;script&gt;' in page
 
 
