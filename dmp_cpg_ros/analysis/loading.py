@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import mmap
+import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
@@ -26,16 +27,17 @@ from dmp_cpg_ros.core.gait.known_gaits import GaitShares
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
 
 ROWS_OF, WORDS = 'sensor_msgs/msg/JointState', 'diagnostic_msgs/msg/DiagnosticArray'
+TEXT = 'std_msgs/msg/String'
 
 TOPICS = {
-    ROWS_OF: ('joint_states', 'joint_targets', 'joint_work',
-                                   'canonical_state', 'foot_contacts', 'posture_feedback'),
+    ROWS_OF: ('joint_states', 'joint_targets', 'joint_work', 'canonical_state', 'foot_contacts',
+              'posture_feedback'),
     'nav_msgs/msg/Odometry': ('ground_truth', 'odom', 'estimated_odom'),
     'geometry_msgs/msg/TwistStamped': ('reference', 'cmd_vel'),
     'geometry_msgs/msg/Twist': ('cmd_vel',),
     WORDS: ('inhibition_state', 'body_mode', 'diagnostics'),
     'rosgraph_msgs/msg/Clock': ('clock',),
-    'std_msgs/msg/String': ('robot_description',),
+    TEXT: ('robot_description',),
 }
 """Topics without namespace that are read, by their types of message."""
 
@@ -46,9 +48,11 @@ FIELDS = {'joint_work': ('position', 'effort'), 'canonical_state': ('position', 
 
 ALL_FIELDS = ('position', 'velocity', 'effort')
 
-ROWS = {*JOINT_NAMES, *LEGS, *(f'{leg}_foot' for leg in LEGS), *layouts.OSCILLATOR_ROWS,
-        layouts.CADENCE_ROW, *layouts.MODE_ROWS}
-"""Names in joint states that are read, besides those of gaits."""
+RARE = (layouts.GAIT_PREFIX, layouts.CADENCE_ROW, layouts.MODE_ROWS[0].partition('/')[0])
+"""Beginnings of names of states that seldom change: only their changes are kept."""
+
+ROWS = {'canonical_state': (*layouts.OSCILLATOR_ROWS, *RARE), 'posture_feedback': RARE}
+"""Beginnings of the names that are read of joint states; of all others all."""
 
 _POSE, _TWIST = 'pose.pose.', 'twist.twist.'
 COLUMNS = {
@@ -61,9 +65,6 @@ COLUMNS = {
     'geometry_msgs/msg/Twist': ('linear.x', 'linear.y', 'angular.z'),
     'rosgraph_msgs/msg/Clock': ()}
 """Numbers of the other messages that are read."""
-
-RARE = (layouts.GAIT_PREFIX, layouts.CADENCE_ROW, layouts.MODE_ROWS[0].partition('/')[0])
-"""Beginnings of the names whose numbers seldom change: only their changes are kept."""
 
 AT_ONCE = 4096
 """Messages of a topic that are decoded together."""
@@ -133,6 +134,8 @@ class Topic:
 
     Parameters
     ----------
+    name : str
+        Without namespace.
     fields : sequence of str
         Of joint states, those that are read.
 
@@ -146,9 +149,9 @@ class Topic:
         Messages that could not be decoded, by topics with namespace.
     """
 
-    def __init__(self, fields: Sequence[str]) -> None:
+    def __init__(self, name: str, fields: Sequence[str]) -> None:
         """Nothing has come."""
-        self.fields = fields
+        self.fields, self._rows = fields, ROWS.get(name, '')
         self.blocks: dict[tuple[tuple[str, ...], str], Blocks] = defaultdict(Blocks)
         self.messages: list[Stamped] = []
         self.skipped = Counter[str]()
@@ -156,7 +159,7 @@ class Topic:
     def take(self, topic: str, kind: str, times: Sequence[int], raws: Sequence[bytes]) -> None:
         """Take messages of one type, of a topic with namespace, and their record times [ns]."""
         count = len(raws)
-        if kind == WORDS:
+        if kind in (WORDS, TEXT):
             messages = [of for raw in raws if (of := message_of(raw, kind)) is not None]
             self.messages += [Stamped(_stamp_ns(of), of) for of in messages]
             count -= len(messages)
@@ -187,7 +190,7 @@ class Topic:
             order = np.argsort(rows)
             block = _cut(Block(bag_ns[rows], stamp, values), order)
             names = key[0]
-            rare = np.array([of.startswith(RARE) for of in names], dtype=bool)
+            rare = np.array([self._rows != '' and of.startswith(RARE) for of in names], bool)
             if rare.any():
                 self.blocks[tuple(np.array(names)[rare]), ''].add(
                     _changes_of(block._replace(values=block.values[..., rare])))
@@ -204,8 +207,7 @@ class Topic:
             columns = [group.numbers(name).astype(float) for name in COLUMNS[kind]]
             return ((), ''), np.concatenate(columns or [np.empty((count, 0))], axis=1)
         names = group.first.name
-        kept = [k for k, name in enumerate(names)
-                if name in ROWS or name.startswith(layouts.GAIT_PREFIX)]
+        kept = [k for k, name in enumerate(names) if name.startswith(self._rows)]
         values = np.full((count, len(self.fields), len(kept)), np.nan)
         for k, field in enumerate(self.fields):
             if len(getattr(group.first, field)) == len(names):  # a message may leave a field out
@@ -259,46 +261,49 @@ def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str]
         if len(robots) > 1:
             raise DataError(f'the bag holds {", ".join(robots)}; record one robot per bag')
         used = [c for c in reader.connections if base_name(c.topic) in TOPICS.get(c.msgtype, ())]
-        topics = {name: Topic(fields.get(name, ALL_FIELDS))
+        topics = {name: Topic(name, fields.get(name, ALL_FIELDS))
                   for names in TOPICS.values() for name in names}
-        waiting: dict[str, tuple[list[int], list[bytes]]] = {of.topic: ([], []) for of in used}
-        kinds, total = {of.topic: of.msgtype for of in used}, sum(of.msgcount for of in used)
-        taken = 0
+        waiting: dict[tuple[str, str], tuple[list[int], list[bytes]]] = {
+            (of.topic, of.msgtype): ([], []) for of in used}
+        taken, total = 0, sum(of.msgcount for of in used)
         for connection, bag_ns, raw in recorded(reader, used):
-            times, raws = waiting[connection.topic]
+            key = connection.topic, connection.msgtype
+            times, raws = waiting[key]
             times.append(bag_ns)
             raws.append(raw)
             if len(raws) == AT_ONCE:
-                topics[base_name(connection.topic)].take(
-                    connection.topic, connection.msgtype, times, raws)
-                waiting[connection.topic] = [], []
+                topics[base_name(key[0])].take(*key, times, raws)
+                waiting[key] = [], []
                 taken += AT_ONCE
                 tell(f'reading: {taken:,} of {total:,} messages')
-        for name, (times, raws) in waiting.items():
-            topics[base_name(name)].take(name, kinds[name], times, raws)
+        for key, of in waiting.items():
+            topics[base_name(key[0])].take(*key, *of)
         counts = {topic: info.msgcount for topic, info in sorted(reader.topics.items())}
     skipped = Counter[str]()
     for topic in topics.values():
         skipped += topic.skipped
     warn_of(skipped)
     commands, arrivals = _on_robot_clock(topics), _arrivals(topics)
-    modes = _modes(topics)
+    modes, names = _modes(topics), _joint_names(topics['robot_description'].messages)
+    # Bags of others have one odometry, and in old ones of this suite it is the truth.
+    truth, estimate = (('ground_truth', 'odom') if topics['ground_truth'].blocks
+                       else ('odom', 'estimated_odom'))
     return Recording(
-        joints=_joints(topics.pop('joint_states')), targets=_joints(topics.pop('joint_targets')),
-        work=recording.WorkSeries(*_table(topics['joint_work'], JOINT_NAMES)),
+        joints=_joints(topics.pop('joint_states'), names),
+        targets=_joints(topics.pop('joint_targets'), names),
+        work=recording.WorkSeries(*_table(topics['joint_work'], names)),
         canonical=_canonical(topics['canonical_state']),
         reference=recording.VelocitySeries(*_rows(topics['reference'].joined(3), (3,))),
         commands=recording.VelocitySeries(*_rows(commands, (3,))),
-        odometry=recording.OdometrySeries(*_rows(topics.pop('odom').joined(13), (3, 4, 3, 3))),
-        estimate=recording.OdometrySeries(
-            *_rows(topics['estimated_odom'].joined(13), (3, 4, 3, 3))),
+        odometry=recording.OdometrySeries(*_rows(topics.pop(truth).joined(13), (3, 4, 3, 3))),
+        estimate=recording.OdometrySeries(*_rows(topics[estimate].joined(13), (3, 4, 3, 3))),
         feet=_feet(topics['foot_contacts']),
         inhibition=_changes(topics['inhibition_state'].messages, lambda e: (e.message, e.values)),
         modes=modes, statuses=_by_name(topics['diagnostics'].messages),
         arrivals=arrivals, counts=counts, undecodable=dict(skipped))
 
 
-def _joint_names(descriptions: Messages) -> tuple[str, ...]:
+def _joint_names(descriptions: Sequence[Stamped]) -> tuple[str, ...]:
     """Names of our joints in a recording, as ``robot/urdf.py`` says them."""
     named = {usual: name for of in descriptions[-1:] for name, usual in re.findall(
         r'<dmp_cpg_ros_joint name="([^"]+)" usual="([^"]+)"', of.message.data)}
@@ -306,6 +311,8 @@ def _joint_names(descriptions: Messages) -> tuple[str, ...]:
 
 
 def _stamp_ns(message: Any) -> int:
+    if not hasattr(message, 'header'):
+        return 0
     return int(message.header.stamp.sec) * 1_000_000_000 + int(message.header.stamp.nanosec)
 
 
@@ -369,9 +376,9 @@ def _table(topic: Topic, names: Sequence[str]) -> list[Array]:
     return [stamps / 1e9, *table]
 
 
-def _joints(topic: Topic) -> recording.JointSeries:
-    time, *values = _table(topic, JOINT_NAMES)
-    unread = np.broadcast_to(np.nan, (len(time), len(JOINT_NAMES)))
+def _joints(topic: Topic, names: Sequence[str]) -> recording.JointSeries:
+    time, *values = _table(topic, names)
+    unread = np.broadcast_to(np.nan, (len(time), len(names)))
     return recording.JointSeries(
         time, **{**dict.fromkeys(ALL_FIELDS, unread), **dict(zip(topic.fields, values,
                                                                  strict=True))})

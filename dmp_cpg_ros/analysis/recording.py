@@ -297,7 +297,7 @@ class Recording:
             'joint_states': self.joints.time, 'joint_targets': self.targets.time,
             'joint_work': self.work.time, 'canonical_state': self.canonical.time,
             'cmd_vel': self.commands.time, 'reference': self.reference.time,
-            'odom': self.odometry.time, 'estimated_odom': self.estimate.time,
+            'ground_truth': self.odometry.time, 'odom': self.estimate.time,
             'foot_contacts': self.feet.time, 'inhibition_state': self.inhibition,
             'diagnostics': self.statuses}
         return [topic for topic, of in read.items() if not len(of)]
