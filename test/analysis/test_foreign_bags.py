@@ -173,7 +173,8 @@ def test_big_endian_messages_are_read(plain: Path, tmp_path: Path, walked: Recor
 
 
 @pytest.mark.parametrize('kept', [
-    {'/joint_states'}, {'/ground_truth'}, {'/ground_truth', '/reference'}, {'/canonical_state', '/foot_contacts'},
+    {'/joint_states'}, {'/ground_truth'}, {'/ground_truth', '/reference'},
+    {'/canonical_state', '/foot_contacts'},
     {'/joint_states', '/ground_truth', '/cmd_vel', '/reference', '/foot_contacts'}])
 def test_topics_that_are_missing_are_named_and_the_rest_is_reported(
         plain: Path, tmp_path: Path, kept: set[str], capsys: pytest.CaptureFixture[str]) -> None:

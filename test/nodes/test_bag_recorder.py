@@ -15,9 +15,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 from ros_processes import NodeProcess, Processes, Ros
+from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
@@ -357,3 +359,50 @@ def test_clock_is_stamped_like_a_header() -> None:
     message = Clock()
     set_stamp(message.clock, 7_000_000_003)
     assert serialize_message(message)[4:8] == (7).to_bytes(4, 'little')
+
+
+@pytest.mark.parametrize('storage', ['mcap', 'sqlite3'])
+def test_a_bag_is_one_of_rosbag2_for_the_readers_of_others(tmp_path: Path, storage: str) -> None:
+    """Its metadata have the fields that rosbag2 of Jazzy reads, and both readers find it whole."""
+    bag = BagWriter(tmp_path / 'bag', storage)
+    topic = interface('joint_states')
+    write = bag.add_topic('/joint_states', topic.type_name, topic.publisher_qos, stamped=True,
+                          clock=True)
+    sent = [(TICK_NS * (k + 1), serialize_message(joint_state(k))) for k in range(100)]
+    for k, (_, data) in enumerate(sent):
+        write(data)
+        if k == 50:
+            bag.flush()
+    bag.close()
+    metadata = yaml.safe_load((tmp_path / 'bag' / 'metadata.yaml').read_text(encoding='utf-8'))
+    described = metadata['rosbag2_bagfile_information']
+    assert set(described) == {
+        'version', 'storage_identifier', 'duration', 'starting_time', 'message_count',
+        'topics_with_message_count', 'compression_format', 'compression_mode',
+        'relative_file_paths', 'files', 'custom_data', 'ros_distro'}
+    assert (described['version'], described['storage_identifier']) == (9, storage)
+    assert described['message_count'] == 100
+    assert described['duration'] == {'nanoseconds': 99 * TICK_NS}
+    (file,), (name,) = described['files'], described['relative_file_paths']
+    assert file == {
+        'path': name, 'starting_time': described['starting_time'],
+        'duration': described['duration'], 'message_count': 100}
+    (counted,) = described['topics_with_message_count']
+    assert set(counted['topic_metadata']) == {
+        'name', 'type', 'serialization_format', 'offered_qos_profiles', 'type_description_hash'}
+    (profile,) = counted['topic_metadata']['offered_qos_profiles']
+    assert set(profile) == {
+        'history', 'depth', 'reliability', 'durability', 'deadline', 'lifespan', 'liveliness',
+        'liveliness_lease_duration', 'avoid_ros_namespace_conventions'}
+    with Reader(tmp_path / 'bag') as reader:
+        assert [(time_ns, bytes(raw)) for _, time_ns, raw in reader.messages()] == sent
+    if storage == 'mcap':
+        with (tmp_path / 'bag' / name).open('rb') as stream:
+            of_mcap = make_reader(stream, validate_crcs=True)
+            summary = of_mcap.get_summary()
+            assert of_mcap.get_header().profile == 'ros2'
+            assert summary is not None and summary.statistics is not None
+            assert summary.statistics.message_count == 100 and len(summary.chunk_indexes) > 1
+            assert [(message.log_time, message.data)
+                    for _, _, message in of_mcap.iter_messages()] == sent
+            assert [schema.encoding for schema in summary.schemas.values()] == ['ros2msg']
