@@ -66,7 +66,7 @@ COLUMNS = {
     'rosgraph_msgs/msg/Clock': ()}
 """Numbers of the other messages that are read."""
 
-AT_ONCE = 4096
+AT_ONCE = 2048
 """Messages of a topic that are decoded together."""
 
 
@@ -387,8 +387,9 @@ def _joints(topic: Topic, names: Sequence[str]) -> recording.JointSeries:
 def _canonical(topic: Topic) -> recording.CanonicalSeries:
     frames = {stamp: frame for (names, frame), blocks in topic.blocks.items() if frame
               for block in blocks.all() for stamp in (block.stamp / 1e9).tolist()}
-    time, x, x_dot = _table(topic, layouts.OSCILLATOR_ROWS)
+    time, x, *rates = _table(topic, layouts.OSCILLATOR_ROWS)
     shape = (-1, len(LEGS), 2)
+    x_dot = rates[0] if rates else np.broadcast_to(np.nan, x.shape)
     return recording.CanonicalSeries(time, x.reshape(shape), x_dot.reshape(shape),
                                      _gaits(topic, time, frames))
 

@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.recording import Array, OdometrySeries, Recording, Series, taken
+from dmp_cpg_ros.analysis.recording import (
+    Array,
+    FootForceSeries,
+    JointSeries,
+    OdometrySeries,
+    Recording,
+    Series,
+    taken,
+)
 from dmp_cpg_ros.core.robot_model import world
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 
@@ -147,6 +155,20 @@ def foot_slip(recording: Recording, robot: RobotDescription, contact_force: floa
     joints, odometry, feet = matched(recording.joints, recording.odometry, recording.feet)
     if len(joints.time) < 2:
         return None
+    slips = np.zeros(len(robot.legs))
+    for first in range(0, len(joints.time) - 1, ROWS_AT_ONCE):
+        rows = slice(first, first + ROWS_AT_ONCE + 1)
+        slips += _foot_slip(taken(joints, rows), taken(odometry, rows), taken(feet, rows), robot,
+                            contact_force)
+    return slips
+
+
+ROWS_AT_ONCE = 100_000
+"""Rows of a long recording that are worked on together."""
+
+
+def _foot_slip(joints: JointSeries, odometry: OdometrySeries, feet: FootForceSeries,
+               robot: RobotDescription, contact_force: float) -> Array:
     R, dt = rotations(odometry.quaternion), np.diff(joints.time)[:, None]
     slips = []
     for i, leg in enumerate(robot.legs):

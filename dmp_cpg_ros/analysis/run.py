@@ -95,32 +95,46 @@ def write_pictures(recording: Recording, context: RunContext, folder: Path, draw
     dict of str to (Path, str)
         File and caption by name; empty without pictures.
     """
-    chosen = moments(recording, context)
+    return _draw_pictures(_scenes(recording, context), folder, draw)
+
+
+Pose = tuple[Array, Array, Array]
+
+
+def _scenes(recording: Recording, context: RunContext) -> list[tuple[Moment, Pose]]:
+    """Moments and poses of the pictures."""
+    if not (recording.joints.time.size and recording.odometry.time.size):
+        return []
+    return [(moment, _pose(recording, moment.time, context.world.is_flat))
+            for moment in moments(recording, context)]
+
+
+def _draw_pictures(scenes: Sequence[tuple[Moment, Pose]], folder: Path, draw: Draw,
+                   ) -> dict[str, tuple[Path, str]]:
     from matplotlib import image
 
-    if not (recording.joints.time.size and recording.odometry.time.size and chosen):
+    if not scenes:
         return {}
-    poses = [_pose(recording, moment.time, context.world.is_flat) for moment in chosen]
-    pictures = draw(*(np.array(part) for part in zip(*poses, strict=True)))
+    pictures = draw(*(np.array(part) for part in zip(*(pose for _, pose in scenes), strict=True)))
     folder.mkdir(parents=True, exist_ok=True)
     written = {}
-    for moment, picture in zip(chosen, pictures, strict=False):
+    for (moment, _), picture in zip(scenes, pictures, strict=False):
         path = folder / f'{moment.name}.png'
         image.imsave(path, picture)
         written[moment.name] = (path, moment.caption)
     return written
 
 
-def _pose(recording: Recording, time: float, turn: bool) -> tuple[Array, Array, Array]:
+def _pose(recording: Recording, time: float, turn: bool) -> Pose:
     """Pose at a time; on a flat floor turned to face along x, so that every picture is taken from
     the same side.
     """
     odometry, joints = recording.odometry, recording.joints
     row = min(int(np.searchsorted(odometry.time, time)), len(odometry.time) - 1)
-    position = odometry.position_in_world[row]
-    angles = held(joints.time, joints.position, time)
+    position = odometry.position_in_world[row].copy()
+    angles = held(joints.time, joints.position, time).copy()
     if not turn:
-        return position, odometry.quaternion[row], angles
+        return position, odometry.quaternion[row].copy(), angles
     quaternion = odometry.quaternion[row : row + 1]
     yaw = float(roll_pitch_yaw(quaternion)[0, 2])
     x, y, z, w = quaternion[0]
@@ -207,10 +221,12 @@ def write_results(
     tell('figures')
     figures = write_figures(recording, context, folder / 'figures')
     tell('pictures and report')
-    pictures = {} if draw is None else write_pictures(recording, context, folder / 'figures', draw)
+    told, headings = story(recording, metrics), _headings(recording, context, facts)
+    scenes = [] if draw is None else _scenes(recording, context)
+    del recording  # an hour's arrays and the drawing together would take too much memory
+    pictures = {} if draw is None else _draw_pictures(scenes, folder / 'figures', draw)
     page = folder / 'report.html'
-    page.write_text(render(*_headings(recording, context, facts), metrics, facts, figures,
-                           pictures, story(recording, metrics)), encoding='utf-8')
+    page.write_text(render(*headings, metrics, facts, figures, pictures, told), encoding='utf-8')
     return RunResults(folder, metrics, facts, page, pictures)
 
 

@@ -85,11 +85,6 @@ def analyze_run(
     earlier = {} if run is None or parameters is not None else read_json(run / 'manifest.json')
     if certificate is None and run is not None:
         certificate = read_json(run / 'metrics.json').get('certificate')
-    recording = load_recording(
-        bag, only=None if export else {'joint_targets': ('position',)}, tell=tell)
-    if export is not None:
-        tell('tables')
-        export(recording)
     if parameters is None:
         parameters = earlier.get('parameters')
     context, robot_path = run_context(parameters, robot_file)
@@ -102,8 +97,22 @@ def analyze_run(
     bag = bag.resolve()
     beside = bag.with_name(f'{bag.name if bag.is_dir() else bag.stem}_analysis')
     folder = Path(out) if out is not None else run or beside
-    return write_results(folder, recording, context, manifest, certificate, draw, report,
-                         tell)
+    return write_results(folder, _recording(bag, export, tell), context, manifest, certificate,
+                         draw, report, tell)
+
+
+SHOWN = {'joint_targets': ('position',)}
+"""Fields that a report shows of topics of which it does not show all."""
+
+
+def _recording(bag: Path, export: Callable[[Recording], None] | None, tell: Callable[[str], None]
+               ) -> Recording:
+    """Recording of which nobody but the caller keeps the arrays."""
+    recording = load_recording(bag, only=None if export else SHOWN, tell=tell)
+    if export is not None:
+        tell('tables')
+        export(recording)
+    return recording
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
