@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest
 from dmp_cpg_ros.core.contraction import inhibited
-from dmp_cpg_ros.core.contraction.capture import capture_set
+from dmp_cpg_ros.core.contraction.capture import capture_set, shared_capture
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
 from dmp_cpg_ros.core.contraction.voting import (
@@ -101,8 +101,8 @@ def vote_bound(s: Setting, gains: Array) -> float:
 def _under(s: Setting, gains: Array) -> tuple[float, inhibited.InhibitedContraction, float]:
     """Gain that capture needs, contraction, and bound on the time to rest under some votes."""
     system, s = s.network.system, replace(s, way=2.0 * math.pi)   # votes wait for fl's phase 0
-    capture = capture_set(system, s.span.omega_armed[1], gains,
-                          s.parameters.inhibition.region_radius)
+    omega, r0 = s.span.omega_armed[1], s.parameters.inhibition.region_radius
+    capture = shared_capture(system, omega, capture_set(system, omega, gains, r0), r0)
     found = inhibited.inhibited_contraction(system, capture)
     bound = math.inf if found.reach == inhibited.NONE else time_to_rest(
         s, capture, inhibited_equilibrium(system, s.span.omega_at_rest, gains))

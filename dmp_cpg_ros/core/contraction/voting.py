@@ -17,7 +17,7 @@ from itertools import combinations, permutations
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.contraction.capture import capture_set
+from dmp_cpg_ros.core.contraction.capture import capture_set, shared_capture
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.errors import ParameterError
@@ -95,7 +95,8 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
         Sufficient for a stop [1/s]; infinite when no weight is certified.
     """
     def certified(alpha: float) -> bool:
-        capture = capture_set(system, omega, _votes(system, voters, alpha), region_radius)
+        capture = shared_capture(system, omega, capture_set(
+            system, omega, _votes(system, voters, alpha), region_radius), region_radius)
         return capture.holds and inhibited_contraction(system, capture).reach != NONE
 
     return _threshold(certified, _scale(system, omega, region_radius))

@@ -14,6 +14,8 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.contraction.capture import capture_set, shared_capture
+from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.contraction.voting import (
     certified_threshold,
     different_voters,
@@ -125,3 +127,48 @@ def test_a_majority_of_none_or_of_more_than_there_are_is_refused() -> None:
     for majority in (0, 5):
         with pytest.raises(ParameterError, match='between 1 and 4'):
             majority_clamp(network('ring', 50.0), OMEGA, REGION, majority)
+
+
+@pytest.mark.parametrize('name', ['ring', 'path', 'star', 'directed_ring'])
+def test_voters_that_relieve_each_other_keep_their_regions(name: str) -> None:
+    """From wherever they enter, however the cadence varies, with hardly more than is certified."""
+    rng, relieved = np.random.default_rng(4), 0
+    for voters in [(0, 1), (0, 2), (0, 1, 2), (1, 2, 3)]:
+        system = network(name, 100.0)
+        alpha = 1.001 * certified_threshold(system, OMEGA, voters, REGION)
+        gains = np.where(np.isin(range(4), voters), alpha, 0.0)
+        box = capture_set(system, OMEGA, gains, REGION)
+        if box.holds:
+            continue
+        relieved += 1
+        capture = shared_capture(system, OMEGA, box, REGION)
+        assert capture.holds and inhibited_contraction(system, capture).reach != NONE
+        assert np.nanmax(capture.needed_gain) >= rest_threshold(system, OMEGA, voters, REGION)
+        for _ in range(6):
+            edge = rng.choice([-1.0, 1.0]) * 2.0 * np.arcsin(0.5 * REGION) * rng.choice([1.0, 0.9])
+            x = state_at(edge + system.graph.phases)
+            away = rng.normal(size=(4, 2))
+            away *= 0.5 * capture.tolerance / np.linalg.norm(away, axis=1, keepdims=True)
+            away[list(voters)] = 0.0
+            x = x + away
+            for k in range(600):
+                cadence = OMEGA if k % 200 < 100 else rng.uniform(0.0, OMEGA)
+                x = system.step(x, cadence, gains, 0.001)
+                distance = np.linalg.norm(x - system.target, axis=1)
+                assert np.all(distance[list(voters)] <= REGION * (1.0 + 1e-9))
+                assert np.all(distance <= box.distance * (1.0 + 1e-9))
+    assert relieved >= (1 if name == 'ring' else 2)
+
+
+@pytest.mark.parametrize('name', ['all_to_all', 'ring', 'path', 'star', 'directed_ring'])
+def test_no_vote_needs_a_fifth_more_than_its_rest(name: str) -> None:
+    system = network(name, 200.0 if name == 'path' else 100.0)
+    for count in (1, 2, 3, 4):
+        for voters in different_voters(system, count):
+            certified = certified_threshold(system, OMEGA, voters, REGION)
+            needed = rest_threshold(system, OMEGA, voters, REGION)
+            assert needed <= certified <= 1.2 * needed
+    for one, other in [((0, 1), (2, 3)), ((0, 2), (1, 2)), ((0, 1), (0, 3))]:
+        both = certified_threshold(system, OMEGA, sorted({*one, *other}), REGION)
+        assert both <= 1.001 * max(certified_threshold(system, OMEGA, voters, REGION)
+                                   for voters in (one, other))

@@ -81,6 +81,23 @@ def test_a_majority_stops_it_through_the_states_of_a_requested_stop(
     assert loop.stop.measured_s <= bound
 
 
+@pytest.mark.parametrize('graph', ['path', 'star', 'directed_ring'])
+def test_a_certified_majority_whose_legs_relieve_each_other_stops_and_fewer_do_not(
+        graph: str) -> None:
+    canonical = CanonicalParameters(coupling_graph=graph)
+    p = SuiteParameters(**voters(inhibited_legs=LEGS[:3]))
+    assert certify(network(coupling_graph=graph), p.inhibition, p.reference, p.leg, p.posture,
+                   TICK, voting=p.voting).holds
+    for missing in LEGS:
+        run = walking('amble', **voters(inhibited_legs=LEGS[:3]), canonical=canonical)
+        majority = tuple(leg for leg in LEGS if leg != missing)
+        vote(run, majority[1:], 2.0)
+        assert not run.loop.stop.requested
+        vote(run, majority, 3.5)
+        bound = vote_bound(Setting.of(run.loop.network, p, TICK), run.loop.inhibition.gains)
+        assert run.loop.stop.state == 'at_rest' and run.loop.stop.measured_s <= bound
+
+
 def test_gains_are_held_back_until_the_reference_is_slow() -> None:
     run = walking(speed=0.8, **voters())
     run.ticks.clear()
@@ -241,7 +258,8 @@ def test_gains_are_suggested_with_which_votes_are_certified_too() -> None:
     assert [entry.name for entry in certified.failing] == ['votes_needed']
     found = suggest_gains(*running, p.voting)
     assert found is not None and found.changed and found.certificate['votes_needed'].holds
-    assert suggest_gains(network(coupling_graph='path'), *running[1:], p.voting) is None
+    fast = replace(p.inhibition, capture_speed=1.0)          # minorities meet slower legs
+    assert suggest_gains(network(coupling_graph='path'), fast, *running[2:], p.voting) is None
 
 
 def test_nobody_is_certain_to_stop_legs_that_are_not_coupled_enough() -> None:
