@@ -78,7 +78,7 @@ SLOWEST, FASTEST, LOWEST = 0.35, 0.65, 0.15
 """Speeds [m/s] and the height of the base [m] of a robot that walks on."""
 
 OWN = tuple(topic for topic in TOPICS if topic.publishers != ('user',) and topic.recorded
-            and topic.name not in ('/clock', '/diagnostics', 'joint_work', 'odom'))
+            and topic.name not in ('/clock', '/diagnostics', 'joint_work', 'odom', '/tf'))
 """Topics that only nodes of the suite may write."""
 
 TICKED = ('joint_states', 'imu', 'foot_contacts', 'reference', 'canonical_state',
