@@ -134,4 +134,5 @@ def frames_of(robot_file: Path, namespace: str) -> Node:
             'robot_description': ParameterValue(urdf(robot_file), value_type=str),
             'use_sim_time': True, 'publish_frequency': 50.0}],
         remappings=[('robot_description', f'{FRAMES}/robot_description'),
-                    *(rule for rule in namespace_rules(namespace) if rule[0] != '__ns')])
+                    *(rule for rule in namespace_rules(namespace) if rule[0] != '__ns')],
+        output='screen')

@@ -185,7 +185,7 @@ def test_the_frames_of_the_links_come_from_the_robots_description_where_that_is_
     (parameters,), remappings = node.parameters, dict(node.remappings)
     text = parameters['robot_description']
     assert text.positional == (urdf(find_config(given['robot'])),) and text.value_type is str
-    assert parameters['use_sim_time'] is True
+    assert parameters['use_sim_time'] is True and node.output == 'screen'
     assert remappings.pop('robot_description') == f'{frames}/robot_description'
     assert remappings == ({name: name[1:] for name in ABSOLUTE_TOPICS} if namespace else {})
     assert len(launch_file.nodes({**given, frames: 'false'})) == len(without)
