@@ -106,7 +106,7 @@ def test_reference_and_oscillators_stop_without_the_inhibition(ros: Ros) -> None
         told = (0, RUNS)
         reference.on_tick(age, {'joint_states': None, 'inhibition_gains': told})
         canonical.on_tick(age, {'reference': np.zeros(3), 'inhibition_gains': told})
-        assert reference._requested == canonical._inhibition.requested == silent
+        assert reference._inhibition.requested == canonical._inhibition.requested == silent
         assert canonical.health.has_problem('inhibition') == silent
     told = (SILENT_NS + TICK, RUNS)
     canonical.on_tick(SILENT_NS + 2 * TICK, {
