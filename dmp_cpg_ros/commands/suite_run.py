@@ -358,8 +358,8 @@ class _Watch:
                 self._come_to_rest(begun)
                 return
             for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_CLEANUP):
-                if self._recording:
-                    self._change_state(RECORDER, transition)
+                if self._recording and self._change_state(RECORDER, transition) is None:
+                    break  # who hangs is not asked twice
             self._recording = False
             down, deadline = self._player.lie_down(), time.monotonic() + LYING_WITHIN_S
             while len(self._interrupted) == begun and time.monotonic() < deadline:
@@ -389,11 +389,11 @@ class _Watch:
                 if name != ROBOT and (name != RECORDER or self._recording):
                     self._change_state(name)
 
-    def _change_state(self, name: str, transition: int = Transition.TRANSITION_DEACTIVATE) -> None:
+    def _change_state(self, name: str, transition: int = Transition.TRANSITION_DEACTIVATE) -> Any:
         if name in self._gone:
-            return
+            return None
         request = ChangeState.Request(transition=Transition(id=transition))
-        self._ask(self._transitions[name], request, LAST_WORDS_S)
+        return self._ask(self._transitions[name], request, LAST_WORDS_S)
 
     def _on_recorded(self, counts: Any) -> None:
         self._recorded = counts
