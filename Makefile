@@ -68,8 +68,9 @@ ACTIVATED := . $(BIN)/activate &&
 STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
 FIGURE_ARGS ?=
+PAGE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures bench doc lint install clean
+.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures paper-page bench doc lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -117,6 +118,9 @@ view-image: $(INSTALLED) ## draw the picture of the live view; needs Chromium
 
 paper-figures: $(INSTALLED) ## draw the figures of the paper into build/paper_figures/ (FIGURE_ARGS=...)
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.paper_figures --out build/paper_figures $(FIGURE_ARGS)
+
+paper-page: $(INSTALLED) ## the paper to touch, build/paper/index.html; needs npm (PAGE_ARGS='--numpy WHEEL')
+	$(ACTIVATED) python -m dmp_cpg_ros.studies.paper_page --out build/paper $(PAGE_ARGS)
 
 bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.bench $(BENCH_ARGS)
