@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import mmap
 import re
+import sys
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
@@ -66,15 +67,11 @@ COLUMNS = {
     'rosgraph_msgs/msg/Clock': ()}
 """Numbers of the other messages that are read."""
 
+Statuses = Sequence[tuple[str, StatusEvent]]
+"""Names and statuses, as they came."""
+
 AT_ONCE = 2048
 """Messages of a topic that are decoded together."""
-
-
-class Stamped(NamedTuple):
-    """A message with its stamp [ns]."""
-
-    stamp: int
-    message: Any
 
 
 class Block(NamedTuple):
@@ -143,8 +140,10 @@ class Topic:
     ----------
     blocks : dict of (tuple of str, str) to Blocks
         By the names that are read and, for former gaits, the frame.
-    messages : list of Stamped
-        Those whose words are read.
+    statuses : list of (str, StatusEvent)
+        Names and statuses.
+    text : str
+        The last text.
     skipped : Counter
         Messages that could not be decoded, by topics with namespace.
     """
@@ -153,7 +152,8 @@ class Topic:
         """Nothing has come."""
         self.fields, self._rows = fields, ROWS.get(name, '')
         self.blocks: dict[tuple[tuple[str, ...], str], Blocks] = defaultdict(Blocks)
-        self.messages: list[Stamped] = []
+        self.statuses: list[tuple[str, StatusEvent]] = []
+        self.text = ''
         self.skipped = Counter[str]()
 
     def take(self, topic: str, kind: str, times: Sequence[int], raws: Sequence[bytes]) -> None:
@@ -161,8 +161,12 @@ class Topic:
         count = len(raws)
         if kind in (WORDS, TEXT):
             messages = [of for raw in raws if (of := message_of(raw, kind)) is not None]
-            self.messages += [Stamped(_stamp_ns(of), of) for of in messages]
             count -= len(messages)
+            for of in messages:
+                if kind == TEXT:
+                    self.text = of.data
+                else:
+                    self.statuses += _statuses(of)
         else:
             count -= self._take_numbers(kind, np.array(times, np.int64), raws)
         if count:
@@ -284,7 +288,7 @@ def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str]
         skipped += topic.skipped
     warn_of(skipped)
     commands, arrivals = _on_robot_clock(topics), _arrivals(topics)
-    modes, names = _modes(topics), _joint_names(topics['robot_description'].messages)
+    modes, names = _modes(topics), _joint_names(topics['robot_description'].text)
     # Bags of others have one odometry, and in old ones of this suite it is the truth.
     truth, estimate = (('ground_truth', 'odom') if topics['ground_truth'].blocks
                        else ('odom', 'estimated_odom'))
@@ -298,22 +302,16 @@ def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str]
         odometry=recording.OdometrySeries(*_rows(topics.pop(truth).joined(13), (3, 4, 3, 3))),
         estimate=recording.OdometrySeries(*_rows(topics[estimate].joined(13), (3, 4, 3, 3))),
         feet=_feet(topics['foot_contacts']),
-        inhibition=_changes(topics['inhibition_state'].messages, lambda e: (e.message, e.values)),
-        modes=modes, statuses=_by_name(topics['diagnostics'].messages),
+        inhibition=_changes(topics['inhibition_state'].statuses, lambda e: (e.message, e.values)),
+        modes=modes, statuses=_by_name(topics['diagnostics'].statuses),
         arrivals=arrivals, counts=counts, undecodable=dict(skipped))
 
 
-def _joint_names(descriptions: Sequence[Stamped]) -> tuple[str, ...]:
+def _joint_names(description: str) -> tuple[str, ...]:
     """Names of our joints in a recording, as ``robot/urdf.py`` says them."""
-    named = {usual: name for of in descriptions[-1:] for name, usual in re.findall(
-        r'<dmp_cpg_ros_joint name="([^"]+)" usual="([^"]+)"', of.message.data)}
+    named = {usual: name for name, usual in re.findall(
+        r'<dmp_cpg_ros_joint name="([^"]+)" usual="([^"]+)"', description)}
     return tuple(named.get(usual, usual) for usual in JOINT_NAMES)
-
-
-def _stamp_ns(message: Any) -> int:
-    if not hasattr(message, 'header'):
-        return 0
-    return int(message.header.stamp.sec) * 1_000_000_000 + int(message.header.stamp.nanosec)
 
 
 def _stamps(group: Alike) -> NDArray[np.int64]:
@@ -440,34 +438,34 @@ def _arrivals(topics: Mapping[str, Topic]) -> recording.ArrivalSeries:
     return recording.ArrivalSeries(states.stamp / 1e9, states.bag_ns / 1e9, answer / 1e9)
 
 
-def _statuses(messages: Sequence[Stamped]) -> Iterator[tuple[str, StatusEvent]]:
-    """Every status with its name."""
-    for received in messages:
-        for status in received.message.status:
-            yield status.name, StatusEvent(
-                received.stamp / 1e9, int(status.level), status.message,
-                {pair.key: pair.value for pair in status.values})
+def _statuses(message: Any) -> Iterator[tuple[str, StatusEvent]]:
+    """Every status of a message with its name."""
+    stamp = message.header.stamp
+    for status in message.status:
+        yield sys.intern(status.name), StatusEvent(
+            (int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)) / 1e9, int(status.level),
+            sys.intern(status.message),
+            {sys.intern(pair.key): pair.value for pair in status.values})
 
 
-def _by_name(messages: Sequence[Stamped]) -> dict[str, tuple[StatusEvent, ...]]:
+def _by_name(statuses: Statuses) -> dict[str, tuple[StatusEvent, ...]]:
     histories: dict[str, list[StatusEvent]] = defaultdict(list)
-    for name, event in _statuses(messages):  # robot/node, where the robot has a namespace
+    for name, event in statuses:  # robot/node, where the robot has a namespace
         histories[base_name(name)].append(event)
     return {name: tuple(history) for name, history in histories.items()}
 
 
-def _changes(messages: Sequence[Stamped], what: Callable[[StatusEvent], Any],
+def _changes(statuses: Statuses, what: Callable[[StatusEvent], Any],
              ) -> tuple[StatusEvent, ...]:
     """The first of the events in a row that say the same."""
-    events = (event for _, event in _statuses(messages))
-    return tuple(next(same) for _, same in groupby(events, what))
+    return tuple(next(same) for _, same in groupby((event for _, event in statuses), what))
 
 
 def _modes(topics: Mapping[str, Topic]) -> tuple[StatusEvent, ...]:
     """When which mode of the body began."""
     time, position = _table(topics['posture_feedback'], layouts.MODE_ROWS)
     if not time.size:  # a recording from before modes were states
-        return _changes(topics['body_mode'].messages, lambda event: event.message)
+        return _changes(topics['body_mode'].statuses, lambda event: event.message)
     modes = position.argmax(axis=1)
     first = np.flatnonzero(np.diff(modes, prepend=-1))
     return tuple(StatusEvent(float(time[k]), 0, layouts.MODE_ROWS[modes[k]].partition('/')[2], {})
