@@ -123,8 +123,8 @@ function showCertificate(found) {
 }
 
 function showTimes() {
-  const told = (name, { predicted, measured }) => `${name}: predicted ${predicted === null ? 'never'
-    : `${predicted.toFixed(3)} s`}, taken ${measured === null ? '–' : `${measured.toFixed(3)} s`}`;
+  const told = (name, { predicted, measured }) => `${name}: predicted ${predicted === null
+    ? `not in ${episode.patience} s` : `${predicted.toFixed(3)} s`}, taken ${measured === null ? '–' : `${measured.toFixed(3)} s`}`;
   find('spans').textContent = `${told('to rest', episode.stop)}; ${told('to walking', episode.start)}`;
 }
 

@@ -106,8 +106,10 @@ class Page:
         Returns
         -------
         dict
-            ``stop`` and ``start``: time, predicted and measured duration [s], None for never;
-            ``frames``: time, state, x and x_d (4, 2), acting gains, gain and speed of each.
+            ``stop`` and ``start``: time, predicted and measured duration [s], None for more than
+            ``patience`` [s];
+            ``frames``: time, state, x and places x_d (4, 2), armed gains (4,) and speed of each;
+            ``legs``, ``region``: their names, and r0.
         """
         gait, p = self._parts(values, start_inhibited=False)
         dt = self.tick_s
@@ -145,4 +147,5 @@ class Page:
                         'gains': inhibition.gains.tolist(), 'speed': float(np.hypot(*r[:2]))})
             told['stop' if request else 'start'] = {
                 'time': begun * dt, 'predicted': finite(predicted.time_s), 'measured': measured}
-        return {'legs': LEGS, 'frames': frames, 'region': p.inhibition.region_radius, **told}
+        return {'legs': LEGS, 'frames': frames, 'region': p.inhibition.region_radius,
+                'patience': PATIENCE, **told}

@@ -78,7 +78,7 @@ def test_a_stop_and_a_start_take_the_time_that_is_predicted_and_keep_the_bound(g
     assert np.linalg.norm(np.subtract(resting[-1][0], [1.0, 0.0])) < episode['region']
 
 
-def test_a_gait_that_no_gain_holds_walks_on_and_the_prediction_says_never() -> None:
+def test_a_gait_that_a_small_gain_cannot_hold_walks_on_as_is_predicted() -> None:
     stop = answer('episode', inhibition_gain=20.0)['stop']
     assert stop['predicted'] is None and stop['measured'] is None
     assert 'capture' in answer('certificate', inhibition_gain=20.0)['failing']
@@ -183,6 +183,8 @@ def test_in_a_browser_without_a_network_the_line_that_breaks_is_the_one_of_pytho
         assert sorted(broken) == sorted(expected['failing'])
         stop = answer('episode', inhibition_gain=gain)['stop']
         assert f'to rest: predicted {stop["predicted"]:.3f} s' in text(page, '#spans')[0]
+    shown(page, 'inhibition_gain', 20)
+    assert 'to rest: predicted not in 4 s, taken –' in text(page, '#spans')[0]
     assert page.problems == []
 
 
