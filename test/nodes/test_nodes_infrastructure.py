@@ -132,7 +132,9 @@ def overrides(**values: Any) -> list[Parameter]:
 
 
 def relay(ros: Ros, **values: Any) -> Relay:
-    return Relay('relay', context=ros.context, parameter_overrides=overrides(**values))
+    node = Relay('relay', context=ros.context, parameter_overrides=overrides(**values))
+    ros.nodes.append(node)
+    return node
 
 
 @pytest.fixture

@@ -223,6 +223,9 @@ class Ros:
         For publishers, subscriptions, clients.
     context : Context
         For nodes under test that run in this process.
+    nodes : list of Node
+        Those of them that end with the test; whoever is left to the garbage collector stays in
+        the graph of the tests that follow.
     """
 
     def __init__(self, domain: int) -> None:
@@ -231,6 +234,7 @@ class Ros:
         self.executor = SingleThreadedExecutor(context=self.context)
         self.node = Node('test', context=self.context)
         self.executor.add_node(self.node)
+        self.nodes = [self.node]
 
     def spin_until(self, condition: Callable[[], bool], deadline_s: float = DEADLINE_S,
                    what: Callable[[], str] | None = None) -> None:
@@ -275,9 +279,10 @@ class Ros:
         return messages
 
     def end(self) -> None:
-        """Destroy the node and end the context."""
+        """Destroy the nodes and end the context."""
         self.executor.shutdown()
-        self.node.destroy_node()
+        for node in self.nodes:
+            node.destroy_node()
         self.context.try_shutdown()
 
 
