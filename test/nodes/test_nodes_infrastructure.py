@@ -342,7 +342,8 @@ def test_help_tells_everything_without_starting_ros() -> None:
 
 
 def test_a_node_that_is_destroyed_leaves_the_graph_though_python_still_knows_it(ros: Ros) -> None:
-    node = relay(ros, autostart=False)
+    # No relay: those that other tests could not make are in the graph until they are collected.
+    node = Relay('leaving', context=ros.context, parameter_overrides=overrides(autostart=False))
     other = Node('other', context=ros.context)
     name = node.get_name()
     ros.spin_until(lambda: name in other.get_node_names())
