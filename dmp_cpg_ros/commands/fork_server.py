@@ -155,6 +155,7 @@ def _prctl(option: int, value: int | bytes) -> None:
 
 def _serve(parent: int, requests: socket.socket) -> None:
     """Fork for every request until there are no more; returns in what was forked, ready to run."""
+    _show([sys.executable, *sys.argv[:2]])  # without the padding
     _prepare()
     gc.collect()
     gc.freeze()  # the collector of a child would otherwise write to, and so copy, all of it
