@@ -181,7 +181,8 @@ def test_there_is_room_for_some_viewers_and_who_leaves_makes_room(
 
 def test_the_page_fetches_nothing_from_elsewhere_and_all_of_it_is_served() -> None:
     names = {path.name for path in PAGE.iterdir()}
-    assert names == {'index.html', *(name[1:] for name in FILES)}
+    of_paper = {'paper.html', 'paper.js'}  # a page of their own, which nobody serves
+    assert names == {'index.html', *of_paper, *(name[1:] for name in FILES)}
     for path in PAGE.iterdir():
         text = path.read_text(encoding='utf-8')
         assert not re.search(r'(https?|wss?):|//[a-z]+\.[a-z]', text), path

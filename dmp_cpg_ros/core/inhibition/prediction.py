@@ -25,7 +25,7 @@ from dmp_cpg_ros.core.transformation.foot_path import swing_height
 DOWN = 0.2
 """Share of the swing's height below which a foot that comes down counts as down."""
 
-CALMING, LONGEST_CALMING = 0.33, 0.8
+CALMING, LONGEST_CALMING = 0.31, 0.8
 """Time from the last foot's coming down until the body stands still: what it takes, and what no
 trial exceeded [s].
 """
