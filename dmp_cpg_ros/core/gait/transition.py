@@ -155,6 +155,7 @@ class BlendedGait(CycleOfLegs):
     rest: float = field(init=False, repr=False, compare=False)
     highest_speed: float = field(init=False, repr=False, compare=False)
     apart: float = field(init=False, repr=False, compare=False)
+    two_sided: float = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Validate and blend; ``turning`` is 2π dw/dt, the rate of an arc of one cycle [rad/s]."""
@@ -169,6 +170,8 @@ class BlendedGait(CycleOfLegs):
             highest_speed=blended_limit(
                 way.before.highest_speed, way.after.highest_speed, weight),
             apart=way.before.apart + weight * (way.after.apart - way.before.apart),
+            two_sided=way.before.two_sided + weight * (
+                way.after.two_sided - way.before.two_sided),
             phases=phases, moving_phases=phases, rest_rate=turning * way.rest_arc)
 
     @property

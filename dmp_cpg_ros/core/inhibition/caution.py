@@ -4,15 +4,17 @@
 
 The measure is the least margin m of the capture point in the support polygon
 (:mod:`~dmp_cpg_ros.core.balance.capture_point`), of a leg of length l. While the robot walks as it
-is to, it is above 0.27 l in all gaits within their limits, but for bounds that turn. Less says
-that the body does not follow its reference: it was pushed, a foot has slipped, a gait is changing,
-or what is asked is more than the gait can do. The steps that bring it back need the room that
-speed takes, so the reference is given only the share
+is to, it is above ``EASY`` q l in all gaits but at some of the limits of what is declared. Less
+says that the body does not follow its reference: it was pushed, a foot has slipped, a gait is
+changing, or what is asked is more than the gait can do. The steps that bring it back need the room
+that speed takes, so the reference is given only the share
 
-    s = (m/l − DISTURBED) / (EASY − DISTURBED)  in [LEAST, 1]
+    s = (m/(q l) − DISTURBED) / (EASY − DISTURBED)  in [LEAST, 1]
 
-of the command. It falls at once and grows by ``REGAIN`` again. In a stop and while a start is
-under way it is 1: their predictions depend on nothing of the body.
+of the command. It falls at once and grows by ``REGAIN`` again. q is 1 where feet of both sides
+carry most of the time, and falls to ``NARROW`` for gaits that stand on one side, whose body sways
+by itself. In a stop and while a start is under way s is 1: their predictions depend on nothing of
+the body.
 """
 
 from __future__ import annotations
@@ -27,12 +29,15 @@ DISTURBED, EASY = 0.12, 0.24
 LEAST = 0.1
 """Least share: with none a robot that is held, or wrong about its speed, would not move again."""
 
+NARROW, WIDE_STANCE = 0.5, 0.75
+"""q of a gait that stands on one side only, and the share of stance on both from which it is 1."""
+
 REGAIN = 1.0
 """Rate at which the share grows again [1/s]: a cycle or two to test what has been given back."""
 
 
-def followed_share(share: float, margins: Sequence[float] | None, leg_length: float, dt: float
-                   ) -> float:
+def followed_share(share: float, margins: Sequence[float] | None, leg_length: float, dt: float,
+                   two_sided: float = 1.0) -> float:
     """Share of the command after a tick, in [LEAST, 1].
 
     Parameters
@@ -45,9 +50,12 @@ def followed_share(share: float, margins: Sequence[float] | None, leg_length: fl
         l [m].
     dt : float
         [s]
+    two_sided : float
+        Share of stance with feet of both sides on the ground, of the gait.
     """
     regained = min(1.0, share + REGAIN * dt)
     if margins is None:
         return regained
-    room = (min(margins) / leg_length - DISTURBED) / (EASY - DISTURBED)
+    q = NARROW + (1.0 - NARROW) * min(1.0, two_sided / WIDE_STANCE)
+    room = (min(margins) / (q * leg_length) - DISTURBED) / (EASY - DISTURBED)
     return min(regained, max(LEAST, room))

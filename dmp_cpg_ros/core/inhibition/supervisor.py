@@ -219,18 +219,19 @@ class GaitSupervisor:
         state = self._voted(state, tally or state.tally)
         state = self._pushed(state, network, x, margins, body_mode)
         if self.parameters.caution:
-            state = self._cautious(state, margins, network.scale.leg_length, dt)
+            state = self._cautious(state, margins, network, dt)
         if state.requested:
             return self._stopping(state, network, x, rates, speed)
         return self._running(state, network.phase_errors(x), speed)
 
     @staticmethod
-    def _cautious(state: SupervisorState, margins: Sequence[float] | None, leg_length: float,
+    def _cautious(state: SupervisorState, margins: Sequence[float] | None, network: GaitNetwork,
                   dt: float) -> SupervisorState:
         """Follow less of the command while the body is disturbed."""
         share = 1.0
         if not (state.in_force or state.state == 'releasing'):
-            share = followed_share(state.share, margins, leg_length, dt)
+            share = followed_share(
+                state.share, margins, network.scale.leg_length, dt, network.gait.two_sided)
         return state if share == state.share else replace_unchecked(state, share=share)
 
     def _automatic(self, state: SupervisorState, commanded: bool) -> SupervisorState:
