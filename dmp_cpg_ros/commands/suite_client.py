@@ -72,7 +72,12 @@ class SuiteClient:
         deadline = time.monotonic() + within_s
         while not condition() and time.monotonic() < deadline:
             left_s = max(0.0, deadline - time.monotonic())
-            self._executor.spin_once(timeout_sec=min(STEP_S, left_s))
+            try:
+                self._executor.spin_once(timeout_sec=min(STEP_S, left_s))
+            except RuntimeError:  # what C++ makes of an interrupt that meets it in a callback
+                if _interrupts:
+                    raise KeyboardInterrupt from None
+                raise
         return bool(condition())
 
     def meet(self, kinds: Sequence[str], *clients: Client) -> None:
@@ -154,8 +159,18 @@ def prepared(parser: argparse.ArgumentParser, arguments: Sequence[str] | None
     if options.namespace is not None:
         words += ['--ros-args', '-r', f'__ns:=/{options.namespace.strip("/")}']
     prepare_middleware()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
     return options, words
+
+
+_interrupts: list[int] = []
+"""Signals that asked this process to end."""
+
+
+def _interrupt(number: int, _: object) -> None:
+    _interrupts.append(number)
+    raise KeyboardInterrupt
 
 
 def connected(name: str, words: Sequence[str], wait_s: float) -> SuiteClient:

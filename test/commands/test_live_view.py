@@ -187,8 +187,12 @@ def test_it_lies_down_and_stands_up(client: Client, ros: Ros) -> None:
 
 def test_a_push_acts_in_the_world(client: Client, ros: Ros) -> None:
     pushes = heard(ros, 'push')
-    assert client.send(push=[0, 12.5, 1]) == (True, '')
-    ros.spin_until(lambda: bool(pushes))
+
+    def sent() -> bool:  # until the writer knows its reader
+        assert client.send(push=[0, 12.5, 1]) == (True, '')
+        return bool(pushes)
+
+    ros.spin_until(sent)
     force = pushes[0].wrench.force
     assert (force.x, force.y, force.z) == (0.0, 12.5, 1.0)
     assert pushes[0].header.frame_id == 'world'
