@@ -30,7 +30,7 @@ CALMING, LONGEST_CALMING = 0.31, 0.8
 trial exceeded [s].
 """
 
-FARTHER = 0.05, 0.12
+FARTHER = 0.1, 0.15
 """What the body goes farther than its reference in no trial: so far [m], and so far for every
 metre per second at the request [s].
 """
