@@ -21,9 +21,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-DISTURBED, EASY = 0.12, 0.24
-"""Margins at which the share is least and 1, in lengths of the leg. The first is
-:data:`~dmp_cpg_ros.core.inhibition.push_recovery.PUSHED`: what standing legs can just bear.
+from dmp_cpg_ros.core.inhibition.push_recovery import PUSHED
+
+DISTURBED, EASY = PUSHED, 2.0 * PUSHED
+"""Margins at which the share is least and 1, in lengths of the leg: what standing legs can just
+bear, and twice that.
 """
 
 LEAST = 0.1

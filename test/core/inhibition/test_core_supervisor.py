@@ -29,10 +29,12 @@ from dmp_cpg_ros.core.canonical.inhibition import (
 )
 from dmp_cpg_ros.core.canonical.phase import phase, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.inhibition.prediction import DOWN
 from dmp_cpg_ros.core.inhibition.supervisor import STATES
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.transformation.foot_path import swing_height
 
 ROBOT = quadruped()
 STANDING = standing_state(ROBOT)
@@ -258,3 +260,24 @@ def test_armed_gains_are_those_of_the_inhibited_legs() -> None:
 def test_impossible_choices_of_legs_are_refused(legs: tuple[str, ...]) -> None:
     with pytest.raises(ParameterError, match='fl, fr, rl, rr'):
         InhibitionParameters(inhibited_legs=legs)
+
+
+@pytest.mark.parametrize(('gait', 'wait'), [('amble', 0.0), ('trot', 0.1), ('walk', 0.3)])
+def test_feet_are_down_and_the_reference_has_gone_as_far_as_was_looked_ahead(
+        gait: str, wait: float) -> None:
+    run = walking(gait).go(wait)
+    run.ticks.clear()
+    run.loop.request(True)
+    outlook = run.loop.outlook
+    run.until('at_rest')
+    assert outlook.way_m == pytest.approx(
+        TICK * sum(np.hypot(*tick.r[:2]) for tick in run.ticks), rel=1e-9)
+    lifted = []
+    for k, tick in enumerate(run.ticks, 1):
+        duty = tick.gait.pace(tick.r, run.loop.canonical.scale)[3]
+        swung = tick.gait.cycle_position(phase(tick.x)) / (1.0 - duty) + 0.5
+        height = [swing_height(s)[0] if 0.0 < s < 1.0 else 0.0 for s in swung.tolist()]
+        if max(tick.supervisor.activity * height) > DOWN:
+            lifted.append(k * TICK)
+    assert outlook.down_s == pytest.approx(lifted[-1]) and 0.0 < outlook.down_s < outlook.time_s
+    assert outlook.stands_s < outlook.stands_within_s
