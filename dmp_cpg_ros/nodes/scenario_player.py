@@ -45,6 +45,11 @@ LEAD_NS = 40_000_000
 """In real time a push is stamped so much later than the clock that its message is in time [ns]."""
 
 
+REPEAT_NS, REPEATED_NS = 200_000_000, 3_000_000_000
+"""In real time a service that refuses is asked again after a time, and for how long [ns]: on a
+loaded machine the robot may have to look after itself for a moment.
+"""
+
 PATIENCE_NS = 12_000_000_000
 """Time on the robot's clock within which it must lie [ns]: coming to rest, and the movement."""
 
@@ -230,7 +235,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self.begun, self._busy, self._word = False, False, ''
         self._holding_ns, self._inhibition_ns = -1, -1
         self.time_ns, self.mode, self.drive, self.finished = 0, '', DRIVE_MODES[0], Future()
-        self._until_ns = -1
+        self._until_ns, self._again_ns = -1, 0
         self._lain: Future | None = None
         voting = any(action.kind == 'votes' for action in self._actions)
         self._topics = {name: AcknowledgedTopic(self, name) for name in (
@@ -324,11 +329,12 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """Deliver the next action if it is due; returns whether one is under way and will call
         back.
         """
-        if self._next == len(self._actions) or self._actions[self._next].time_ns > self.time_ns:
+        if (self._next == len(self._actions)
+                or max(self._actions[self._next].time_ns, self._again_ns) > self.time_ns):
             return False
         action = self._actions[self._next]
         self._next += 1
-        if action.label:
+        if action.label and not self._again_ns:
             self._say(self.time_ns * 1e-9, f'> {action.label}')
         self._busy = True
         self._deliver[action.kind](action.value)
@@ -372,10 +378,16 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
 
     def _ask(self, service: str, stop: bool) -> None:
         request = SetBool.Request(data=stop) if service == 'inhibit' else Trigger.Request()
+        due_ns = self._actions[self._next - 1].time_ns
 
         def answered(agreed: bool, message: str) -> None:
             if agreed:
                 self._say(self.time_ns * 1e-9, f'  {service}: {message}')
+            elif not self._lock_step and self.time_ns < due_ns + REPEATED_NS:
+                self._busy, self._next = False, self._next - 1
+                self._again_ns = self.time_ns + REPEAT_NS
+                return
+            self._again_ns = 0
             self._go_on(agreed, f'service {service}: {message}')
 
         ask(self._callees[service], request, answered)
