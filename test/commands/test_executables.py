@@ -65,7 +65,7 @@ def test_a_bad_parameter_is_named_with_what_is_valid(processes: Processes, name:
     process = processes.python(
         '-m', 'dmp_cpg_ros', name, '--ros-args', '-p', f'{parameter}:={text}'
     )
-    assert process.wait() == 2, process
+    assert process.wait() == 2, str(process)
     assert valid in process.output, process
     assert 'Traceback' not in process.output
 
@@ -103,7 +103,7 @@ def test_not_a_number_neither_ends_a_node_nor_leaves_it(
         for message in messages if topic in OUTPUTS else ():
             assert all(math.isfinite(value) for value in numbers_of(message)), topic
     process.interrupt()
-    assert process.wait() == 0, process
+    assert process.wait() == 0, str(process)
     assert 'Traceback' not in process.output, process
 
 

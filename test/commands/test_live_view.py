@@ -265,7 +265,7 @@ def test_without_a_suite_it_says_so() -> None:
     with reserved_domain() as domain:
         alone = Processes(domain)
         process = alone.executable('live_view', '--wait', '0.5')
-        assert process.wait(PATIENCE_S) == 1, process
+        assert process.wait(PATIENCE_S) == 1, str(process)
         assert 'live_view: no suite answers' in process.output
 
 

@@ -60,7 +60,7 @@ def test_in_lock_step_the_walk_goes_on_as_if_nobody_had_died(
         send(process, node, signal.SIGKILL)
         process.wait_for_output(rf'{node} was ended by signal 9 \(SIGKILL\)', RUN_S)
     process.wait_for_output(AGAIN, RUN_S)
-    assert process.wait(RUN_S) == 0, process
+    assert process.wait(RUN_S) == 0, str(process)
     recording = load_recording(tmp_path / 'run')
     stamps = np.unique(recording.joints.time)
     assert np.allclose(np.diff(stamps), 0.004)
@@ -75,7 +75,7 @@ def test_without_respawn_the_robot_comes_to_a_stand_and_walk_names_who_died(
     process = walk(processes, tmp_path, 60.0)
     process.wait_for_output(r's +walking', RUN_S)
     send(process, node, signal.SIGKILL)
-    assert process.wait(RUN_S) == 1, process
+    assert process.wait(RUN_S) == 1, str(process)
     assert re.search(rf'walk: {node} was ended by signal 9 \(SIGKILL\)', process.output)
     odometry = load_recording(tmp_path / 'run').odometry
     assert tilt(odometry.quaternion).max() < 0.5
@@ -87,5 +87,5 @@ def test_a_node_that_hangs_is_named_and_the_run_has_failed(
     process = walk(processes, tmp_path, 2.0, '--composed')
     process.wait_for_output(r's +walking', RUN_S)
     send(process, 'bag_recorder', signal.SIGSTOP)
-    assert process.wait(RUN_S) == 1, process
+    assert process.wait(RUN_S) == 1, str(process)
     assert 'bag_recorder hung' in process.output

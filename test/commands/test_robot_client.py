@@ -55,7 +55,7 @@ def told(process: NodeProcess, status: int = 1) -> str:
     """What a client has printed at its end; some look for what is not there for ten seconds, in
     which others are asked.
     """
-    assert process.wait(90.0) == status, process
+    assert process.wait(90.0) == status, str(process)
     assert 'Traceback' not in process.output, process
     return process.output.strip()
 
@@ -145,7 +145,7 @@ def test_a_velocity_reaches_the_reference_and_ends_with_zero(suite: Processes, r
     twist = references[-1].twist
     assert abs(twist.linear.y - 0.05) < 0.01 and abs(twist.angular.z - 0.1) < 0.01
     client.signal(signal.SIGTERM)
-    assert client.wait() == 0, client
+    assert client.wait() == 0, str(client)
     ros.spin_until(lambda: sent[-1].linear.x == sent[-1].angular.z == 0.0)
     assert said(suite, 'cmd_vel', '0.1', '--for', '0.5') == ''
     await_stop(ros, 'at_rest')

@@ -94,10 +94,10 @@ def test_a_second_suite_in_the_domain_is_refused_and_the_first_walks_on(
     assert late.wait(RUN_S) == 2 and not (tmp_path / 'late').exists()
     beside = walk(processes, brief, '--composed', '--lock-step', '--no-report', '--namespace',
                   'robot2', '--out', str(tmp_path / 'beside'))
-    assert beside.wait(RUN_S) == 0, beside
+    assert beside.wait(RUN_S) == 0, str(beside)
     assert walking.running
     walking.interrupt()
-    assert walking.wait(RUN_S) == 130, walking
+    assert walking.wait(RUN_S) == 130, str(walking)
 
 
 def test_nodes_left_over_are_named_instead_of_measured(
@@ -141,11 +141,11 @@ def test_a_walk_reads_the_sections_of_its_namespace(processes: Processes, tmp_pa
         + '\n/robot1/canonical_oscillators: {ros__parameters: {gait: gallop}}\n', encoding='utf-8')
     given = (scenario(tmp_path, 0.5), '--parameters', str(path), '--out', str(tmp_path / 'run'))
     inside = walk(processes, *given, '--namespace', '/robot1')
-    assert inside.wait() == 2, inside
+    assert inside.wait() == 2, str(inside)
     assert "no gait 'gallop'" in inside.output, inside
     with claim('/inhibition', processes.domain):
         outside = walk(processes, *given)
-        assert outside.wait() == 2, outside
+        assert outside.wait() == 2, str(outside)
     assert ("section '/robot1/canonical_oscillators' means no node in namespace '/'"
             in outside.output), outside
     assert 'nodes /inhibition' in outside.output, outside
@@ -160,7 +160,7 @@ def test_a_walk_in_a_namespace_is_the_walk_without(processes: Processes, tmp_pat
             (composed, inside)]):
         out = tmp_path / str(number)
         process = walk(processes, brief, '--out', str(out), *options, *given)
-        assert process.wait(RUN_S) == 0, process
+        assert process.wait(RUN_S) == 0, str(process)
         assert 'deprecated' not in process.output
         recording = load_recording(out / 'bag')
         assert len(recording.joints.time) >= 149
@@ -186,7 +186,7 @@ def test_whatever_ends_walk_ends_its_nodes_and_closes_the_bag(
     assert len(nodes) == (2 if composed else 10)
     process.signal(number)
     killed = number == signal.SIGKILL
-    assert process.wait(RUN_S) == (-number if killed else 128 + number), process
+    assert process.wait(RUN_S) == (-number if killed else 128 + number), str(process)
     wait_until(lambda: not any(map(alive, nodes)), RUN_S,
                what=lambda: f'the end of {[pid for pid in nodes if alive(pid)]}')
     assert (tmp_path / 'run' / 'bag' / 'metadata.yaml').is_file()
@@ -203,7 +203,7 @@ def test_a_walk_goes_on_without_its_recorder_and_says_so_at_once(
         f'/proc/{pid}/cmdline').read_text(encoding='utf-8'))
     os.kill(recorder, signal.SIGKILL)
     process.wait_for_output(' s  bag_recorder was ended by signal 9.*; the walk goes on', RUN_S)
-    assert process.wait(RUN_S) == 1, process
+    assert process.wait(RUN_S) == 1, str(process)
     assert 'the rest of the walk was not recorded' in process.output
     assert f'; see {tmp_path}' not in process.output  # the scenario was played to its end
 
@@ -295,7 +295,7 @@ def test_commands_take_what_launch_adds(
 def test_walk_refuses_what_is_wrong_and_says_what_is_valid(
         processes: Processes, arguments: list[str], text: str) -> None:
     process = walk(processes, *arguments)
-    assert process.wait() == 2, process
+    assert process.wait() == 2, str(process)
     assert text in process.output, process
     assert 'Traceback' not in process.output
 

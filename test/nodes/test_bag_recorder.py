@@ -92,7 +92,7 @@ def test_a_stopped_recorder_has_every_byte(processes: Processes, ros: Ros, tmp_p
     commands.wait_for_all_acked()
     joints.wait_for_all_acked()
     process.interrupt()
-    assert process.wait() == 0, process
+    assert process.wait() == 0, str(process)
     recorded = read(bag)
     assert [data for _, data in recorded['/joint_states']] == sent
     assert [time_ns for time_ns, _ in recorded['/joint_states']
@@ -124,7 +124,7 @@ def test_a_second_signal_does_not_break_into_the_end_of_a_recording(
         '-c', program, '--ros-args', '-p', f'output:={tmp_path / "bag"}')
     process.wait_for_output('active')
     process.signal(number)
-    assert process.wait() == 0, process
+    assert process.wait() == 0, str(process)
     assert 'Traceback' not in process.output, process
     assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
 
@@ -166,7 +166,7 @@ def test_a_second_recording_gets_a_name_of_its_own(processes: Processes, ros: Ro
     for _ in range(2):
         process = started(processes, ros, tmp_path / 'bag')
         process.interrupt()
-        assert process.wait() == 0, process
+        assert process.wait() == 0, str(process)
     assert process.output.count('WARN') == 1
     assert f"'{tmp_path / 'bag'}' exists" in process.output
     for name in ('bag', 'bag_1'):
@@ -203,7 +203,7 @@ def test_a_real_time_recording_is_as_long_as_the_robot_walked(processes: Process
     for sender in (command, push, clock, joints):
         sender.wait_for_all_acked()
     process.interrupt()
-    assert process.wait() == 0, process
+    assert process.wait() == 0, str(process)
     recorded = read(bag)
     times = [time_ns for messages in recorded.values() for time_ns, _ in messages]
     assert [len(recorded[name]) for name in ('/cmd_vel', '/push', '/clock')] == [5, 5, 5]
@@ -233,7 +233,7 @@ def test_the_time_of_a_command_is_that_of_its_reception(
     push.publish(early)
     ros.spin_until(lambda: recorded('/push') == 1, what=lambda: str(process))
     process.interrupt()
-    assert process.wait() == 0, process
+    assert process.wait() == 0, str(process)
     (time_ns, _), = read(tmp_path / 'bag')['/push']
     assert time_ns == 50 * TICK_NS
 
@@ -241,7 +241,7 @@ def test_the_time_of_a_command_is_that_of_its_reception(
 def test_the_gate_is_not_in_the_bag(processes: Processes, ros: Ros, tmp_path: Path) -> None:
     process = started(processes, ros, tmp_path / 'bag')
     process.interrupt()
-    assert process.wait() == 0, process
+    assert process.wait() == 0, str(process)
     topics = read(tmp_path / 'bag').keys()
     assert '/joint_states' in topics
     assert not [topic for topic in topics if topic.startswith('/mujoco_robot/')]

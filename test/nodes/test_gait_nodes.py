@@ -60,5 +60,5 @@ def test_the_gait_is_set_through_the_nodes_own_service(processes: Processes, ros
     assert not strange.successful and 'valid are amble' in strange.reason
     for node in nodes:
         node.interrupt()
-        assert node.wait() == 0, node
+        assert node.wait() == 0, str(node)
         assert 'Traceback' not in node.output, node

@@ -89,7 +89,7 @@ def started(processes: Processes, tmp_path: Path, kind: str, **parameters: Any) 
 def ended(process: NodeProcess) -> None:
     """It ends as it should, and nothing went wrong before."""
     process.interrupt()
-    assert process.wait() == 0, process
+    assert process.wait() == 0, str(process)
     assert 'Traceback' not in process.output, process
     assert 'FATAL' not in process.output, process
 
@@ -427,7 +427,7 @@ def test_an_interrupt_ends_a_lone_node_without_complaint(
             if kind == 'mujoco_robot':
                 ros.spin_until(lambda seen=seen: all(seen))
         process.signal(number)
-        assert process.wait() == 0, process
+        assert process.wait() == 0, str(process)
         # A farewell that was lost is made up for by the end of the lease, after 20 s.
         ros.spin_until(lambda: kind not in ros.node.get_node_names(), 2.0 * DEADLINE_S)
         assert 'Traceback' not in process.output, process

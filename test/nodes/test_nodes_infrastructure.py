@@ -665,12 +665,12 @@ def test_a_lone_node_serves_and_ends_cleanly(processes: Processes, ros: Ros, exe
     assert np.isfinite(robot.tick().twist.linear.x), process
     ros.spin_until(lambda: 'dropped' in process.output)
     process.signal(number)
-    assert process.wait() == 0, process
+    assert process.wait() == 0, str(process)
     assert 'Traceback' not in process.output, process
 
 
 def ended(process: NodeProcess, status: int, *words: str) -> None:
-    assert process.wait() == status, process
+    assert process.wait() == status, str(process)
     assert 'Traceback' not in process.output, process
     for word in words:
         assert word in process.output, process

@@ -77,7 +77,7 @@ def test_one_vote_does_not_stop_the_nodes_and_three_do(
     scenario.write_text(SCENARIO, encoding='utf-8')
     process = processes.executable('walk', str(scenario), '--lock-step',
                                    '--composed', '--no-report', '--out', str(out))
-    assert process.wait(RUN_S) == 0, process
+    assert process.wait(RUN_S) == 0, str(process)
     recording, ticks = load_recording(out / 'bag'), plain_run(scenario)
     np.testing.assert_array_equal(recording.canonical.x, [tick.x for tick in ticks])
     np.testing.assert_array_equal(

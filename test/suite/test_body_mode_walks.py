@@ -86,7 +86,7 @@ def test_services_act_at_their_ticks_and_nodes_agree_with_the_plain_loop_bit_for
     processes: Processes, tmp_path: Path
 ) -> None:
     process = start(processes, UP_AND_DOWN, tmp_path, '--lock-step', '--processes', 'blocks')
-    assert process.wait(RUN_S) == 0, process
+    assert process.wait(RUN_S) == 0, str(process)
     assert 'lie_down: lying' in process.output
     recording = load_recording(tmp_path / 'run' / 'bag')
     states, ticks = plain_run(tmp_path / 'scenario.yaml')
@@ -118,7 +118,7 @@ def test_ctrl_c_lays_a_live_robot_down_after_the_recording(
     process = start(processes, WALKING, tmp_path, '--composed')
     process.wait_for_output('walking', RUN_S)
     process.interrupt()
-    assert process.wait(RUN_S) == 130, process
+    assert process.wait(RUN_S) == 130, str(process)
     assert 'it is lying' in process.output
     modes = [event.message for event in load_recording(tmp_path / 'run' / 'bag').modes]
     assert modes == ['standing']

@@ -66,7 +66,7 @@ def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
     process = processes.executable('walk', str(asked), '--lock-step',
                                    '--processes', 'blocks', '--no-report', '--out',
                                    str(tmp_path / 'run'), *settings)
-    assert process.wait(240.0) == 0, process
+    assert process.wait(240.0) == 0, str(process)
     said = process.output
     refusals = re.findall(r'refused: (.*)', said)
     assert len(refusals) == 4, said
@@ -165,7 +165,7 @@ def test_each_node_guards_its_own_parameters_and_follows_the_others(
     ros.spin_until(lambda: alarmed(other) and alarmed(owner))
     for process in (canonical, inhibition):
         process.interrupt()
-        assert process.wait() == 0, process
+        assert process.wait() == 0, str(process)
         assert 'Traceback' not in process.output, process
 
 

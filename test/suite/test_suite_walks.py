@@ -97,7 +97,7 @@ def start_walk(processes: Processes, scenario: Path, out: Path, *options: str) -
 
 def walked(processes: Processes, scenario: Path, out: Path, *options: str) -> Path:
     process = start_walk(processes, scenario, out, *options)
-    assert process.wait(RUN_S) == 0, process
+    assert process.wait(RUN_S) == 0, str(process)
     return out
 
 

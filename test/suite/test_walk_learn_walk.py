@@ -49,7 +49,7 @@ def test_a_walk_is_learned_from_its_recording_and_walked_again(
 
     assert walk('shown') == 0
     learned = processes.executable('learn', str(tmp_path / 'shown'), '--motion', str(file))
-    assert learned.wait(RUN_S) == 0, learned
+    assert learned.wait(RUN_S) == 0, str(learned)
     assert walk('played', '--motion', str(file)) == 0
     shown, played = (json.loads((tmp_path / name / 'metrics.json').read_text(encoding='utf-8'))
                      for name in ('shown', 'played'))

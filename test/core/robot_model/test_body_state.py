@@ -138,4 +138,4 @@ def test_the_node_bears_silent_sensors_and_names_them(processes: Processes, ros:
                    and 'imu, contact of fr' in told_problems())
     assert all(math.isfinite(value) for message in feedback for value in message.effort)
     process.interrupt()
-    assert process.wait() == 0, process
+    assert process.wait() == 0, str(process)
