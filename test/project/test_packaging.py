@@ -241,11 +241,17 @@ def built(folder: Path, what: str) -> Path:
     return folder / 'dist' / done.stdout.splitlines()[-1]
 
 
-def test_a_wheel_has_the_same_files_from_the_checkout_as_from_an_sdist(tmp_path: Path) -> None:
-    pytest.importorskip('setuptools', minversion='70.1')  # those before need the package wheel
-    checkout, unpacked = tmp_path / 'checkout', tmp_path / 'unpacked'
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """A copy of what is in the repository."""
     unwanted = shutil.ignore_patterns('.*', 'runs', 'build', '__pycache__', '*.egg-info')
-    shutil.copytree(ROOT, checkout, ignore=unwanted)
+    return Path(shutil.copytree(ROOT, tmp_path / 'checkout', ignore=unwanted))
+
+
+def test_a_wheel_has_the_same_files_from_the_checkout_as_from_an_sdist(
+        checkout: Path, tmp_path: Path) -> None:
+    pytest.importorskip('setuptools', minversion='70.1')  # those before need the package wheel
+    unpacked = tmp_path / 'unpacked'
     with tarfile.open(built(checkout, 'sdist')) as archive:
         archive.extractall(unpacked, filter='data')
     (sources,) = unpacked.iterdir()
@@ -262,6 +268,26 @@ def test_a_wheel_has_the_same_files_from_the_checkout_as_from_an_sdist(tmp_path:
     scripts = {f'lib/{PACKAGE}/{name}' for name in executables()}
     modules_ = {str(path.relative_to(ROOT)) for path in modules().values()}
     assert shared | scripts | modules_ <= names
+
+
+@pytest.mark.skipif(shutil.which('colcon') is None, reason='colcon is not installed')
+def test_colcon_installs_the_same_files_as_a_wheel(checkout: Path, tmp_path: Path) -> None:
+    install = tmp_path / 'install'
+    subprocess.run(
+        ['colcon', '--log-base', str(tmp_path / 'log'), 'build', '--base-paths', str(checkout),
+         '--build-base', str(tmp_path / 'build'), '--install-base', str(install)],
+        check=True, timeout=300, cwd=tmp_path, stdout=subprocess.DEVNULL)
+    by_colcon = {str(path.relative_to(install / PACKAGE))
+                 for path in (install / PACKAGE).rglob('*') if path.is_file()}
+    # What colcon adds to every package, what setuptools says of it, and what pip has in bin.
+    others = (rf'.*\.egg-info/|share/colcon-core/|share/{PACKAGE}/(hook/|package\.(?!xml))'
+              rf'|lib/{PACKAGE}/{PACKAGE}$|.*\.pyc$')
+    by_colcon = {re.sub(r'^lib/python[^/]+/site-packages/', '', name) for name in by_colcon
+                 if not re.match(others, name)}
+    with ZipFile(built(checkout, 'wheel')) as wheel:
+        by_pip = {entry.partition('.data/data/')[2] or entry for entry in wheel.namelist()
+                  if '.dist-info/' not in entry}
+    assert by_colcon == by_pip
 
 
 @installed
