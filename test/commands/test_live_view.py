@@ -19,7 +19,14 @@ pytest.importorskip('rclpy')
 
 import ros_processes
 from browser import Page, browser, find_browser
-from ros_processes import NodeProcess, Processes, Ros, composed_suite, reserved_domain
+from ros_processes import (
+    NodeProcess,
+    Processes,
+    Ros,
+    composed_suite,
+    joined,
+    reserved_domain,
+)
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.messages.conversions import read_body_mode
@@ -297,10 +304,8 @@ def state(word: str) -> str:
     return f"document.querySelector('#state').textContent === '{word}'"
 
 
-def test_in_a_browser_the_robot_is_driven_pushed_and_stopped(
-        client: Client, page: Page, ros: Ros) -> None:
-    at_rest(client)
-    page.open(client.address, 900, 640)
+def drive(page: Page, ros: Ros) -> None:
+    """Start, drive by key and by stick, push, and stop a robot that rests, all by hand."""
     page.until(state('at rest'))
     page.until("document.querySelector('#robot').textContent === 'mini quadruped'")
     pushes, commands = heard(ros, 'push'), heard(ros, 'cmd_vel')
@@ -330,9 +335,31 @@ def test_in_a_browser_the_robot_is_driven_pushed_and_stopped(
     page.until(state('at rest'))
     page.until("document.querySelector('#certificate').classList.contains('holds')")
     assert 'rest' in page.evaluate("document.querySelector('#answers').textContent")
+    assert not page.problems
+
+
+def test_in_a_browser_the_robot_is_driven_pushed_and_stopped(
+        client: Client, page: Page, ros: Ros) -> None:
+    at_rest(client)
+    page.open(client.address, 900, 640)
+    drive(page, ros)
     frame = client.until(lambda frame: frame['at_rest'])
     assert frame['requested'] and frame['stop']['automatic'] == 'false'
-    assert not page.problems
+
+
+def test_one_command_gives_an_address_at_which_the_robot_is_driven_pushed_and_stopped(
+        page: Page, tmp_path: Path) -> None:
+    with reserved_domain() as domain, joined(domain) as ros:
+        processes = Processes(domain)
+        try:
+            walk = processes.python(
+                '-m', 'dmp_cpg_ros', 'walk', '--view', '--no-report', '--out', str(tmp_path))
+            page.open(walk.wait_for_output(ADDRESS, PATIENCE_S)[1], 900, 640)
+            drive(page, ros)
+            walk.interrupt()
+            assert walk.wait(PATIENCE_S) == 130, str(walk)
+        finally:
+            processes.end()
 
 
 def test_the_picture_shows_a_robot_and_the_panels_are_drawn(client: Client, page: Page) -> None:
