@@ -130,6 +130,8 @@ setup(
         'video': ['imageio-ffmpeg>=0.4.9'],
         # Recordings as Parquet; analyze --parquet says so without.
         'parquet': ['pyarrow>=14'],
+        # Studies on several machines: --cluster.
+        'cluster': ['distributed>=2024.4'],
     },
     entry_points={
         'console_scripts': [f'{NAME} = {NAME}.__main__:main',

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import sys
 import time
 from collections import Counter
@@ -36,6 +35,7 @@ from dmp_cpg_ros.studies.adversary_suite import (
     smaller,
     varied,
 )
+from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_suite
 
 WEAKENED = tuple(dict.fromkeys((*adversary_networks.WEAKENED, *CONDITIONS)))
@@ -120,12 +120,18 @@ def _smallest_suite(description: RobotDescription, case: Case, what: str, weaken
     return {'attack': 'suite', 'happened': play(description, case, weaken)[0], **case}
 
 
+def _searched(job: tuple[int, float, str, int, bool]) -> tuple[Counter[str], list[Case]]:
+    return search(*job)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the search; returns 1 when it found something."""
     parser = argparse.ArgumentParser(description='Search for a certificate that is wrong.')
     parser.add_argument('--seconds', type=float, default=60.0)
     parser.add_argument('--seed', type=int, default=0)
-    parser.add_argument('--workers', type=int, default=1)
+    parser.add_argument('--workers', type=int, default=1, help='searches at once (default: 1)')
+    parser.add_argument('--cluster', default='', metavar='ADDRESS',
+                        help='run them on a dask.distributed cluster')
     parser.add_argument('--weaken', choices=WEAKENED, default='', help='leave this out')
     parser.add_argument('--failures', type=int, default=3, help='stop after this many')
     parser.add_argument('--record', type=Path, help='Markdown file to add the counts to')
@@ -135,11 +141,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     jobs = [(1000 * options.seed + k, options.seconds, options.weaken, options.failures,
              options.auto)
             for k in range(options.workers)]
-    if options.workers == 1:
+    if options.workers == 1 and not options.cluster:
         results = [search(*jobs[0])]
     else:
-        with multiprocessing.get_context('spawn').Pool(options.workers) as pool:
-            results = pool.starmap(search, jobs)
+        with Workers(options.workers, options.cluster) as workers:
+            results = list(workers.map(_searched, jobs))
     total = sum((counts for counts, _ in results), Counter())
     failures = [case for _, found in results for case in found]
     row = _row(total, options, len(failures))

@@ -21,8 +21,6 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from math import isnan, nan, pi
-from multiprocessing import Pool
-from multiprocessing.pool import Pool as Processes
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +33,7 @@ from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies import walking_trials as trials
 from dmp_cpg_ros.studies.loop_recording import StopSummary
 from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
+from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 Results = list[tuple[dict[str, Any], Any]]
@@ -133,9 +132,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _benchmark(options: argparse.Namespace, _: RosArguments) -> int:
     results: dict[str, Any] = {}
-    with Pool(options.jobs) as pool:
+    with Workers(options.workers, options.cluster) as workers:
         for name in options.tables:
-            table = TABLES[name](pool, options.seeds, options.phases)
+            table = TABLES[name](workers, options.seeds, options.phases)
             print(f'{table.title}\n\n{output.markdown_table(table.columns, table.rows)}\n',
                   flush=True)
             results[name] = [case | (outcome if isinstance(outcome, dict) else vars(outcome))
@@ -144,20 +143,19 @@ def _benchmark(options: argparse.Namespace, _: RosArguments) -> int:
     return 0
 
 
-def _run(pool: Processes, trial: Callable[..., Any], cases: Sequence[dict[str, Any]],
-         chunk: int = 1) -> Results:
-    """Cases with their outcomes, on several processes."""
-    return list(zip(cases, pool.map(partial(_tried, trial), cases, chunk), strict=True))
+def _run(workers: Workers, trial: Callable[..., Any], cases: Sequence[dict[str, Any]]) -> Results:
+    """Cases with their outcomes."""
+    return list(zip(cases, workers.map(partial(_tried, trial), cases), strict=True))
 
 
 def _tried(trial: Callable[..., Any], case: dict[str, Any]) -> Any:
     return trial(**case)
 
 
-def speeds(pool: Processes, seeds: int, phases: int) -> Table:
+def speeds(workers: Workers, seeds: int, phases: int) -> Table:
     """Steady velocities in all gaits."""
     walks = [*((gait, (v, 0.0, 0.0)) for gait, vs in STRAIGHT.items() for v in vs), *OTHERS]
-    results = _run(pool, trials.steady, [{'gait': gait, 'velocity': v} for gait, v in walks])
+    results = _run(workers, trials.steady, [{'gait': gait, 'velocity': v} for gait, v in walks])
     rows = [(case['gait'], _velocity(case['velocity']), *steady_cells(case['velocity'], outcome))
             for case, outcome in results]
     return Table('Speeds', ('gait', 'asked m/s, rad/s', 'reached', 'error %',
@@ -181,12 +179,12 @@ def _number(value: float, digits: int) -> str:
     return '-' if isnan(value) else f'{value:.{digits}f}'
 
 
-def pushes(pool: Processes, seeds: int, phases: int) -> Table:
+def pushes(workers: Workers, seeds: int, phases: int) -> Table:
     """Largest pushes survived, the least and the median over the phases."""
     cases = [{'gait': gait, 'speed': speed, 'phase': i / phases,
               'directions': tuple(DIRECTIONS.values())}
              for (gait, speed), i in product(PUSHED, range(phases))]
-    survived = [changes for _, changes in _run(pool, trials.survived_pushes, cases)]
+    survived = [changes for _, changes in _run(workers, trials.survived_pushes, cases)]
     rows = []
     for k, (gait, speed) in enumerate(PUSHED):
         of = np.array(survived[k * phases:(k + 1) * phases])
@@ -199,12 +197,12 @@ def pushes(pool: Processes, seeds: int, phases: int) -> Table:
                  ('walking', *DIRECTIONS), rows, results)
 
 
-def manoeuvres(pool: Processes, seeds: int, phases: int) -> Table:
+def manoeuvres(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls by pushes at rest and in manoeuvres, without and with the steps that catch them."""
     cells = [(name, change, drawn, recovery)
              for name, changes, draws in PUSHED_IN for change, drawn, recovery in product(
                  changes, draws, (False, True)) if recovery or name.startswith(STOPPED)]
-    results = _run(pool, trials.pushed, [
+    results = _run(workers, trials.pushed, [
         {'manoeuvre': name, 'speed_change': change, 'case': case, 'cases': phases, 'drawn': drawn,
          'recovery': recovery} for name, change, drawn, recovery in cells
         for case in range(phases)])
@@ -220,9 +218,9 @@ def manoeuvres(pool: Processes, seeds: int, phases: int) -> Table:
                   'most releases'), rows, results)
 
 
-def unpushed(pool: Processes, seeds: int, phases: int) -> Table:
+def unpushed(workers: Workers, seeds: int, phases: int) -> Table:
     """Releases by stops without a push; half as many seeds as ``phases`` on each ground."""
-    results = _run(pool, trials.unpushed, [
+    results = _run(workers, trials.unpushed, [
         {'gait': gait, 'speed': low + (high - low) * seed / max(phases // 2 - 1, 1),
          'seed': seed + 1, 'kind': kind, 'numbers': numbers, 'payload': payload}
         for gait, (low, high), kind, numbers, payload in UNPUSHED for seed in range(phases // 2)])
@@ -238,9 +236,9 @@ def unpushed(pool: Processes, seeds: int, phases: int) -> Table:
         'gait', 'm/s', 'ground', 'stops', 'released', 'fell', 'rest after 3 s'), rows, results)
 
 
-def rough(pool: Processes, seeds: int, phases: int) -> Table:
+def rough(workers: Workers, seeds: int, phases: int) -> Table:
     """Share of the seeds that cross each ground."""
-    results, rows = _crossings(pool, seeds, product(ROUGH, ROUGH_GAITS, [()])), []
+    results, rows = _crossings(workers, seeds, product(ROUGH, ROUGH_GAITS, [()])), []
     for case, words, of, shares in _groups(results, seeds):
         times = [outcome.time for outcome in of if outcome.crossed]
         rows.append((case['kind'], words, case['gait'], *shares,
@@ -249,9 +247,9 @@ def rough(pool: Processes, seeds: int, phases: int) -> Table:
         'ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s'), rows, results)
 
 
-def contacts(pool: Processes, seeds: int, phases: int) -> Table:
+def contacts(workers: Workers, seeds: int, phases: int) -> Table:
     """Crossings of rough ground with each of ``FEELING``."""
-    results, rows = _crossings(pool, seeds, product(FELT_GROUNDS, ROUGH_GAITS, FEELING)), []
+    results, rows = _crossings(workers, seeds, product(FELT_GROUNDS, ROUGH_GAITS, FEELING)), []
     for case, words, of, shares in _groups(results, seeds):
         rows.append((f'{case["kind"]}, {words}', case['gait'], FEELING[case['values']], *shares,
                      f'{np.mean([outcome.distance for outcome in of]):.2f}',
@@ -262,11 +260,11 @@ def contacts(pool: Processes, seeds: int, phases: int) -> Table:
                   'mean speed m/s', 'tilt rms deg'), rows, results)
 
 
-def _crossings(pool: Processes, seeds: int, walks: Iterator[tuple[Any, ...]]) -> Results:
+def _crossings(workers: Workers, seeds: int, walks: Iterator[tuple[Any, ...]]) -> Results:
     """Crossings of ground, gait and parameters with every seed, the seeds innermost."""
-    return _run(pool, trials.cross, [
+    return _run(workers, trials.cross, [
         {'gait': gait, 'kind': kind, 'numbers': {name: number}, 'seed': seed, 'values': values}
-        for ((kind, name, number), gait, values), seed in product(walks, range(seeds))], 2)
+        for ((kind, name, number), gait, values), seed in product(walks, range(seeds))])
 
 
 def _groups(results: Results, seeds: int) -> Iterator[tuple[
@@ -280,9 +278,9 @@ def _groups(results: Results, seeds: int) -> Iterator[tuple[
         yield case, words, of, (str(seeds), output.percent(crossed, seeds), str(fell))
 
 
-def gaits(pool: Processes, seeds: int, phases: int) -> Table:
+def gaits(workers: Workers, seeds: int, phases: int) -> Table:
     """Every ordered pair of gaits changed while moving, at a quarter of the phases."""
-    walks = _run(pool, trials.run_changes, [
+    walks = _run(workers, trials.run_changes, [
         {'before': before, 'speed': speed, 'phases': max(1, phases // 4)}
         for before, speed in product(load_gaits(), trials.CHANGE_SPEEDS)])
     results = [(case, one) for case, of in walks for one in of]
@@ -347,9 +345,9 @@ def _top_speed(file: str) -> float:
     return top
 
 
-def robots(pool: Processes, seeds: int, phases: int) -> Table:
+def robots(workers: Workers, seeds: int, phases: int) -> Table:
     """All robots that are there, with their files alone."""
-    results = _run(pool, run_robot, [
+    results = _run(workers, run_robot, [
         {'file': file, 'phases': phases} for file in ROBOTS if _is_there(file)])
     rows = []
     for case, of in results:

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from copy import deepcopy
 from functools import cache
 from typing import Any, NamedTuple
@@ -26,6 +25,7 @@ from dmp_cpg_ros.core.scenario.fault import COMPONENTS, KINDS, PLACED, Fault, Fa
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 GAITS = ('amble', 'trot')
@@ -130,10 +130,10 @@ def trial(cell: Cell, seconds: float = FAILS_S) -> Outcome:
     return Outcome('falls' if fell else 'rests' if rests else 'stops', tuple(sorted(walk.named)))
 
 
-def study(cells: Sequence[Cell], jobs: int) -> dict[Cell, Outcome]:
+def study(cells: Sequence[Cell], workers: Workers) -> dict[Cell, Outcome]:
     """Outcome of every cell."""
-    with ProcessPoolExecutor(jobs) as pool:
-        return dict(zip(cells, pool.map(trial, cells), strict=True))
+    with workers:
+        return dict(zip(cells, workers.map(trial, cells), strict=True))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -144,7 +144,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _study(options: argparse.Namespace, _: Any) -> int:
-    outcomes = study([cell for cell in CELLS if cell[0] in options.gaits], options.jobs)
+    outcomes = study([cell for cell in CELLS if cell[0] in options.gaits],
+                     Workers(options.workers, options.cluster))
     for gait in options.gaits:
         rows = [[component, *(' '.join((of.end, *(of.named and [f"({', '.join(of.named)})"])))
                               for kind in KINDS for of in [outcomes[gait, component, kind]])]

@@ -28,12 +28,19 @@ def at_least_one(text: str) -> int:
 
 def parser_of(name: str, description: str | None, written: str, *, jobs: bool = True
               ) -> argparse.ArgumentParser:
-    """Parser with the options ``--json``, for what is written, and ``--jobs``."""
+    """Parser with the options ``--json``, for what is written, and those of
+    :class:`~dmp_cpg_ros.studies.workers.Workers`.
+    """
     parser = argparse.ArgumentParser(prog=name, description=description,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     if jobs:
-        parser.add_argument('--jobs', type=at_least_one, default=os.cpu_count() or 1, metavar='N',
+        parser.add_argument('--workers', '--jobs', type=at_least_one,
+                            default=os.cpu_count() or 1, metavar='N',
                             help='processes (default: one per processor)')
+        parser.add_argument(
+            '--cluster', default='', metavar='ADDRESS',
+            help='of the scheduler of a dask.distributed cluster, such as tcp://HOST:8786, whose '
+            "workers have this package; needs pip install 'dmp_cpg_ros[cluster]'")
     parser.add_argument('--json', type=Path, metavar='FILE', help=f'write {written}')
     return parser
 

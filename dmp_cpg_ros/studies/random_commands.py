@@ -16,7 +16,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
-from multiprocessing import Pool
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ import numpy as np
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies.walking_trials import Velocity, Walk, suite_of
+from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gaits
 
 JUMPS, CHANGES, STOPS, HOLDS = (0.5, 3.0), (2.0, 8.0), (4.0, 14.0), (0.2, 4.5)
@@ -150,11 +150,9 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the walks and print what became of them; returns 1 if one fell or a stop was late."""
-    parser = output.parser_of('random_commands', __doc__, 'every outcome', jobs=False)
+    parser = output.parser_of('random_commands', __doc__, 'every outcome')
     parser.add_argument('--runs', type=output.at_least_one, default=20, metavar='N')
     parser.add_argument('--seconds', type=float, default=60.0, help='of each walk (default: 60)')
-    parser.add_argument('--workers', type=output.at_least_one, default=2, metavar='N',
-                        help='processes, on which the outcomes do not depend (default: 2)')
     parser.add_argument('--robot', metavar='FILE', help="robot file (default: the suite's own)")
     parser.add_argument('--gaits', nargs='+', choices=sorted(load_gaits()), default=GAITS,
                         metavar='GAIT', help='gaits to change among (default: all six)')
@@ -165,10 +163,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
     walk = partial(trial, seconds=options.seconds, robot=options.robot, gaits=options.gaits)
     outcomes = []
-    with Pool(options.workers) as pool:
-        for outcome in pool.imap(walk, range(options.seed, options.seed + options.runs)):
+    with Workers(options.workers, options.cluster, progress=True) as workers:
+        for outcome in workers.map(walk, range(options.seed, options.seed + options.runs)):
             outcomes.append(outcome)
-            print(f'\r{len(outcomes)}/{options.runs} ', end='', file=sys.stderr, flush=True)
             for line in ([f'fell: {outcome.fell}'] if outcome.fell else []) + [
                     f'stop in {gait}: predicted {predicted:.3f} s, bound {bound:.3f} s, '
                     f'took {took:.3f} s' for gait, predicted, bound, took in outcome.late]:

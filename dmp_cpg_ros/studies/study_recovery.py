@@ -15,7 +15,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import Pool
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +24,7 @@ from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_recording import LoopRun
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, percent, write_results
+from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_suite
 
 OWN_ROBOT = 'robots/mini_quadruped.yaml'
@@ -73,10 +73,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
     rows, outcomes, fine = [], {}, []
-    with Pool(options.jobs) as pool:
+    with Workers(options.workers, options.cluster) as workers:
         for robot in options.robots:
             up, down = up_and_down(robot)
-            falls = pool.map(partial(recovery, robot), range(options.seeds), chunksize=1)
+            falls = list(workers.map(partial(recovery, robot), range(options.seeds)))
             rows.append(row(robot, up, down, falls))
             outcomes[robot] = falls
             fine.append(up and down and all(fall.stands for fall in falls))

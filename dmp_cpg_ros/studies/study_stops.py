@@ -30,7 +30,6 @@ from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from itertools import groupby, product
 from math import cos, isnan, pi, sin
-from multiprocessing import Pool
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +60,7 @@ from dmp_cpg_ros.studies.output import (
     percent,
     write_results,
 )
+from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import Suite, load_gait, load_suite
 
 METHODS = ('inhibition', 'freeze', 'finish_swing')
@@ -171,7 +171,8 @@ def _study(options: argparse.Namespace, _: RosArguments) -> int:
     suite = suite_of(options.file, cases[0].leg, cases[0].braking)
     for gait in options.gaits:
         load_gait(gait)
-    results = run_cases(cases, options.file, options.jobs, options.quiet, options.record)
+    results = run_cases(cases, options.file, Workers(
+        options.workers, options.cluster, not options.quiet), options.record)
     print(f'{suite.file}: {len(cases)} stops; columns with two numbers are median / worst\n')
     print(table(results, by_case=not options.random))
     if options.random:
@@ -254,25 +255,21 @@ def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     return list(run_trials(robot, cases, p, certificate.time_to_rest))
 
 
-def run_cases(cases: Sequence[StopCase], file: str | None, jobs: int, quiet: bool = True,
+def run_cases(cases: Sequence[StopCase], file: str | None, workers: Workers,
               record: Path | None = None) -> Results:
-    """Run cases on several processes; the results do not depend on how many, nor on how much of
-    them a record holds already.
+    """Run cases; the results do not depend on the workers, nor on how much of them a record holds
+    already.
     """
     outcomes: list[StopOutcome] = []
     if record is not None and record.exists():
         outcomes = [StopOutcome(**json.loads(line)) for line in record.read_text().splitlines()]
     walks = [list(group) for _, group in groupby(
         cases[len(outcomes):], lambda case: (*_key(case), case.friction, case.payload))]
-    with Pool(jobs) as pool, open(record or os.devnull, 'a', encoding='utf-8') as kept:
-        for of_walk in pool.imap(partial(run_walk, file=file), walks):
+    with workers, open(record or os.devnull, 'a', encoding='utf-8') as kept:
+        for of_walk in workers.map(partial(run_walk, file=file), walks):
             outcomes += of_walk
             print(*(json.dumps(vars(outcome)) for outcome in of_walk), sep='\n', file=kept,
                   flush=True)
-            if not quiet:
-                print(f'\r{len(outcomes)}/{len(cases)}', end='', file=sys.stderr, flush=True)
-    if not quiet:
-        print('\r', end='', file=sys.stderr)
     return list(zip(cases, outcomes[:len(cases)], strict=True))
 
 

@@ -20,6 +20,7 @@ RECORDS = {'rosbags', 'mcap', 'lz4', 'zstandard', 'pyarrow'}
 FIGURES = {'matplotlib'}
 FILMS = {'PIL', 'imageio_ffmpeg'}
 EVERYTHING = {'numpy', 'scipy', 'yaml', 'mujoco', *ROS, *RECORDS, *FIGURES, *FILMS}
+CLUSTER = {'distributed'}
 
 # layer: (own layers below it, packages of others); the standard library is everyone's.
 LAYERS = {
@@ -38,7 +39,8 @@ LAYERS = {
     'commands': ({'core', 'configuration', 'layouts', 'suite_table', 'suite',
                   'primitive_files', 'robot', 'nodes', 'analysis'}, EVERYTHING),
     'studies': ({'core', 'paper', 'configuration', 'layouts', 'suite_table', 'suite',
-                 'primitive_files', 'robot', 'nodes', 'analysis', 'commands'}, EVERYTHING),
+                 'primitive_files', 'robot', 'nodes', 'analysis', 'commands'},
+                EVERYTHING | CLUSTER),
     '__main__': ({'suite_table'}, set()),
     'models': (set(), set()),
     '': (set(), set()),  # the package itself: its version

