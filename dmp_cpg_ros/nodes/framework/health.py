@@ -13,11 +13,10 @@ from __future__ import annotations
 import math
 import time
 import zlib
-from array import array
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -134,6 +133,39 @@ def _level(error: bool) -> bytes:
     return bytes(DiagnosticStatus.ERROR if error else DiagnosticStatus.WARN)
 
 
+BINS = 100.0
+"""Bins of durations per factor of ten: each is 2.3 % wide."""
+
+
+class Durations(Counter[int]):
+    """How many durations fell into which bin; a difference of two is what came in between.
+
+    Neither its memory nor the time that it takes to report grows with the length of a run.
+    """
+
+    def note(self, seconds: float) -> None:
+        """Count a duration [s]; none is shorter than 1 µs."""
+        self[round(BINS * math.log10(max(seconds, 1e-6)))] += 1
+
+    def percentile(self, percent: float) -> float:
+        """Duration that so many are not above [s]; NaN without any."""
+        wanted, seen = 1e-2 * percent * self.total(), 0
+        for bin_ in sorted(self):
+            seen += self[bin_]
+            if seen >= wanted:
+                return math.pow(10.0, bin_ / BINS)
+        return math.nan
+
+    def __str__(self) -> str:
+        return ' '.join(f'{bin_}:{count}' for bin_, count in sorted(self.items()))
+
+    @classmethod
+    def parse(cls, text: str) -> Durations:
+        """Read what ``str`` has written."""
+        pairs = (word.split(':') for word in text.split())
+        return cls({int(bin_): int(count) for bin_, count in pairs})
+
+
 class RobotTiming:
     """Measures on the machine's monotonic clock; nothing of it enters the gait.
 
@@ -141,18 +173,22 @@ class RobotTiming:
     ----------
     ticks, misses, waits : int
         Ticks; those at which targets were missing; periods that the simulation let pass.
+    latency, period : Durations
+        From a state to the last of its targets; between states.
     """
 
     def __init__(self) -> None:
         """Start without any tick."""
         self._published: dict[int, list[float]] = {}
-        self._latency = array('d')
+        self.latency, self.period = Durations(), Durations()
         self._first = self._last = (math.nan, 0)
         self.ticks = self.misses = self.waits = 0
 
     def published(self, stamp_ns: int) -> None:
         """Note that the state of a tick has been published."""
         now = time.monotonic()
+        if self.ticks:
+            self.period.note(now - self._last[0])
         self._last = (now, stamp_ns)
         self._first = self._first if self.ticks else self._last
         self.ticks += 1
@@ -167,7 +203,7 @@ class RobotTiming:
             return
         entry[1] += 1.0
         if entry[1] == len(LEGS):
-            self._latency.append(1e3 * (time.monotonic() - entry[0]))
+            self.latency.note(time.monotonic() - entry[0])
 
     def deadline(self, stamp_ns: int) -> None:
         """Note that the tick after ``stamp_ns`` begins: its targets should have arrived."""
@@ -175,16 +211,17 @@ class RobotTiming:
         if entry is not None and entry[1] < len(LEGS):
             self.misses += 1
 
-    def values(self) -> dict[str, float | int]:
+    def values(self) -> dict[str, float | int | str]:
         """Rate [Hz], real-time factor, latency [ms] and misses since the start; NaN without
-        ticks.
+        ticks. ``latencies`` and ``periods`` are what :class:`Durations` writes.
         """
         wall = self._last[0] - self._first[0] or math.nan
         robot = (self._last[1] - self._first[1]) * 1e-9
-        half, most = np.percentile(self._latency or [math.nan], (50, 99)).tolist()
         return {'deadline_misses': self.misses, 'waits': self.waits, 'timed_ticks': self.ticks,
                 'rate_hz': (self.ticks - 1) / wall, 'real_time_factor': robot / wall,
-                'latency_ms_p50': half, 'latency_ms_p99': most}
+                'latency_ms_p50': 1e3 * self.latency.percentile(50.0),
+                'latency_ms_p99': 1e3 * self.latency.percentile(99.0),
+                'latencies': str(self.latency), 'periods': str(self.period)}
 
 
 ASK_AGAIN_S = 0.25, 2.0
