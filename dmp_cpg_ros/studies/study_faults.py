@@ -16,10 +16,8 @@ import os
 import random
 import re
 import signal
-import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
@@ -35,15 +33,13 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.walk_process import WalkProcess
 from dmp_cpg_ros.suite import load_gaits
 from dmp_cpg_ros.suite_table import ROBOT, WALKING_NODES
 
 WALKS = (('amble', 0.5), ('trot', 1.0))
 
 READY, FOLLOWS = 'all nodes are ready again', 'the robot follows its legs again'
-
-WITHIN_S = 120.0
-"""How long the suite may take to be ready, at first and again, before a walk is given up [s]."""
 
 FALLEN_TILT, LOW = 0.9, 0.7
 """Tilt of a robot that has fallen [rad]; share of its height at the start below which it lies."""
@@ -109,42 +105,6 @@ class Outcome:
     kills: list[Kill] = field(default_factory=list)
 
 
-class _Walking:
-    """A ``walk`` in a process of its own, with what it says."""
-
-    def __init__(self, command: Sequence[str]) -> None:
-        self.lines: list[str] = []
-        self.process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env={**os.environ, 'PYTHONUNBUFFERED': '1'})
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _read(self) -> None:
-        assert self.process.stdout is not None
-        self.lines.extend(self.process.stdout)
-
-    def said(self, pattern: str, begin: int = 0) -> float:
-        """Wait for a line that ends like that; its time [s], infinite when it does not come."""
-        deadline = time.monotonic() + WITHIN_S
-        while time.monotonic() < deadline and self.process.poll() is None:
-            for line in self.lines[begin:]:
-                if found := re.search(rf'^ *([\d.]+) s .*{pattern}', line):
-                    return float(found[1])
-            time.sleep(0.05)
-        return inf
-
-    def pid_of(self, node: str) -> int:
-        """Process of a node."""
-        for path in Path('/proc').glob('[0-9]*/cmdline'):
-            try:
-                words = path.read_text().split('\0')
-            except OSError:
-                continue
-            if str(self.process.pid) in words and f'__node:={node}' in words:
-                return int(path.parent.name)
-        return 0
-
-
 def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence[str],
         rng: random.Random, folder: Path) -> Outcome:
     """Walk, and kill some nodes one after the other."""
@@ -152,14 +112,13 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
     scenario.write_text(json.dumps({
         'name': 'kills', 'duration': 3600.0, 'parameters': {'gait': gait},
         'events': [{'at': 0.5, 'command': {'v_x': speed}}]}))
-    walk = _Walking([sys.executable, '-m', 'dmp_cpg_ros', 'walk', str(scenario), '--no-report',
-                     '--out', str(folder / 'run'), *['--lock-step'] * lock_step,
-                     *['--respawn'] * respawn])
+    walk = WalkProcess([str(scenario), '--no-report', '--out', str(folder / 'run'),
+                        *['--lock-step'] * lock_step, *['--respawn'] * respawn])
     outcome = Outcome(gait, lock_step, respawn)
     going = walk.said('walking') < inf
     for node in nodes if going else ():
         time.sleep(rng.uniform(2.0, 8.0))
-        begin, pid = len(walk.lines), walk.pid_of(node)
+        begin, pid = len(walk.lines), walk.pid_of([node])
         if not pid:
             break
         kill = Kill(node)

@@ -1,0 +1,84 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A ``walk`` in a process of its own, for studies that do something to it or measure it."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from math import inf
+from pathlib import Path
+
+WITHIN_S = 120.0
+"""How long the suite may take to be ready, at first and again, before a walk is given up [s]."""
+
+
+class WalkProcess:
+    """A running ``walk`` with what it says.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Of ``walk``.
+
+    Attributes
+    ----------
+    lines, times : list
+        What it has said, and when on the monotonic clock [s].
+    """
+
+    def __init__(self, arguments: Sequence[str]) -> None:
+        """Start it."""
+        self.lines: list[str] = []
+        self.times: list[float] = []
+        self.process = subprocess.Popen(
+            [sys.executable, '-m', 'dmp_cpg_ros', 'walk', *arguments],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            env={**os.environ, 'PYTHONUNBUFFERED': '1'})
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.times.append(time.monotonic())
+            self.lines.append(line)
+
+    def said(self, pattern: str, begin: int = 0) -> float:
+        """Wait for a line that ends like that; its time [s], infinite when it does not come."""
+        deadline = time.monotonic() + WITHIN_S
+        while time.monotonic() < deadline and self.process.poll() is None:
+            for line in self.lines[begin:]:
+                if found := re.search(rf'^ *([\d.]+) s .*{pattern}', line):
+                    return float(found[1])
+            time.sleep(0.05)
+        return inf
+
+    def pid_of(self, nodes: Sequence[str]) -> int:
+        """Process of some nodes; 0 when there is none."""
+        wanted = {f'__node:={nodes[0]}'} if len(nodes) == 1 else set(nodes)
+        for path in Path('/proc').glob('[0-9]*/cmdline'):
+            try:
+                words = path.read_text().split('\0')
+            except OSError:
+                continue
+            if str(self.process.pid) in words and wanted.issubset(words):
+                return int(path.parent.name)
+        return 0
+
+    def end(self) -> int:
+        """Interrupt it, skip its report, and wait; returns the exit status."""
+        waiting = True
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        while self.process.poll() is None:
+            if waiting and any('a second Ctrl-C skips' in line for line in self.lines):
+                waiting = False
+                self.process.send_signal(signal.SIGINT)
+            time.sleep(0.05)
+        return self.process.returncode
