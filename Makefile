@@ -70,7 +70,7 @@ BENCHMARK_ARGS ?=
 FIGURE_ARGS ?=
 PAGE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures paper-page bench doc lint install clean
+.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures paper-page bench bench-ros doc lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -122,8 +122,11 @@ paper-figures: $(INSTALLED) ## draw the figures of the paper into build/paper_fi
 paper-page: $(INSTALLED) ## the paper to touch, build/paper/index.html; needs npm (PAGE_ARGS='--numpy WHEEL')
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.paper_page --out build/paper $(PAGE_ARGS)
 
-bench: $(INSTALLED) ## measure the cost of the core and of the nodes (BENCH_ARGS=...)
+bench: $(INSTALLED) ## measure the cost of the core and of its messages (BENCH_ARGS=...)
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.bench $(BENCH_ARGS)
+
+bench-ros: $(INSTALLED) ## measure the running suite beside bare relays, 5 min (BENCH_ARGS='--rows latency cpu')
+	$(ACTIVATED) python -m dmp_cpg_ros.studies.bench_ros $(BENCH_ARGS)
 
 doc: $(INSTALLED) $(VENV)/.documentation ## make the documentation as a site: build/site/index.html
 	$(ACTIVATED) NO_MKDOCS_2_WARNING=1 mkdocs --quiet build --strict

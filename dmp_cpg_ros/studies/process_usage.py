@@ -1,0 +1,52 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What processes use, as Linux counts it for each of their threads."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+
+class Usage(NamedTuple):
+    """Of one process: time on a core and time waiting for one [s]; changes of context: how often
+    it slept and was woken, and was preempted; memory with its share of what processes have
+    together [MB]; time on a core by the name of the thread [s].
+    """
+
+    cpu_s: float
+    waited_s: float
+    wakeups: int
+    preempted: int
+    memory_mb: float
+    threads: Mapping[str, float]
+
+
+def usage(pid: int) -> Usage:
+    """Read all counts of a process."""
+    root, threads = Path(f'/proc/{pid}'), Counter[str]()
+    waited, changes = 0, Counter[str]()
+    for task in (root / 'task').iterdir():
+        with suppress(OSError):  # a thread may have ended
+            ran, waits, _ = map(int, (task / 'schedstat').read_text().split())
+            for kind, count in re.findall(r'(\w+)_ctxt_switches:\s*(\d+)',
+                                          (task / 'status').read_text()):
+                changes[kind] += int(count)
+            name = (task / 'comm').read_text().strip()
+            threads[re.sub(r'[\d.]+$', '', name) if task.name != root.name else 'main'] += ran
+            waited += waits
+    share = re.search(r'^Pss:\s*(\d+)', (root / 'smaps_rollup').read_text(), re.MULTILINE)
+    return Usage(1e-9 * threads.total(), 1e-9 * waited, changes['voluntary'],
+                 changes['nonvoluntary'], int(share[1]) / 1024 if share else 0.0,
+                 {name: 1e-9 * ran for name, ran in threads.items()})
+
+
+def between(first: Usage, last: Usage) -> Usage:
+    """What was used from one reading to another; memory is what there was at the end."""
+    return Usage(last.cpu_s - first.cpu_s, last.waited_s - first.waited_s,
+                 last.wakeups - first.wakeups, last.preempted - first.preempted, last.memory_mb,
+                 {name: ran - first.threads.get(name, 0.0) for name, ran in last.threads.items()})
