@@ -17,9 +17,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from datetime import datetime, timezone
-from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Barrier
@@ -28,18 +26,12 @@ from typing import Any, NamedTuple
 from dmp_cpg_ros.analysis.bag import find_bag, opened, recorded
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands.ros_arguments import run_command
+from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies import long_recordings, relays
+from dmp_cpg_ros.studies import bench_runs, long_recordings, relays
 from dmp_cpg_ros.studies.bench import parts_of_a_tick, seconds_of
-from dmp_cpg_ros.studies.bench_runs import (
-    Run,
-    competitor,
-    run_relays,
-    run_suite,
-    shared,
-    write_samples,
-)
+from dmp_cpg_ros.studies.bench_runs import Run, shared
 from dmp_cpg_ros.studies.loop_recording import LoopRun
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of
 from dmp_cpg_ros.suite import load_suite
@@ -101,17 +93,17 @@ class Bench:
         """A run of the suite, and one of the relays that send its messages right after it."""
         key = (way, lock_step, busy)
         if key not in self._runs:
-            timed = not lock_step and way == 'each' and self._options.minutes is not None
+            timed = self._options.minutes and not lock_step and way == self.ways[0]
             seconds = 60.0 * self._options.minutes if timed else self._options.seconds
             folder = self._folder / self._name(*key)
-            with competitor(busy):
+            with bench_runs.competitor(busy):
                 _say(f'{SHARING[way]}, {"lock-step" if lock_step else "real time"}'
                      f'{", with a competitor" * busy}: the suite')
-                suite = run_suite(way, folder, seconds, lock_step)
-                known = write_samples(folder / 'run', folder / 'samples.json')
+                suite = bench_runs.run_suite(way, folder, seconds, lock_step)
+                known = bench_runs.write_samples(folder / 'run', folder / 'samples.json')
                 self.known = self.known if lock_step else known
                 _say('    its relays')
-                floor = run_relays(shared(way), folder / 'samples.json', seconds,
+                floor = bench_runs.run_relays(shared(way), folder / 'samples.json', seconds,
                                    *['--lock-step'] * lock_step)
             self._runs[key] = suite, floor
         return self._runs[key]
@@ -130,10 +122,10 @@ class Bench:
         """How processes are shared, as was asked for."""
         return [way for way in SHARING if way in self._options.ways]
 
-    @cached_property
+    @property
     def mujoco_s(self) -> float:
-        """Time of ``mj_step`` over one tick [s]."""
-        return seconds_of(relays.physics(TICK_NS))
+        """Time of ``mj_step`` over one tick, measured now [s]."""
+        return seconds_of(relays.physics(TICK_NS), repetitions=20)
 
     def latency(self) -> Iterator[Figure]:
         """From the robot's state to the last of its targets, in real time."""
@@ -208,8 +200,9 @@ class Bench:
 
     def parts(self) -> Iterator[Figure]:
         """One tick of each part of the plain loop, alone."""
+        floor_us = 1e6 * self.mujoco_s
         for part in parts_of_a_tick():
-            yield Figure(part.what, 'us', 1e6 * part.seconds, 1e6 * self.mujoco_s, MUJOCO)
+            yield Figure(part.what, 'us', 1e6 * part.seconds, floor_us, MUJOCO)
 
     def memory(self) -> Iterator[Figure]:
         """Memory by process, what is shared counted once, and its growth."""
@@ -224,14 +217,15 @@ class Bench:
         folder, seconds = self._folder / 'recorder', self._options.seconds
         folder.mkdir()
         samples = folder / 'samples.json'
-        write_samples(self._recorded(), samples)
+        bench_runs.write_samples(self._recorded(), samples)
         source = {relays.SOURCE: [relays.SOURCE]}
         for times in RECORDED_RATES:
             _say(f'recorder at {times} times the rate')
             bag = folder / f'bag_{times}'
             flags = ('--rate', str(RATE_HZ * times), '--seconds', str(seconds))
-            bare = run_relays({**source, RECORDER: [RECORDER]}, samples, seconds, *flags)
-            run = run_relays(source, samples, seconds, *flags, recorder=[
+            bare = bench_runs.run_relays(
+                {**source, RECORDER: [RECORDER]}, samples, seconds, *flags)
+            run = bench_runs.run_relays(source, samples, seconds, *flags, recorder=[
                 RECORDER, '--ros-args', '-p', f'output:={bag}',
                 *(word for rule in namespace_rules('/relays')
                   for word in ('-r', ':='.join(rule)))])
@@ -267,7 +261,7 @@ class Bench:
             _say(f'{count} robots')
             together = Barrier(count, timeout=300.0)
             with ThreadPoolExecutor(count) as pool:
-                runs = list(pool.map(lambda k, meet=together.wait, of=count: run_suite(
+                runs = list(pool.map(lambda k, meet=together.wait, of=count: bench_runs.run_suite(
                     'composed', self._folder / f'robots_{of}' / str(k), self._options.seconds,
                     namespace=f'robot{k}', meet=meet), range(count)))
             one = one or runs
@@ -310,7 +304,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help=f'how processes are shared: {", ".join(SHARING)} (default: all)')
     add('--seconds', type=float, default=10.0, help='length of every window (default: 10)')
     add('--minutes', type=float, metavar='M',
-        help='length of those in real time in ten processes, idle and busy')
+        help='length of those in real time in the first way, idle and busy')
     add('--bags', type=at_least_one, nargs='+', default=[10, 60], metavar='M',
         help='lengths of the recordings of row analyze [min] (default: 10 60)')
     add('--update-doc', type=Path, metavar='FILE',
@@ -320,26 +314,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _bench(options: argparse.Namespace, _: Any) -> int:
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    begin, rows, about, status = (
-        time.monotonic(), list[tuple[str, Figure]](), machine(), 0)
+    rows, about, status = list[tuple[str, Figure]](), machine(), 0
     with TemporaryDirectory() as folder:
         bench = Bench(options, Path(folder))
         try:
             for name in options.rows:
                 _say(name)
-                for found in getattr(bench, name)():
-                    rows.append((name, found))
-                    write_json(options.json, {
-                        'machine': about, 'seconds': options.seconds, 'minutes': options.minutes,
-                        'rows': [{'row': row, **of._asdict(), 'ratio': of.ratio}
-                                 for row, of in rows]})
+                try:
+                    for found in getattr(bench, name)():
+                        rows.append((name, found))
+                except DmpCpgError as error:
+                    _say(f'no {name}: {error}')
+                    status = 1
+                finally:
+                    write_json(options.json, {'machine': about, 'options': vars(options), 'rows': [
+                        {'row': row, **of._asdict(), 'ratio': of.ratio} for row, of in rows]})
         except KeyboardInterrupt:
             status = 130
-    text = table(rows)
-    print(f'\n{about}\n\n{text}\n\n{len(rows)} figures in {time.monotonic() - begin:.0f} s, '
-          f'written to {options.json}')
+    text = f'{about}\n\n{table(rows)}'
+    print(f'\n{text}\n\n{len(rows)} figures, also in {options.json}')
     if options.update_doc and rows:
-        update(options.update_doc, f'{about}\n\n{text}')
+        update(options.update_doc, text)
     return status
 
 
@@ -351,21 +346,19 @@ def table(rows: Sequence[tuple[str, Figure]]) -> str:
 
 
 def update(document: Path, text: str) -> None:
-    """Write a text between the marks of a document; raises ValueError where there are none."""
+    """Write a text between the marks of a document; raises DataError where there are none."""
     before, begin, rest = document.read_text(encoding='utf-8').partition(BEGIN)
     _, end, after = rest.partition(END)
     if not end:
-        raise ValueError(f"'{document}' has no lines {BEGIN} and {END}")
+        raise DataError(f"'{document}' has no lines {BEGIN} and {END}")
     document.write_text(f'{before}{begin}\n{text}\n{end}{after}', encoding='utf-8')
 
 
 def machine() -> str:
     """What was measured on, and how busy it was before."""
-    found = None
-    with suppress(OSError):
-        found = re.search(r'model name\s*: (.*)', Path('/proc/cpuinfo').read_text())
-    return (f'{datetime.now(timezone.utc):%Y-%m-%d}, {os.cpu_count()} processors '
-            f'({found[1] if found else platform.machine()}), Linux {platform.release()}, Python '
+    found = re.search(r'model name\s*: (.*)', Path('/proc/cpuinfo').read_text())
+    return (f'{datetime.now(timezone.utc):%Y-%m-%d}, {os.cpu_count()} processors'
+            f'{f" ({found[1]})" if found else ""}, {platform.platform(terse=True)}, Python '
             f'{platform.python_version()}, load before the run {os.getloadavg()[0]:.1f}')
 
 

@@ -29,15 +29,16 @@ class Usage(NamedTuple):
 def usage(pid: int) -> Usage:
     """Read all counts of a process."""
     root, threads = Path(f'/proc/{pid}'), Counter[str]()
-    waited, changes = 0, Counter[str]()
+    waited, changes, own = 0, Counter[str](), (root / 'comm').read_text().strip()
     for task in (root / 'task').iterdir():
         with suppress(OSError):  # a thread may have ended
             ran, waits, _ = map(int, (task / 'schedstat').read_text().split())
             for kind, count in re.findall(r'(\w+)_ctxt_switches:\s*(\d+)',
                                           (task / 'status').read_text()):
                 changes[kind] += int(count)
-            name = (task / 'comm').read_text().strip()
-            threads[re.sub(r'[\d.]+$', '', name) if task.name != root.name else 'main'] += ran
+            name = re.sub(r'[\d.]+$', '', (task / 'comm').read_text().strip())
+            threads['main' if task.name == root.name else
+                    'other' if name == own else name] += ran
             waited += waits
     share = re.search(r'^Pss:\s*(\d+)', (root / 'smaps_rollup').read_text(), re.MULTILINE)
     return Usage(1e-9 * threads.total(), 1e-9 * waited, changes['voluntary'],

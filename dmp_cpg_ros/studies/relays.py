@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import rclpy
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
@@ -47,6 +48,8 @@ SOURCE = 'source'
 
 SECOND, LOOK_S = 1_000_000_000, 0.02
 """One second [ns]; how often relays look whether they are connected [s]."""
+
+STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 
 KIND_OF = {name: kind.name for kind, name, _ in instances()}
 
@@ -129,13 +132,16 @@ class Relay(Node):
                 self._outputs += [(publisher.publish, bytearray(data), round(1.0 / per_tick))] * (
                     writers(topic) if kind == SOURCE else 1)
             if kind != SOURCE and reads(kind, topic):
+                waits = per_tick > 0.9 and kind != RECORDER
                 subscription = self.create_subscription(
-                    topic.type, topic.name.strip('/'), partial(self._take, topic.name),
+                    topic.type, topic.name.strip('/'),
+                    partial(self._match, topic.name) if waits else self._take,
                     topic.recorder_qos if kind == RECORDER else topic.reader_qos, raw=True)
-                self._expect(subscription.get_publisher_count, 1)
-                if per_tick > 0.9 and kind != RECORDER:
-                    self._wanted += writers(topic)
-                    self._waiting[0] += topic.name in DELAYED  # nothing comes before the first
+                self._expect(subscription.get_publisher_count,
+                             writers(topic) if waits else 1)
+                self._wanted += writers(topic) * waits
+                # nothing comes before the first tick
+                self._waiting[0] += waits and topic.name in DELAYED
 
     def _expect(self, count: Callable[[], int], least: int) -> None:
         self._ends.append(lambda: count() >= least)
@@ -147,16 +153,18 @@ class Relay(Node):
     def begin(self) -> None:
         """Go on without a first message; only the robot does."""
 
-    def _take(self, topic: str, data: bytes) -> None:
+    def _take(self, data: bytes) -> None:
         self.taken += 1
-        if self._wanted:
-            seconds, rest = STAMP.unpack_from(data, STAMP_AT)
-            stamp_ns = seconds * SECOND + rest + (self.tick_ns if topic in DELAYED else 0)
-            self._waiting[stamp_ns] += 1
-            self.arrived(stamp_ns)
-            if self._waiting[stamp_ns] == self._wanted:
-                del self._waiting[stamp_ns]
-                self.fire(stamp_ns)
+
+    def _match(self, topic: str, data: bytes) -> None:
+        self.taken += 1
+        seconds, rest = STAMP.unpack_from(data, STAMP_AT)
+        stamp_ns = seconds * SECOND + rest + (self.tick_ns if topic in DELAYED else 0)
+        self._waiting[stamp_ns] += 1
+        self.arrived(stamp_ns)
+        if self._waiting[stamp_ns] == self._wanted:
+            del self._waiting[stamp_ns]
+            self.fire(stamp_ns)
 
     def arrived(self, stamp_ns: int) -> None:
         """Note one message of a tick; only the robot does."""
@@ -179,7 +187,7 @@ class RobotRelay(Relay):
         self._publish()
         if not self.lock_step:
             self._begun = time.monotonic_ns()
-            self.create_timer(self.tick_ns * 1e-9, self._on_timer)
+            self.create_timer(self.tick_ns * 1e-9, self._on_timer, clock=STEADY)
 
     def arrived(self, stamp_ns: int) -> None:
         """Note the targets of a leg."""
@@ -216,7 +224,7 @@ class SourceRelay(Relay):
     def begin(self) -> None:
         """Start with time 0."""
         self._next, self._begun = 0, time.monotonic_ns()
-        self.create_timer(1e-3, self._on_timer)
+        self.create_timer(1e-3, self._on_timer, clock=STEADY)
 
     def _on_timer(self) -> None:
         now = time.monotonic_ns()
@@ -281,7 +289,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for node in nodes:
                 node.begin()
 
-    timer: Any = nodes[0].create_timer(LOOK_S, look)
+    timer: Any = nodes[0].create_timer(LOOK_S, look, clock=STEADY)
     threading.Thread(target=listen, daemon=True).start()
     execution.schedule(BATCH)
     execution.spin(nodes, 'events', until)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 import ros_processes
 
 pytest.importorskip('mujoco')
+from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.framework.health import BINS, Durations, RobotTiming
 from dmp_cpg_ros.nodes.messages import interfaces
 from dmp_cpg_ros.studies import bench_ros, relays
@@ -38,7 +40,7 @@ def test_every_row_is_documented_and_the_table_has_its_place(tmp_path: Path) -> 
     assert copy.read_text(encoding='utf-8') == (
         f'{before}{bench_ros.BEGIN}\nnewer\n{bench_ros.END}{after}')
     copy.write_text('nothing', encoding='utf-8')
-    with pytest.raises(ValueError, match='has no lines'):
+    with pytest.raises(DataError, match='has no lines'):
         bench_ros.update(copy, 'new')
 
 
@@ -54,6 +56,23 @@ def test_it_measures_the_suite_beside_relays(
         assert row['what'] in printed and row['floor_is'] in ('relays', 'relays connected')
         if row['what'] != 'growth of all' and 'preempted' not in row['what']:
             assert row['measured'] > 0.0 and row['floor'] > 0.0 and row['ratio'] > 0.0, row
+
+
+def test_what_was_measured_stays_when_a_row_fails_or_is_interrupted(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def measured(error: BaseException) -> Callable[[object], Iterator[bench_ros.Figure]]:
+        def row(self: object) -> Iterator[bench_ros.Figure]:
+            yield bench_ros.Figure('one', 's', 2.0, 0.0 if isinstance(error, DataError) else 4.0)
+            raise error
+
+        return row
+
+    monkeypatch.setattr(bench_ros.Bench, 'latency', measured(DataError('it fell')))
+    monkeypatch.setattr(bench_ros.Bench, 'cpu', measured(KeyboardInterrupt()))
+    file = tmp_path / 'bench.json'
+    assert bench_ros.main(['--rows', 'latency', 'cpu', 'memory', '--json', str(file)]) == 130
+    rows = json.loads(file.read_text(encoding='utf-8'))['rows']
+    assert [(row['row'], row['ratio']) for row in rows] == [('latency', None), ('cpu', 0.5)]
 
 
 def test_durations_are_counted_in_narrow_bins() -> None:
