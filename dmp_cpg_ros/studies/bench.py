@@ -41,7 +41,7 @@ from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_recording import LoopRun
 from dmp_cpg_ros.studies.output import parser_of, write_results
 from dmp_cpg_ros.studies.tightness import network
-from dmp_cpg_ros.suite import load_suite
+from dmp_cpg_ros.suite import Suite, load_suite
 
 TICK, OMEGA, GAIN = 0.004, 9.0, 100.0
 """Tick [s], angular frequency [rad/s] and sum of the gains at each node [1/s] of the networks."""
@@ -112,12 +112,8 @@ def steps_of_many(sizes: Sequence[int]) -> list[Row]:
 
 def parts_of_a_tick() -> list[Row]:
     """Parts of the plain loop on the walking robot, and the prediction of a stop."""
-    suite = load_suite(overrides={'cmd_vel_timeout': 0.0})
-    robot = MujocoRobot(suite.robot_file, suite.tick_ns)
-    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
-    loop.command(0.5)
-    run = LoopRun(robot, loop)
-    run.tick(500 * run.tick_s)
+    suite, run = _walking()
+    loop, robot = run.loop, run.robot
     state, x, r, dt, zero = run.state, loop.x, loop.r, run.tick_s, np.zeros(3)
     x_dot = loop.network.rate(x, r, loop.inhibition)
     stopping = loop.supervisor.request(loop.stop, True)
@@ -145,6 +141,23 @@ def parts_of_a_tick() -> list[Row]:
             loop.supervisor, loop.reference, loop.canonical, stopping, loop.inhibition, loop.canon,
             r, command, dt).time_s),
     ])
+
+
+def ticks_per_second() -> float:
+    """Ticks of the plain loop with its robot in a second of wall time, while it walks."""
+    run = _walking()[1]
+    return 1.0 / seconds_of(lambda: run.tick(run.tick_s), least=0.2)
+
+
+def _walking() -> tuple[Suite, LoopRun[WalkingLoop]]:
+    """The plain loop, 2 s after it was told to walk, and its parameters."""
+    suite = load_suite(overrides={'cmd_vel_timeout': 0.0})
+    robot = MujocoRobot(suite.robot_file, suite.tick_ns)
+    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
+    loop.command(0.5)
+    run = LoopRun(robot, loop)
+    run.tick(500 * run.tick_s)
+    return suite, run
 
 
 def messages() -> list[Row]:

@@ -27,14 +27,10 @@ from dmp_cpg_ros.analysis.bag import find_bag, opened, recorded
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands.ros_arguments import run_command
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
-from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import bench_runs, long_recordings, relays
-from dmp_cpg_ros.studies.bench import parts_of_a_tick, seconds_of
+from dmp_cpg_ros.studies.bench import parts_of_a_tick, seconds_of, ticks_per_second
 from dmp_cpg_ros.studies.bench_runs import Run, shared
-from dmp_cpg_ros.studies.loop_recording import LoopRun
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of
-from dmp_cpg_ros.suite import load_suite
 from dmp_cpg_ros.suite_table import RECORDER, namespace_rules
 
 SHARING = {'each': 'ten processes', 'blocks': 'blocks', 'composed': 'composed'}
@@ -140,13 +136,7 @@ class Bench:
             suite, floor = self.runs(way, lock_step=True)
             yield Figure(SHARING[way], '1/s', suite.rate_hz, floor.rate_hz)
             yield Figure(SHARING[way], '1/s', suite.rate_hz, 1.0 / self.mujoco_s, MUJOCO)
-        suite_file = load_suite(overrides={'cmd_vel_timeout': 0.0})
-        robot = MujocoRobot(suite_file.robot_file, TICK_NS)
-        loop = WalkingLoop(robot.description, suite_file.gait, suite_file.parameters)
-        loop.command(0.5)
-        plain = LoopRun(robot, loop)
-        plain.tick(1.0)
-        rate_hz = 1.0 / seconds_of(lambda: plain.tick(plain.tick_s), least=0.2)
+        rate_hz = ticks_per_second()
         yield Figure('without ROS', '1/s', rate_hz, 1.0 / self.mujoco_s, MUJOCO)
         yield Figure('without ROS', '1/s', rate_hz, RATE_HZ, 'real time')
 
