@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Vectors, rotations and matrix exponentials."""
 
+from math import inf
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,5 +16,9 @@ Array = NDArray[np.float64]
 def check_positive(**values: float | Array) -> None:
     """Raise ParameterError for a number, or one in an array, that is not positive and finite."""
     for name, value in values.items():
-        if not (np.all(np.isfinite(value)) and np.all(np.greater(value, 0.0))):
+        if isinstance(value, float):
+            holds = 0.0 < value < inf
+        else:
+            holds = bool(np.all(np.isfinite(value)) and np.all(np.greater(value, 0.0)))
+        if not holds:
             raise ParameterError(f'{name} = {value!r} must be a positive finite number')
