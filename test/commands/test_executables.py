@@ -62,9 +62,7 @@ def test_a_bad_parameter_is_named_with_what_is_valid(processes: Processes, name:
     }
     parameter, value, valid = bad[name]
     text = '.nan' if isinstance(value, float) and math.isnan(value) else str(value)
-    process = processes.python(
-        '-m', 'dmp_cpg_ros', name, '--ros-args', '-p', f'{parameter}:={text}'
-    )
+    process = processes.executable(name, '--ros-args', '-p', f'{parameter}:={text}')
     assert process.wait() == 2, str(process)
     assert valid in process.output, process
     assert 'Traceback' not in process.output

@@ -94,8 +94,8 @@ def start(processes: Processes, node: Any, folder: Path) -> NodeProcess:
             path.write_text(yaml.dump(content), encoding='utf-8')
             given = path
         words += ['--params-file', str(given)]
-    return processes.python('-m', 'dmp_cpg_ros', node.executable, *getattr(node, 'arguments', ()),
-                            '--ros-args', *words)
+    return processes.executable(node.executable, *getattr(node, 'arguments', ()), '--ros-args',
+                                *words)
 
 
 def test_launched_nodes_are_those_of_the_table(launch_file: ModuleType) -> None:

@@ -49,7 +49,7 @@ def scenario(folder: Path, duration_s: float) -> str:
 
 
 def walk(processes: Processes, *arguments: str) -> NodeProcess:
-    return processes.python('-m', 'dmp_cpg_ros', 'walk', *arguments)
+    return processes.executable('walk', *arguments)
 
 
 def children(parent: int) -> list[int]:
@@ -266,8 +266,8 @@ NEEDED = {'analyze': ['bag'], 'learn': ['bag', '--out', 'x'], 'inspect_robot': [
 @pytest.mark.parametrize('name', COMMANDS)
 def test_commands_without_parameters_refuse_them_and_say_what_is_valid(
         processes: Processes, name: str) -> None:
-    process = processes.python('-m', 'dmp_cpg_ros', name, *NEEDED.get(name, []), '--ros-args',
-                               '-r', '__node:=x', '-p', 'gait:=trot')
+    process = processes.executable(name, *NEEDED.get(name, []), '--ros-args', '-r', '__node:=x',
+                                   '-p', 'gait:=trot')
     assert process.wait() == 2
     assert "no parameter 'gait'" in process.output and '__ns' in process.output
 
@@ -275,8 +275,8 @@ def test_commands_without_parameters_refuse_them_and_say_what_is_valid(
 @pytest.mark.parametrize('name', ['analyze', 'inspect_robot'])
 def test_commands_take_what_launch_adds(
         processes: Processes, tmp_path: Path, name: str) -> None:
-    process = processes.python('-m', 'dmp_cpg_ros', name, str(tmp_path / 'nosuch'), '--ros-args',
-                               '-r', '__node:=x', '-r', '__ns:=/a', '--log-level', 'info')
+    process = processes.executable(name, str(tmp_path / 'nosuch'), '--ros-args', '-r',
+                                   '__node:=x', '-r', '__ns:=/a', '--log-level', 'info')
     assert process.wait() == 2
     assert 'nosuch' in process.output and 'usage' not in process.output
 
@@ -301,6 +301,6 @@ def test_walk_refuses_what_is_wrong_and_says_what_is_valid(
 
 
 def test_help_of_walk_lists_the_scenarios(processes: Processes) -> None:
-    process = walk(processes, '--help')
+    process = processes.python('-m', 'dmp_cpg_ros', 'walk', '--help')
     assert process.wait() == 0
     assert 'start_stop' in process.output and 'votes' in process.output

@@ -90,9 +90,9 @@ def test_a_run_with_other_names_is_the_same_run(processes: Processes, tmp_path: 
     scenario.write_text(SCENARIO, encoding='utf-8')
     file = robot_file(tmp_path, UNITREE)
     for out, options in (('usual', []), ('named', ['--robot', str(file)])):
-        walk = processes.python(
-            '-m', 'dmp_cpg_ros.commands.walk', str(scenario), '--lock-step', '--composed',
-            '--no-report', '--out', str(tmp_path / out), *options)
+        walk = processes.executable(
+            'walk', str(scenario), '--lock-step', '--composed', '--no-report', '--out',
+            str(tmp_path / out), *options)
         assert walk.wait(240.0) == 0, str(walk)
     usual, named = (load_recording(tmp_path / out) for out in ('usual', 'named'))
     assert len(named.joints.time) > 250
