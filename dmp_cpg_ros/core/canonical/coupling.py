@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -92,6 +92,20 @@ class CouplingGraph:
         turned = [turns[i].T @ gain @ turns[i]
                   for (i, _), gain in zip(self.edges, self.gains, strict=True)]
         return -self._block_matrix(turned, lambda i, j: np.eye(2))
+
+    @cached_property
+    def comparison(self) -> Array:
+        """Diagonal Σ_j λ_min of K_ij's symmetric part, −‖K_ij‖ beside it, ndarray (N, N) [1/s]."""
+        L = np.zeros((self.size, self.size))
+        if not self.edges:
+            return L
+        symmetric = 0.5 * (self.gains + np.swapaxes(self.gains, 1, 2))
+        held = np.linalg.eigvalsh(symmetric)[:, 0]
+        pulled = np.linalg.svd(self.gains, compute_uv=False)[:, 0]
+        for (i, j), weakest, strongest in zip(self.edges, held, pulled, strict=True):
+            L[i, i] += weakest
+            L[i, j] -= strongest
+        return L
 
     def _block_matrix(self, gains: Iterable[Array], seen_from: Callable[[int, int], Array]
                       ) -> Array:

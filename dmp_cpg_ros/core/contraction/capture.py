@@ -20,6 +20,7 @@ nodes away from the origin, where oscillators diverge, and gives contraction on 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -83,7 +84,8 @@ class CaptureSet:
 
 
 def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
-                region_radius: float, places: float = PLACE_TOLERANCE) -> CaptureSet:
+                region_radius: float, places: float = PLACE_TOLERANCE,
+                known: CaptureSet | None = None) -> CaptureSet:
     """Build the invariant set of an inhibited network.
 
     Parameters
@@ -98,6 +100,8 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
         r0 of C_i = {|x_i − x_{i,d}| ≤ r0}.
     places : float
         Largest distance of a node from its place at capture, as a fraction of |x_d|.
+    known : CaptureSet, optional
+        The same for another ``places``: its box does not depend on them.
 
     Returns
     -------
@@ -122,9 +126,10 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     L = comparison_laplacian(system.graph)
     largest = float(np.sqrt(max(float(system.radius.max()), D)**2
                             + overshoot(L) / float(system.rho.min())))
-    u = _distances(system, L, omega, inhibited, D, region_radius, largest + D)
-    pull = outward_growth(system, omega, D, u) - L @ u
-    needed = np.where(inhibited, pull / region_radius, np.nan)
+    u = known.distance if known else _distances(
+        system, L, omega, inhibited, D, region_radius, largest + D)
+    needed = known.needed_gain if known else np.where(
+        inhibited, (outward_growth(system, omega, D, u) - L @ u) / region_radius, np.nan)
     tolerance = places * D
     if np.any(~inhibited):
         tolerance = min(tolerance, float(u[~inhibited].min()) - region_radius)
@@ -273,11 +278,13 @@ def _distances(system: CanonicalSystem, L: Array, omega: Array, inhibited: Mask,
     """
     u = np.where(inhibited, region_radius, largest)
     free = ~inhibited
+    solution = _grounded_solution(L, free)
     for _ in range(12):
-        solved = _grounded_solution(L, outward_growth_within(system, omega, D, u), u, free)
+        solved = solution(outward_growth_within(system, omega, D, u), u)
         beyond = free & (solved >= largest)
         if np.any(beyond):                                  # fixed at the edge of the disc
             free = free & ~beyond
+            solution = _grounded_solution(L, free)
             u = np.where(beyond, largest, u)
             continue
         new = np.minimum(u, solved)
@@ -287,23 +294,24 @@ def _distances(system: CanonicalSystem, L: Array, omega: Array, inhibited: Mask,
     return u
 
 
-def _grounded_solution(L: Array, g: Array, u: Array, free: Mask) -> Array:
-    """Solve (L u)_i = g_i at the free nodes, u kept at the others; ∞ where unbounded."""
-    solved, heard = u.copy(), ~free
-    for _ in range(len(u)):
-        if np.all(heard):
-            break
+def _grounded_solution(L: Array, free: Mask) -> Callable[[Array, Array], Array]:
+    """Solver of (L u)_i = g_i at the free nodes, u kept at the others; ∞ where unbounded."""
+    heard = ~free
+    for _ in range(len(L)):
         heard = heard | ((L < 0.0) @ heard)
-    solved[~heard] = np.inf                                 # no kept node acts on these
-    free = free & heard
-    if not np.any(free):
+    known, any_free = bool(np.all(heard)), bool(np.any(free & heard))
+    free, kept = free & heard, ~free & heard
+    grounded, beside = L[np.ix_(free, free)], L[np.ix_(free, kept)]
+    firm = known and any_free and slowest_rate(grounded) > 1e-9 * float(np.abs(grounded).max())
+
+    def solution(g: Array, u: Array) -> Array:
+        solved = np.where(heard, u, np.inf)                 # no kept node acts on the others
+        if known and any_free:
+            solved[free] = np.linalg.solve(
+                grounded, g[free] - beside @ u[kept]) if firm else np.inf
         return solved
-    grounded, kept = L[np.ix_(free, free)], ~free & heard
-    if np.any(~heard) or slowest_rate(grounded) <= 1e-9 * float(np.abs(grounded).max()):
-        solved[free] = np.inf if np.all(heard) else solved[free]
-        return solved
-    solved[free] = np.linalg.solve(grounded, g[free] - L[np.ix_(free, kept)] @ u[kept])
-    return solved
+
+    return solution
 
 
 def _smallest_radii(system: CanonicalSystem, M: Array, omega: Array, u: Array, D: float,

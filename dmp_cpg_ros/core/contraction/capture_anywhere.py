@@ -52,15 +52,15 @@ def needed_gain_anywhere(system: CanonicalSystem, omega: float, node: int,
     largest = max(float(system.radius.max()), reach)
     L = comparison_laplacian(system.graph)[node]
     held, pulled = float(L[node]), float(-L[np.arange(len(L)) != node].sum())
-    rho, r = float(system.rho[node]), float(system.radius[node])
+    rho, r_squared = float(system.rho[node]), Interval.of(float(system.radius[node])).square()
+    both = Interval.of(reach).square() + Interval.of(region_radius).square()
 
     def outward(cosine: Interval) -> Interval:
         """n·ẋ_i without inhibition at x_i = x_d + r0 n, with n·x_d = |x_d| cos."""
         sine = (1.0 - cosine.square()).sqrt()
         along = cosine * reach + region_radius                               # n·x_i
-        squared = (cosine * (2.0 * reach * region_radius)
-                   + (Interval.of(reach).square() + Interval.of(region_radius).square()))
-        radial = rho * ((Interval.of(r).square() - squared) * along)
+        squared = cosine * (2.0 * reach * region_radius) + both
+        radial = rho * ((r_squared - squared) * along)
         return sine * (abs(omega) * reach) + radial + pulled * largest - held * along
 
     return _maximum(outward) / region_radius
@@ -116,7 +116,7 @@ class Interval:
     def __post_init__(self) -> None:
         """Validate."""
         lower, upper = np.asarray(self.lower, float), np.asarray(self.upper, float)
-        if not np.all(lower <= upper):
+        if not (lower <= upper).all():
             raise DataError('the ends of an interval must be numbers with lower <= upper')
         object.__setattr__(self, 'lower', lower)
         object.__setattr__(self, 'upper', upper)

@@ -23,6 +23,7 @@ in the end, for frequencies that vary in time as they like; applied again with w
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,8 +83,12 @@ def disagreement_bound(rate: float, disturbance: float, weights: Array) -> tuple
         raise ParameterError(f'rate = {rate!r} 1/s must be positive: the network is not certified '
                              'to synchronise')
     disagreement = disturbance / rate
-    two_smallest = np.sort(weights)[:2]
-    return disagreement, disagreement * float(np.sqrt(np.sum(1.0 / two_smallest)))
+    return disagreement, disagreement * _farthest_two(weights)
+
+
+def _farthest_two(weights: Array) -> float:
+    """Largest (1/ξ_i + 1/ξ_j)^½."""
+    return float(np.sqrt(np.sum(1.0 / np.sort(weights)[:2])))
 
 
 def mismatch_bound(found: Synchronisation, rho: float, radius: float,
@@ -112,28 +117,36 @@ def mismatch_bound(found: Synchronisation, rho: float, radius: float,
     """
     if not (np.isfinite(mismatch) and mismatch >= 0.0):
         raise ParameterError(f'mismatch = {mismatch!r} rad/s must be finite and not negative')
+    *_, last = _bounds(found, rho, radius, mismatch)
+    return last
+
+
+def _bounds(found: Synchronisation, rho: float, radius: float, mismatch: float
+            ) -> Iterator[MismatchBound]:
+    """Bounds of which each is nowhere larger than the one before."""
     if not found.synchronises or found.weights is None:
-        return MismatchBound(float('inf'), float('inf'), 0.0, float(np.pi))
-    bound = MismatchBound(float('inf'), float('inf'), 0.0, float(np.pi))
+        yield MismatchBound(float('inf'), float('inf'), 0.0, float(np.pi))
+        return
+    least, smallest = 0.0, float(found.weights.min())
     largest = radius if found.overshoot == 0.0 else float(
         np.sqrt(radius**2 + found.overshoot / rho))
+    two, one = _farthest_two(found.weights), ((1.0 - smallest) / smallest) ** 0.5
     for _ in range(20):
-        growth = min(found.growth, rho * (radius**2 - bound.smallest_radius**2))
-        epsilon, distance = disagreement_bound(found.connectivity - growth, mismatch * largest,
-                                               found.weights)
+        growth = min(found.growth, rho * (radius**2 - least**2))
+        epsilon = mismatch * largest / (found.connectivity - growth)
+        distance = epsilon * two
         if not found.free_mean:
-            return MismatchBound(epsilon, distance, 0.0, float(np.pi))
-        smallest = float(found.weights.min())
-        farthest = epsilon * ((1.0 - smallest) / smallest) ** 0.5            # bounds |x_i − x̄|
+            yield MismatchBound(epsilon, distance, 0.0, float(np.pi))
+            return
+        farthest = epsilon * one                                             # bounds |x_i − x̄|
         mean = _mean_radius(rho, radius, mismatch, epsilon, farthest)
         inner = max(0.0, mean - farthest)
         half = distance / (2.0 * inner) if inner > 0.0 else 1.0
         spread = 2.0 * float(np.arcsin(half)) if half < 1.0 else float(np.pi)
-        new = MismatchBound(epsilon, distance, inner, spread)
-        if abs(new.smallest_radius - bound.smallest_radius) < 1e-9:
-            return new
-        bound = new
-    return bound
+        yield MismatchBound(epsilon, distance, inner, spread)
+        if abs(inner - least) < 1e-9:
+            return
+        least = inner
 
 
 def mismatch_margin(graph: CouplingGraph, found: Synchronisation, rho: float, radius: float,
@@ -161,9 +174,10 @@ def mismatch_margin(graph: CouplingGraph, found: Synchronisation, rho: float, ra
         gain = phase_gain(L)
 
     def within(delta: float) -> bool:
-        bound = mismatch_bound(found, rho, radius, delta)
-        return bound.phase_spread <= phase_spread or gain is not None and _phase_spread(
-            bound, L, gain, rho, radius, delta) <= phase_spread
+        for bound in _bounds(found, rho, radius, delta):
+            if bound.phase_spread <= phase_spread:
+                return True
+        return gain is not None and _stays_within(phase_spread, bound, L, gain, rho, radius, delta)
 
     return last_that_holds(within, 0.0, max(found.rate, 0.0), 20)
 
@@ -201,12 +215,14 @@ _CELL = 0.1  # of the fastest time constant
 _MOST_CELLS = 3000
 
 
-def _phase_spread(bound: MismatchBound, L: Array, gain: Array, rho: float, radius: float,
-                  mismatch: float) -> float:
-    """Largest phase difference in the end, from a bound that is known to hold then [rad]."""
+def _stays_within(limit: float, bound: MismatchBound, L: Array, gain: Array, rho: float,
+                  radius: float, mismatch: float) -> bool:
+    """Whether phases differ by at most a limit [rad] in the end, from a bound that holds then."""
     spread, inner = np.full_like(L, bound.phase_spread), bound.smallest_radius
     K = np.maximum(0.0, -L)
     for _ in range(20):
+        if spread.max() <= limit:
+            return True
         if not (spread.max() < 1.0 and inner > 0.0):
             break
         slack = float((K * (1.0 - np.cos(spread))).sum(axis=1).max()) / rho
@@ -217,7 +233,7 @@ def _phase_spread(bound: MismatchBound, L: Array, gain: Array, rho: float, radiu
         if np.abs(new - spread).max() < 1e-9:
             break
         spread = new
-    return float(spread.max())
+    return float(spread.max()) <= limit
 
 
 def _mean_radius(rho: float, radius: float, mismatch: float, epsilon: float,

@@ -200,16 +200,7 @@ def comparison_laplacian(graph: CouplingGraph) -> Array:
     ndarray (N, N)
         [1/s]
     """
-    L = np.zeros((graph.size, graph.size))
-    if not graph.edges:
-        return L
-    symmetric = 0.5 * (graph.gains + np.swapaxes(graph.gains, 1, 2))
-    held = np.linalg.eigvalsh(symmetric)[:, 0]
-    pulled = np.linalg.svd(graph.gains, compute_uv=False)[:, 0]
-    for (i, j), weakest, strongest in zip(graph.edges, held, pulled, strict=True):
-        L[i, i] += weakest
-        L[i, j] -= strongest
-    return L
+    return graph.comparison.copy()
 
 
 def overshoot(laplacian: Array) -> float:
