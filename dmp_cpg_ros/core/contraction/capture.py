@@ -101,7 +101,7 @@ def capture_set(system: CanonicalSystem, omega: float | Array, gains: Array,
     places : float
         Largest distance of a node from its place at capture, as a fraction of |x_d|.
     known : CaptureSet, optional
-        The same for another ``places``: its box does not depend on them.
+        Of other ``places``, or other gains of the same nodes: the box depends on neither.
 
     Returns
     -------
