@@ -53,7 +53,7 @@ def send(process: NodeProcess, node: str, number: int) -> None:
 
 def test_in_lock_step_the_walk_goes_on_as_if_nobody_had_died(
         processes: Processes, tmp_path: Path) -> None:
-    process = walk(processes, tmp_path, 6.0, '--lock-step', '--respawn')
+    process = walk(processes, tmp_path, 4.0, '--lock-step', '--respawn')
     process.wait_for_output(r's +walking', RUN_S)
     dead = ('inhibition', 'canonical_oscillators', 'leg_transformation_fl')
     for node in dead:

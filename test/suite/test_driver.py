@@ -93,9 +93,8 @@ def test_a_driver_in_place_of_the_robot_walks_and_stops(
     file = tmp_path / 'my_suite.yaml'
     file.write_text(yaml.safe_dump({
         '/**': {'ros__parameters': {'expected_nodes': expected}}, **own}), encoding='utf-8')
-    processes.python('-m', 'dmp_cpg_ros', 'composed_suite',
-                     *(name for name in WALKING_NODES if name != ROBOT),
-                     '--ros-args', '--params-file', str(file))
+    processes.executable('composed_suite', *(name for name in WALKING_NODES if name != ROBOT),
+                         '--ros-args', '--params-file', str(file))
     driver = Driver(ros)
     ros.spin_until(lambda: driver.joints.get_subscription_count() >= 1
                    and driver.node.count_publishers('joint_targets') == len(LEGS))

@@ -52,9 +52,9 @@ def test_no_text_of_a_run_in_lock_step_carries_a_number_that_controls(
         processes: Processes, tmp_path: Path) -> None:
     scenario = tmp_path / 'scenario.yaml'
     scenario.write_text(SCENARIO, encoding='utf-8')
-    walk = processes.python(
-        '-m', 'dmp_cpg_ros.commands.walk', str(scenario), '--lock-step', '--composed',
-        '--no-report', '--out', str(tmp_path / 'run'))
+    walk = processes.executable(
+        'walk', str(scenario), '--lock-step', '--composed', '--no-report', '--out',
+        str(tmp_path / 'run'))
     assert walk.wait(240.0) == 0, str(walk)
     texts: dict[str, set[tuple[str, ...]]] = defaultdict(set)
     with AnyReader([tmp_path / 'run' / 'bag']) as reader:

@@ -26,11 +26,11 @@ processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
 SCENARIO = """\
 name: straight
-duration: 8.0
+duration: 7.0
 events:
   - {at: 0.2, inhibit: false}
   - {at: 0.2, command: {v_x: 0.5}}
-  - {at: 6.0, inhibit: true}
+  - {at: 5.0, inhibit: true}
 """
 RUN_S = 240.0
 """How long a run may take on a loaded machine before the test gives up [s]."""
