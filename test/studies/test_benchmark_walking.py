@@ -18,6 +18,7 @@ from dmp_cpg_ros.analysis.recording import WorkSeries
 from dmp_cpg_ros.studies.output import markdown_table
 
 pytest.importorskip('mujoco')
+from dmp_cpg_ros.studies import walking_trials
 from dmp_cpg_ros.studies.benchmark_walking import main, steady_cells
 from dmp_cpg_ros.studies.loop_recording import recording_of
 from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, Walk, cross, relative_error, survives
@@ -79,7 +80,8 @@ def test_a_push_is_felt_and_a_blow_is_fatal() -> None:
     assert not survives(run, 0.5 * pi, 8.0)
 
 
-def test_a_crossing_ends_at_the_finish_or_on_the_ground() -> None:
+def test_a_crossing_ends_at_the_finish_or_on_the_ground(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(walking_trials, 'CROSSING_TIME', 12.0)  # twice as long as on the flat
     flat = cross('trot', 'flat', {}, 0, speed=0.8)
     assert flat.crossed and not flat.fell
     assert flat.time == pytest.approx(5.0 / 0.8, rel=0.2)
