@@ -112,7 +112,7 @@ def at_rest(client: Client) -> Any:
 def test_the_scene_says_what_walks_and_what_can_be_asked(client: Client) -> None:
     scene = client.scene()
     assert scene['robot'] == 'mini_quadruped' and scene['legs'] == list(LEGS)
-    assert scene['drives'] is True and scene['rate'] == 250.0
+    assert scene['drives'] is True and scene['rate'] == ros_processes.SHARED_HZ
     assert {'amble', 'trot'} <= set(scene['gaits'])
     assert scene['inhibited'] == ['fl'] and scene['mass'] > 1.0
 
@@ -363,10 +363,10 @@ def test_one_command_gives_an_address_at_which_the_robot_is_driven_pushed_and_st
     with reserved_domain() as domain, joined(domain) as ros:
         processes = Processes(domain)
         try:
-            walk = processes.python(
-                '-m', 'dmp_cpg_ros', 'walk', '--view', '--no-report', '--out', str(tmp_path))
+            walk = processes.executable('walk', '--view', '--no-report', '--out', str(tmp_path))
             page.open(walk.wait_for_output(ADDRESS, PATIENCE_S)[1], 900, 640)
             drive(page, ros)
+            page.open('about:blank')  # which asks nobody who has ended
             walk.interrupt()
             assert walk.wait(PATIENCE_S) == 130, str(walk)
         finally:

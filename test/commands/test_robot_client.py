@@ -99,7 +99,8 @@ def test_a_suite_in_a_namespace_is_found_there_and_elsewhere_named(
         shared_domain: int, tmp_path: Path, ros: Ros) -> None:
     references = ros.collect(interface('reference').type, 'robot1/reference',
                              interface('reference').reader_qos)
-    with composed_suite(shared_domain, tmp_path, '-r', '__ns:=/robot1') as suite:
+    with composed_suite(shared_domain, tmp_path, '-r', '__ns:=/robot1',
+                        control_rate=ros_processes.SHARED_HZ) as suite:
         await_stop(ros, 'at_rest', 'robot1/inhibition_state')
         await_following(ros, 'robot1/drive_mode')
         elsewhere = suite.executable(*CLIENT, '--wait', '10', 'inhibit')

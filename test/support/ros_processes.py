@@ -49,6 +49,9 @@ DEADLINE_S = 30.0
 MARK = 'DMP_CPG_ROS_TEST'
 """Variable by which the processes of a test, and theirs, are known."""
 
+SHARED_HZ = 100.0
+"""Control rate of a suite beside which tests ask, command and look on; it is certified too."""
+
 ASK_AGAIN_S = 3.0
 """Time after which a request that may be repeated is repeated."""
 
@@ -363,7 +366,8 @@ def composed_suite(domain: int, folder: Path, *ros_arguments: str, **parameters:
 def shared_suite(shared_domain: int, tmp_path_factory: pytest.TempPathFactory
                  ) -> Iterator[Processes]:
     """A suite in one process that all tests of a module use."""
-    with composed_suite(shared_domain, tmp_path_factory.mktemp('suite')) as started:
+    with composed_suite(shared_domain, tmp_path_factory.mktemp('suite'),
+                        control_rate=SHARED_HZ) as started:
         yield started
 
 
