@@ -20,7 +20,6 @@ correlated from sample to sample.
 
 _HARMONICS = 8
 _COARSE_SAMPLES = 500
-_AT_ONCE = 256
 
 
 def find_period(demonstration: Demonstration, shortest: float | None = None,
@@ -178,43 +177,13 @@ def phase_lead(reference: Array, other: Array) -> float:
     return float((delta + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-def periodogram(times: Array, values: Array, frequency: Array) -> Array:
-    """Lomb-Scargle periodogram, summed over the columns (Scargle 1982, eq. 10).
-
-    Parameters
-    ----------
-    times : ndarray (m,)
-        [s]
-    values : ndarray (m, n)
-        With the mean 0.
-    frequency : ndarray (f,)
-        [1/s]
-
-    Returns
-    -------
-    ndarray (f,)
-        As of scipy.signal.lombscargle, with the waves computed once for all columns.
-    """
-    return np.concatenate([_power(times, values, frequency[first:first + _AT_ONCE])
-                           for first in range(0, len(frequency), _AT_ONCE)])
-
-
-def _power(times: Array, values: Array, frequency: Array) -> Array:
-    waves = np.exp(2j * np.pi * np.outer(times, frequency))
-    double = np.einsum('mf,mf->f', waves, waves) / len(times)
-    found = (values.T @ waves) * np.exp(-0.5j * np.angle(double))  # no correlation of its parts
-    cosines = 0.5 * (1.0 + np.abs(double))
-    sines = np.maximum(1.0 - cosines, np.finfo(float).epsneg)
-    power = (found.real**2 / cosines + found.imag**2 / sines).sum(axis=0)
-    return np.asarray(0.5 * power / len(times))
-
-
 def _candidates(times: Array, values: Array, low: float, high: float) -> list[float]:
     """Frequencies of spectral peaks and their fractions, within the limits [1/s]."""
-    from scipy.signal import find_peaks
+    from scipy.signal import find_peaks, lombscargle
 
     frequency = np.arange(0.5 * low, high, 0.125 / times[-1])
-    power = periodogram(times, values, frequency)
+    power = np.sum([lombscargle(times, column, 2.0 * np.pi * frequency) for column in values.T],
+                   axis=0)
     peaks, _ = find_peaks(np.concatenate([[0.0], power, [0.0]]), height=1e-4 * power.max())
     strongest = peaks[np.argsort(power[peaks - 1])[::-1][:5]] - 1
     found: list[float] = [low]
