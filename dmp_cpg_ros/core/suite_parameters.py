@@ -143,6 +143,9 @@ class RobotParameters(Parameters):
     longest_lag: float = parameter(
         0.024, "real time: age of a leg's targets beyond which the simulation waits for newer "
         'ones, up to target_timeout of wall time; 0: it never waits', 0.0, 10.0, unit='s')
+    target_lead: float = parameter(
+        0.0, 'time after its tick at which a target acts, for which it is computed', 0.0, 0.06,
+        unit='s')
     viewer: bool = parameter(False, 'whether to open a window with the robot')
     fail: str = parameter(
         '', 'failure to inject when it is set, such as {component: imu, kind: stuck, for_s: 0.5}')

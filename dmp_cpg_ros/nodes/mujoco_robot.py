@@ -371,8 +371,9 @@ class MujocoRobotNode(SuiteNode):
     # Inside --------------------------------------------------------------------------------------
 
     def _new_guard(self) -> CommandWatchdog:
-        return CommandWatchdog(
-            self._robot.description, round(self._options.target_timeout * 1e9))
+        p = self._options
+        return CommandWatchdog(self._robot.description, round(p.target_timeout * 1e9),
+                               round(p.target_lead * 1e9))
 
     @property
     def _file(self) -> Path:

@@ -43,6 +43,14 @@ class LastCycle:
         """Remember the targets of one leg."""
         self._heard[place].append((stamp_ns, np.array(tuple(vars(targets).values()))))
 
+    def acting(self, place: int, time_ns: int) -> tuple[int, Array] | None:
+        """Stamp and values (3, 3) of a leg's newest targets up to a time, else of its first ones;
+        None where it sent none.
+        """
+        heard = self._heard[place]
+        return next((entry for entry in reversed(heard) if entry[0] <= time_ns),
+                    heard[0] if heard else None)
+
     def rhythm(self) -> Rhythm | None:
         """Rhythm of the last targets up to the last that all legs sent; None where they have
         none.

@@ -51,10 +51,12 @@ STANDING_HEIGHT = 0.7
 class CommandWatchdog:
     """The newest targets of the four legs, or a fallback when one of them is too old.
 
-    Targets hold at their stamp. Those that act later are carried on by their own velocity to the
-    time at which they act, as the joint would have moved if they had come in time; otherwise every
-    late message would hold the feet, and with them the body, back. When a leg's targets are
-    still later, all legs go on with the rhythm of their last cycle or take up their stance.
+    Targets hold a lead after their stamp, and those that come earlier wait until then: a delay
+    that varies within the lead becomes a constant one. Those that act later are carried on by
+    their own velocity to the time at which they act, as the joint would have moved if they had
+    come in time; otherwise every late message would hold the feet, and with them the body, back.
+    When a leg's targets are still later, all legs go on with the rhythm of their last cycle or
+    take up their stance.
 
     Parameters
     ----------
@@ -62,6 +64,8 @@ class CommandWatchdog:
         The robot, for its postures.
     timeout_ns : int
         Age of a leg's targets from which the robot falls back [ns].
+    lead_ns : int
+        Time after their stamp for which targets were computed [ns].
 
     Attributes
     ----------
@@ -71,9 +75,9 @@ class CommandWatchdog:
         ``stand``, ``lie`` or ``damp`` while the robot falls back; else empty.
     """
 
-    def __init__(self, description: RobotDescription, timeout_ns: int) -> None:
+    def __init__(self, description: RobotDescription, timeout_ns: int, lead_ns: int = 0) -> None:
         """Start without targets."""
-        self._timeout_ns, self._targets = timeout_ns, np.zeros((3, 12))
+        self._timeout_ns, self._lead_ns, self._targets = timeout_ns, lead_ns, np.zeros((3, 12))
         self.stamps: list[int | None] = [None] * len(LEGS)
         self.fallback = ''
         self._sense, self._stance_height = BodySense(description), description.stance_height
@@ -93,9 +97,7 @@ class CommandWatchdog:
         if newest is not None and stamp_ns <= newest:
             return
         self.stamps[i] = stamp_ns
-        joints = slice(len(JOINTS_OF_LEG) * i, len(JOINTS_OF_LEG) * (i + 1))
-        self._targets[:, joints] = targets.position, targets.velocity, targets.effort
-        self._memory.accept(i, stamp_ns, targets)
+        self._memory.accept(i, stamp_ns + self._lead_ns, targets)
 
     def silent(self, now_ns: int) -> list[str]:
         """Legs whose targets are missing or too old."""
@@ -103,12 +105,13 @@ class CommandWatchdog:
                 if stamp is None or now_ns - stamp > self._timeout_ns]
 
     def age_ns(self, now_ns: int) -> int:
-        """Age of the oldest targets of the legs that are not silent [ns]; 0 while a leg has never
-        sent any.
+        """Age, beyond the lead, of the oldest targets of the legs that are not silent [ns]; 0
+        while a leg has never sent any.
         """
         known = [stamp for stamp in self.stamps if stamp is not None]
         ages = [now_ns - stamp for stamp in known if now_ns - stamp <= self._timeout_ns]
-        return max(ages, default=0) if len(known) == len(self.stamps) else 0
+        return max(0, max(ages, default=0) - self._lead_ns) if (
+            len(known) == len(self.stamps)) else 0
 
     def targets(self, state: RobotState) -> JointTargets:
         """Targets of all joints, (12,) each, at a state of the robot."""
@@ -118,12 +121,12 @@ class CommandWatchdog:
 
     def _chosen(self, state: RobotState) -> JointTargets:
         now, known = state.time_ns, None not in self.stamps
+        ages = self._take_what_acts(now)
         if self.silent(now) or (self.fallback and known and not self._at_ease(now)):
             return self._falling_back(state)
         if self.fallback:
             self._taken_ns, self.fallback = now, ''
             self._off = self._given - self._targets[0]
-        ages = [now - stamp for stamp in self.stamps if stamp is not None]
         position, velocity, effort = self._targets.copy()
         if any(ages):
             late = np.repeat(ages, len(JOINTS_OF_LEG))
@@ -136,6 +139,17 @@ class CommandWatchdog:
         if self._taken_ns and now - self._taken_ns < TAKEN_UP_S * 1e9:
             position += (1.0 - _share(now - self._taken_ns, TAKEN_UP_S)) * self._off
         return JointTargets(position, velocity, effort)
+
+    def _take_what_acts(self, now: int) -> list[int]:
+        """Take of each leg the newest targets whose time has come; return their ages [ns]."""
+        ages = []
+        for i in range(len(LEGS)):
+            acting = self._memory.acting(i, now)
+            if acting is not None:
+                joints = slice(len(JOINTS_OF_LEG) * i, len(JOINTS_OF_LEG) * (i + 1))
+                holds_ns, self._targets[:, joints] = acting
+                ages.append(now - holds_ns)
+        return ages
 
     def _going_on(self, state: RobotState, last: Array) -> Array:
         """Targets (3, 12) while a leg is late, but not yet silent, after the last ones. All legs

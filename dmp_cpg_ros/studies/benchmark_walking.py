@@ -6,8 +6,9 @@ speeds: steady velocities against the commanded ones. pushes: largest speed chan
 eight directions at every phase. manoeuvres: falls by pushes at rest, while stopping, starting,
 changing gait and turning. unpushed: stops that nobody pushes against. rough: share of seeds that
 cross 5 m of rough ground. contacts: the same with and without the feedback of touchdown and the
-stumbling reflex. gaits: every ordered pair of gaits changed while moving. robots: other robots,
-with their files alone; those of the extra `robots` are left out where it is not installed.
+stumbling reflex. delays: targets that arrive late. gaits: every ordered pair of gaits changed
+while moving. robots: other robots, with their files alone; those of the extra `robots` are left
+out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """
@@ -20,7 +21,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from math import isnan, nan, pi
+from math import ceil, isnan, nan, pi
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +101,13 @@ UNPUSHED: tuple[tuple[str, tuple[float, float], str, dict[str, float], float], .
 
 SIDES = (0.5 * pi, 1.5 * pi)
 """Directions of the pushes of each robot [rad]."""
+
+LATE_WALKS = (('amble', 0.5), ('amble', 1.2), ('trot', 1.0), ('trot', 2.0))
+"""Gaits and speeds of walks whose targets arrive late."""
+
+DELAYS_MS = ((0.0, 0.0), (16.0, 16.0), (20.0, 20.0), (24.0, 24.0), (40.0, 40.0), (5.0, 30.0),
+             (5.0, 50.0))
+"""Least and longest delays of their targets [ms]."""
 
 TOP_SPEEDS = (1.0, 1.5, 2.0, 2.5, 3.0)
 """Speeds that are tried in a trot, one after the other [m/s]."""
@@ -278,6 +286,25 @@ def _groups(results: Results, seeds: int) -> Iterator[tuple[
         yield case, words, of, (str(seeds), output.percent(crossed, seeds), str(fell))
 
 
+def delays(workers: Workers, seeds: int, phases: int) -> Table:
+    """Falls and speed by the delay of the targets, without a lead and with one that covers it."""
+    cells = [(gait, speed, delay, lead) for (gait, speed), delay in product(LATE_WALKS, DELAYS_MS)
+             for lead in sorted({0, 4 * ceil(delay[1] / 4)})]
+    results = _run(workers, trials.late, [
+        {'gait': gait, 'speed': speed, 'delay_ms': delay, 'lead_ms': lead, 'seed': seed + 1}
+        for gait, speed, delay, lead in cells for seed in range(seeds)])
+    rows = []
+    for k, (gait, speed, delay, lead) in enumerate(cells):
+        of = [outcome for _, outcome in results[k * seeds:(k + 1) * seeds]]
+        upright = [one for one in of if not one.fell]
+        means = ((f'{np.mean([one.reached for one in upright]):.2f}',
+                  f'{np.mean([one.tilt for one in upright]):.2f}') if upright else ('-', '-'))
+        rows.append((f'{gait} {speed:g}', ' to '.join(f'{end:g}' for end in sorted(set(delay))),
+                     str(lead), f'{len(of) - len(upright)}/{seeds}', *means))
+    return Table('Targets that arrive late', ('gait, m/s', 'delay ms', 'target_lead ms', 'fell',
+                                              'reached m/s', 'tilt rms deg'), rows, results)
+
+
 def gaits(workers: Workers, seeds: int, phases: int) -> Table:
     """Every ordered pair of gaits changed while moving, at a quarter of the phases."""
     walks = _run(workers, trials.run_changes, [
@@ -373,7 +400,7 @@ def _is_there(file: str) -> bool:
 
 
 TABLES = {make.__name__: make for make in (
-    speeds, pushes, manoeuvres, unpushed, rough, contacts, gaits, robots)}
+    speeds, pushes, manoeuvres, unpushed, rough, contacts, delays, gaits, robots)}
 """What can be measured."""
 
 

@@ -18,7 +18,7 @@ from dmp_cpg_ros.analysis.recording import Recording, taken
 from dmp_cpg_ros.core.gait.known_gaits import shares_of
 from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
 PUSH_DURATION = 0.1
@@ -62,8 +62,12 @@ class LoopRun(Generic[Loop]):
     def tick(self, seconds: float) -> None:
         """Tick for a time [s], upright or not."""
         for _ in range(round(seconds / self.tick_s)):
-            self.state = self.robot.step(self.loop.tick(self.state).targets)
+            self.state = self.robot.step(self.acting(self.loop.tick(self.state)))
             self.states.append(self.state)
+
+    def acting(self, tick: Tick) -> JointTargets:
+        """Targets that act in a tick."""
+        return tick.targets
 
     def walk(self, seconds: float) -> bool:
         """Tick for a time [s], or until the robot falls; return whether it is on its feet."""

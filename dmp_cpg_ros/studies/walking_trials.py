@@ -21,11 +21,13 @@ from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
-from dmp_cpg_ros.core.loop import Array, WalkingLoop
+from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
 from dmp_cpg_ros.core.maths.roots import last_that_holds
-from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import WORLDS, World
+from dmp_cpg_ros.core.suite_parameters import RobotParameters
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.studies.loop_recording import PUSH_DURATION, LoopRun, recording_of
 from dmp_cpg_ros.suite import Suite, load_gaits, load_suite
 
@@ -41,6 +43,11 @@ MEASURED, MEASURED_WAY = 5.0, 2.0
 """Least time [s] and, where it goes somewhere, least way [m] over which a steady velocity and the
 heading are averaged: over half a metre the sway of single steps would be taken for drift.
 """
+
+LATE_S = 6.0
+"""Time for which a robot whose targets arrive late is watched at its speed [s]."""
+
+TARGET_TIMEOUT_NS = round(1e9 * RobotParameters().target_timeout)
 
 RECOVERY = 3.0
 """Time for which the robot must stay on its feet after a push [s]."""
@@ -119,6 +126,46 @@ class Walk(LoopRun[WalkingLoop]):
         return 2.0 * pi / self.loop.network.omega(self.loop.r)
 
 
+class LateWalk(Walk):
+    """A walk whose targets arrive late: those of each leg in order, from the second on after times
+    drawn evenly from a range.
+
+    Parameters
+    ----------
+    gait : str
+        Name of the gait.
+    delay_ms : tuple of float
+        Least and longest [ms].
+    lead_ms : int
+        ``target_lead`` [ms].
+    seed : int
+        Of the delays and, as for :class:`Walk`, of the start.
+    """
+
+    def __init__(self, gait: str, delay_ms: tuple[float, float], lead_ms: int, seed: int) -> None:
+        self._delay_ms, self._lead_ms = delay_ms, lead_ms
+        self._random = np.random.default_rng(seed)
+        self._guard: CommandWatchdog | None = None
+        self._on_the_way: list[list[tuple[int, int, JointTargets]]] = [[] for _ in LEGS]
+        self._arrival_ns = [0] * len(LEGS)
+        super().__init__(gait, seed=seed, values=(('target_lead', 1e-3 * lead_ms),))
+
+    def acting(self, tick: Tick) -> JointTargets:
+        """Send what the legs want, and take of it what the robot's watchdog gives out."""
+        if self._guard is None:
+            self._guard = CommandWatchdog(
+                self.robot.description, TARGET_TIMEOUT_NS, self._lead_ms * 1_000_000)
+        sent = np.split(np.array(tuple(vars(tick.targets).values())), len(LEGS), axis=1)
+        for i, (leg, of_leg) in enumerate(zip(LEGS, sent, strict=True)):
+            delay_ms = self._random.uniform(*self._delay_ms) * (self._guard.stamps[i] is not None)
+            self._arrival_ns[i] = max(self._arrival_ns[i], tick.time_ns + round(1e6 * delay_ms))
+            queue = self._on_the_way[i]
+            queue.append((self._arrival_ns[i], tick.time_ns, JointTargets(*of_leg)))
+            while queue and queue[0][0] <= tick.time_ns:
+                self._guard.accept(leg, *queue.pop(0)[1:])
+        return self._guard.targets(self.state)
+
+
 @dataclass(frozen=True)
 class SteadyOutcome:
     """A velocity that was held.
@@ -163,6 +210,29 @@ def steady(gait: str, velocity: Velocity, robot: str | None = None) -> SteadyOut
         recording_of(states), RunContext(robot=run.robot.description), way)
     return replace(held, yaw_drift=abs(float(np.rad2deg(gained))) * 10.0 / way,
                    cost_of_transport=work or nan)
+
+
+@dataclass(frozen=True)
+class LateOutcome:
+    """Whether a walk with late targets fell, its mean speed [m/s], and the root mean square of its
+    roll and pitch [deg].
+    """
+
+    fell: bool
+    reached: float = nan
+    tilt: float = nan
+
+
+def late(gait: str, speed: float, delay_ms: tuple[float, float], lead_ms: int, seed: int
+         ) -> LateOutcome:
+    """Ramp to a speed [m/s] and hold it for ``LATE_S``; see :class:`LateWalk`."""
+    run = LateWalk(gait, delay_ms, lead_ms, seed)
+    if not (run.settle((speed, 0.0, 0.0)) and run.walk(LATE_S)):
+        return LateOutcome(True)
+    states = run.states[-round(LATE_S / run.tick_s):]
+    tilt = np.rad2deg(np.sqrt(np.mean(np.sum(_attitude(states)[:, :2] ** 2, axis=1))))
+    return LateOutcome(
+        False, float(np.mean([state.base_velocity_in_base[0] for state in states])), float(tilt))
 
 
 def relative_error(outcome: SteadyOutcome, velocity: Velocity) -> float:

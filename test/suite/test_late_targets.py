@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,15 +23,16 @@ from dmp_cpg_ros.suite import load_gaits, load_suite
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.walking_trials import late
 
 TICK_NS = 4_000_000
 LONGEST = CARRIED_NS // TICK_NS
 SUITE = load_suite(None, {'auto_inhibit': False, 'cmd_vel_timeout': 0.0})
 
 
-def make_guard(description: RobotDescription) -> CommandWatchdog:
+def make_guard(description: RobotDescription, lead_ns: int = 0) -> CommandWatchdog:
     timeout_ns = round(1e9 * RobotParameters().target_timeout)
-    return CommandWatchdog(description, timeout_ns)
+    return CommandWatchdog(description, timeout_ns, lead_ns)
 
 
 def accept(guard: CommandWatchdog, stamp_ns: int, targets: JointTargets) -> None:
@@ -70,6 +72,24 @@ def test_each_leg_is_carried_by_its_own_age(standing: PerfectTrackingRobot) -> N
     assert np.allclose(moved, 1e-9 * TICK_NS * np.arange(4.0)[:, None], rtol=0.0, atol=1e-15)
 
 
+@given(lead=st.integers(0, 15), seed=st.integers(0, 2**32))
+def test_what_comes_within_the_lead_acts_at_its_end_however_it_came(
+        standing: PerfectTrackingRobot, lead: int, seed: int) -> None:
+    random, state = np.random.default_rng(seed), standing.reset()
+    sent = [JointTargets(*values) for values in random.normal(size=(40, 3, 12))]
+    arrival = np.maximum.accumulate(np.arange(40) + random.integers(0, lead + 1, size=40))
+    guard = make_guard(standing.description, lead * TICK_NS)
+    accept(guard, 0, sent[0])
+    for now in range(40):
+        for k in np.flatnonzero(arrival == now):
+            accept(guard, int(k) * TICK_NS, sent[k])
+        given_out, wanted = guard.targets(replace(state, time_ns=now * TICK_NS)), sent[
+            max(0, now - lead)]
+        assert all(np.array_equal(*pair) for pair in zip(
+            vars(given_out).values(), vars(wanted).values(), strict=True))
+        assert guard.age_ns(now * TICK_NS) == 0
+
+
 def arrivals(ticks: int, seed: int) -> list[int]:
     """Tick whose targets act at each tick: they come late, in bursts, by 24 ms at most."""
     random, newest, stalled, acting = np.random.default_rng(seed), 0, 0, []
@@ -107,3 +127,12 @@ def test_a_robot_whose_targets_come_in_bursts_walks_as_fast_as_it_should(gait: s
     assert not robot.fallen and loop.mode.mode == 'standing'
     assert np.mean(speeds[-1000:]) == pytest.approx(0.5, rel=0.05)
     assert min(heights) > 0.9 * heights[0]
+
+
+@pytest.mark.parametrize(('gait', 'speed', 'delay_ms', 'lead_ms'), [
+    ('trot', 2.0, (24.0, 24.0), 24), ('amble', 1.2, (5.0, 30.0), 32)])
+def test_with_a_lead_a_robot_whose_targets_come_late_walks_as_fast_as_it_should_at_speed(
+        gait: str, speed: float, delay_ms: tuple[float, float], lead_ms: int) -> None:
+    leads, late_only = (late(gait, speed, delay_ms, lead, seed=1) for lead in (lead_ms, 0))
+    assert not leads.fell and leads.reached == pytest.approx(speed, rel=0.02) and leads.tilt < 2.0
+    assert late_only.fell or late_only.reached < 0.9 * speed

@@ -234,7 +234,8 @@ class PostureController:
         rates = [rate + gait.rest_rate for rate in scalar_phase_rates(x, x_dot)]
         activity = activities_step(memory.activity, rates, own_omegas, p.activity_rate, dt)
         swings = activity.tolist()
-        positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2)) for x_1, x_2 in x.tolist()]
+        positions = [gait.scalar_cycle_position(scalar_phase(x_1, x_2) + p.target_lead * rate)
+                     for (x_1, x_2), rate in zip(x.tolist(), rates, strict=True)]
         load = virtual_model.contact_weights(positions, duty, swings, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
         velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))

@@ -63,3 +63,6 @@ class PostureParameters(Parameters):
     activity_rate: float = parameter(
         12.0, 'rate at which the planned body motion fades when the phase stops', 0.1, 1e3,
         unit='1/s')
+    target_lead: float = parameter(
+        0.0, 'time after its tick at which a target acts, for which it is computed', 0.0, 0.06,
+        unit='s')

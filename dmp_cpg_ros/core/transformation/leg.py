@@ -71,6 +71,9 @@ class LegParameters(Parameters):
     target_rate: float = parameter(
         2.0, 'largest speed at which the target of a joint changes, over the speed limit of the '
         'joint', 0.1, 100.0)
+    target_lead: float = parameter(
+        0.0, 'time after its tick at which a target acts, for which it is computed', 0.0, 0.06,
+        unit='s')
 
 
 class LegState(NamedTuple):
@@ -88,6 +91,8 @@ class LegState(NamedTuple):
         What the stumbling reflex does.
     motion : object
         Of the foot's motion.
+    sent : tuple of ndarray (3,)
+        Angles that were sent, from those that act now on [rad].
     """
 
     joints: SpringState
@@ -95,6 +100,7 @@ class LegState(NamedTuple):
     shift_in_base: Array
     stumble: reflex.Stumble = reflex.Stumble()
     motion: Any = None
+    sent: tuple[Array, ...] = ()
 
 
 class LegFeedback(NamedTuple):
@@ -176,7 +182,7 @@ class LegPrimitive:
 
     def step(self, state: LegState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
              feedback: LegFeedback, dt: float) -> tuple[LegState, Array, Array]:
-        """Advance the leg to the time at which the inputs hold.
+        """Advance the leg to ``target_lead`` after the time at which the inputs hold.
 
         Parameters
         ----------
@@ -204,13 +210,17 @@ class LegPrimitive:
         omega = own_omegas[self.place]
         x_1, x_2 = x.tolist()
         rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
-        position = gait.scalar_cycle_position(scalar_phase(x_1, x_2))
+        phi, lead = scalar_phase(x_1, x_2), p.target_lead
+        position = gait.scalar_cycle_position(phi + lead * rate)
+        acts = gait.scalar_cycle_position(phi) if lead else position
+        ahead = round(lead / dt) if dt > 0.0 else 0
+        sent = (*state.sent, state.joints.position)[-1 - ahead:]
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
         path = self.path(reference, omega, duty, activity, state.stumble, feedback)
         motion, foot, path_velocity = self.motion.step(state.motion, path, position, rate, dt)
         offset = triple(state.shift_in_base.tolist())
         offset_rate, stumble = self._offset_rate(
-            state, offset, activity, path, position, path_velocity, feedback, dt)
+            state, offset, activity, path, (acts, position), sent[0], path_velocity, feedback, dt)
         offset = moved(offset, offset_rate, dt)
         bounce = gait.bounce(position, duty, omega)
         p_x, p_y, p_z = plus(foot, offset)
@@ -221,7 +231,8 @@ class LegPrimitive:
         goal, goal_velocity = np.array(angles), np.array(_joint_velocity(jacobian, (
             v_x, v_y, v_z + stumble.rate - activity * bounce.velocity * (rate / omega))))
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
-        return LegState(joints, activity, np.array(offset), stumble, motion), goal, goal_velocity
+        return (LegState(joints, activity, np.array(offset), stumble, motion, sent), goal,
+                goal_velocity)
 
     def path(self, reference: Triple, omega: float, duty: float, activity: float,
              stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
@@ -232,28 +243,31 @@ class LegPrimitive:
             self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
 
     def _offset_rate(self, state: LegState, offset: Triple, activity: float, path: FootPath,
-                     position: float, path_velocity: Triple, feedback: LegFeedback,
-                     dt: float) -> tuple[Triple, reflex.Stumble]:
+                     positions: tuple[float, float], acting: Array, path_velocity: Triple,
+                     feedback: LegFeedback, dt: float) -> tuple[Triple, reflex.Stumble]:
         """Rate of the foothold offset [m/s]: placement and stumbling reflex in swing, following
-        the ground in stance.
+        the ground in stance. The foot is where the targets that act now and the first of the
+        positions in the cycle have it; its offset is for the second.
         """
         if dt <= 0.0:
             return (0.0, 0.0, 0.0), state.stumble
-        swung = path.swung(position)
-        measured = self.kinematics.foot(feedback.joint_position)
-        target = self.kinematics.foot(state.joints.position)
+        stands, will_stand = (abs(at) >= 0.5 * (1.0 - path.duty) for at in positions)
+        measured, target = self.kinematics.foot(feedback.joint_position), self.kinematics.foot(
+            acting)
         away = minus(measured, target)
-        lift, lag = self.stumble_lift, self.stumble_lag
-        if abs(position) >= 0.5 * (1.0 - path.duty):
-            stumble = reflex.stumble_step(state.stumble, None, lift, lag, dt)
-            drift = pair(feedback.drift_in_base.tolist())
-            return self.offset_rates.in_stance(offset, drift, away[:2], activity, dt), stumble
-        progress = None
-        if lift:
+        lift, lag, progress = self.stumble_lift, self.stumble_lag, None
+        if lift and not stands:
             touches = feedback.foot_force > self.touch_force
-            progress = reflex.swing_progress(path, swung, measured, target, touches)
-        stumble = reflex.stumble_step(state.stumble, progress, activity * lift, lag, dt)
-        placement, (height, _) = triple(feedback.shift_in_base.tolist()), swing_height(swung)
+            progress = reflex.swing_progress(
+                path, path.swung(positions[0]), measured, target, touches)
+        stumble = reflex.stumble_step(
+            state.stumble, progress, lift if stands else activity * lift, lag, dt)
+        if will_stand:
+            drift = pair(feedback.drift_in_base.tolist())
+            slipped = away[:2] if stands else (0.0, 0.0)
+            return self.offset_rates.in_stance(offset, drift, slipped, activity, dt), stumble
+        placement = triple(feedback.shift_in_base.tolist())
+        height, _ = swing_height(path.swung(positions[1]))
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
         return reflex.compliant_offset_rate(stumble, rate, path_velocity, away), stumble
 

@@ -33,9 +33,11 @@ def leg_of(leg: str, **changes: object) -> LegPrimitive:
 
 
 def asked(leg: LegPrimitive, state: LegState, shift: np.ndarray | None = None) -> LegFeedback:
-    """Feedback for a leg whose joints are at their targets."""
+    """Feedback for a leg whose joints are at their targets, those that act now."""
     shift = np.zeros(3) if shift is None else shift
-    return LegFeedback(state.joints.position, shift, np.zeros(2), np.zeros(3))
+    sent = (*state.sent, state.joints.position)
+    acts = sent[-1 - round(leg.parameters.target_lead / TICK):][0]
+    return LegFeedback(acts, shift, np.zeros(2), np.zeros(3))
 
 
 def walked(leg: LegPrimitive, gait: Gait, r: np.ndarray, shift: np.ndarray, seconds: float
@@ -60,6 +62,35 @@ def test_goal_velocities_are_the_rates_of_the_goals(leg: str, gait: str, directi
     rates = np.diff(goals, axis=0) / TICK
     middle = 0.5 * (velocities[1:] + velocities[:-1])
     assert np.abs(rates - middle).max() < 0.05 * np.abs(velocities).max()
+
+
+@pytest.mark.parametrize('direction', REFERENCES)
+@pytest.mark.parametrize('ticks', [1, 6, 15])
+def test_a_leg_with_a_lead_sends_what_another_sends_that_much_later(
+        ticks: int, direction: str) -> None:
+    r, shift = np.array(REFERENCES[direction]), np.array([0.02, -0.01, 0.01])
+    later = walked(leg_of('rl'), GAITS['trot'], r, shift, 3.0)
+    leads = walked(leg_of('rl', target_lead=ticks * TICK), GAITS['trot'], r, shift, 3.0)
+    assert np.allclose(leads[500:-ticks], later[500 + ticks:], atol=1e-6)
+
+
+@pytest.mark.parametrize('place', [-0.1, 0.02, 0.3])
+def test_what_a_lead_misses_of_a_changing_cadence_is_of_second_order(place: float) -> None:
+    gait, r = GAITS['amble'], np.array([0.5, 0.0, 0.0])
+    begin = 2.0 * np.pi * (place - gait.cycle_position(np.zeros(1))[0])
+
+    def goal(lead: float, phi: float, rate: float) -> np.ndarray:
+        leg, x = leg_of('fl', target_lead=lead), state_at(phi)
+        state = leg.initial_state()._replace(activity=1.0)
+        x_dot = rate * phase_generator() @ x
+        return leg.step(state, gait, x, x_dot, r, asked(leg, state), TICK)[1]
+
+    omega, change = gait.omega(leg_of('fl').scale.foot_speed(*r), leg_of('fl').scale), 20.0
+    missed = [np.abs(goal(d, begin, omega) - goal(
+        0.0, begin + omega * d + 0.5 * change * d * d, omega + change * d)).max()
+        for d in (0.004, 0.002, 0.001)]
+    assert missed[0] / missed[1] == pytest.approx(4.0, rel=0.2)
+    assert missed[1] / missed[2] == pytest.approx(4.0, rel=0.1)
 
 
 def test_an_unused_foot_path_in_stance_moves_against_the_body() -> None:
