@@ -26,9 +26,10 @@ from dmp_cpg_ros.analysis.bag import opened, payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario
 from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
@@ -68,6 +69,15 @@ events:
   - {at: 4.75, inhibit: true}
 """
 
+LEADING = """\
+name: leading
+duration: 3.0
+parameters: {target_lead: 0.02}
+events:
+  - {at: 0.3, inhibit: false}
+  - {at: 0.3, command: {v_x: 0.8}}
+"""
+
 WITH_CONTACTS = {'contact_feedback': True}
 """All that listens to the feet."""
 
@@ -102,17 +112,22 @@ def walked(processes: Processes, scenario: Path, out: Path, *options: str) -> Pa
 
 
 def plain_run(scenario_file: Path, **values: Any) -> tuple[list[RobotState], list[Any]]:
-    """Run the scenario on the plain loop; states and ticks."""
+    """Run the scenario on the plain loop behind the robot's watchdog; states and ticks."""
     scenario, suite = load_scenario(scenario_file), load_suite(None, values)
     robot = MujocoRobot(
         suite.robot_file, suite.tick_ns, world=suite.world, sensors=suite.sensors
     )
     loop = WalkingLoop(robot.description, suite.gait, suite.parameters, load_gaits())
     states, ticks = [robot.reset()], []
+    guard = CommandWatchdog(
+        robot.description, 200_000_000, round(1e9 * suite.parameters.leg.target_lead))
 
     def step() -> RobotState:
         ticks.append(loop.tick(states[-1]))
-        states.append(robot.step(ticks[-1].targets))
+        sent = np.split(np.array(tuple(vars(ticks[-1].targets).values())), 4, axis=1)
+        for leg, targets in zip(LEGS, sent, strict=True):
+            guard.accept(leg, states[-1].time_ns, JointTargets(*targets))
+        states.append(robot.step(guard.targets(states[-1])))
         return states[-1]
 
     play(scenario, suite.tick_ns, step, {**loop.takers, **robot.takers})
@@ -174,6 +189,22 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
     assert metrics['robot']['fell'] is False
     assert metrics['robot']['cost_of_transport_from'] == 'joint_work'
     assert metrics['stop']['measured_s'] == pytest.approx(metrics['stop']['predicted_s'], abs=1e-6)
+
+
+def test_nodes_let_targets_act_a_lead_after_their_stamp(
+    processes: Processes, tmp_path: Path
+) -> None:
+    scenario = tmp_path / 'leading.yaml'
+    scenario.write_text(LEADING, encoding='utf-8')
+    run = walked(processes, scenario, tmp_path / 'run', '--lock-step', '--composed')
+    recording = load_recording(run / 'bag')
+    states, ticks = plain_run(scenario, target_lead=0.02)
+    at_once, _ = plain_run(scenario)
+    joints = np.array([state.joint_position for state in states[:-1]])
+    np.testing.assert_array_equal(recording.joints.position, joints)
+    np.testing.assert_array_equal(recording.targets.position,
+                                  [tick.targets.position for tick in ticks])
+    assert not np.array_equal(joints, [state.joint_position for state in at_once[:-1]])
 
 
 def test_nodes_answer_pushes_as_the_plain_loop_does(
