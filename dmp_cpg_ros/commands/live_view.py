@@ -30,7 +30,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.commands.suite_client import SuiteClient, connected, prepared
+from dmp_cpg_ros.commands.suite_client import SuiteClient, connected, deliver, prepared
 from dmp_cpg_ros.commands.view_server import Frames, ViewServer
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core import suite_parameters as core
@@ -296,6 +296,7 @@ class LiveView:
         finally:
             if self._driving:
                 self._let_go()
+                deliver(self._velocity)
 
     def _let_go(self) -> None:
         self._driving = False
