@@ -100,8 +100,16 @@ class InterruptedRunError(DmpCpgError):
 
 
 @contextmanager
-def alone_in_domain(namespace: str) -> Iterator[None]:
+def alone_in_domain(namespace: str, meanwhile: Callable[[], Any] = lambda: None
+                    ) -> Iterator[Any]:
     """Hold the ROS domain for one suite in a namespace.
+
+    Parameters
+    ----------
+    namespace : str
+        Of the suite.
+    meanwhile : callable ()
+        What is done, and handed on, while the graph has time to tell of others.
 
     Raises
     ------
@@ -116,9 +124,11 @@ def alone_in_domain(namespace: str) -> Iterator[None]:
         domain = context.get_domain_id()
         held = claims.claim(f'{namespace}/suite', domain)
         names = [f'{namespace}/{name}' for name in (*WALKING_NODES, RECORDER)]
-        lookout = Node('lookout', context=context, namespace=namespace)
+        lookout, deadline = Node('lookout', context=context, namespace=namespace), (
+            time.monotonic() + LOOK_S)
+        made = meanwhile()
         # Claims tell at once of nodes on this machine; the graph, after a while, of all others.
-        others = claims.claimed(names, domain) or _in_graph(lookout, names)
+        others = claims.claimed(names, domain) or _in_graph(lookout, names, deadline)
         lookout.destroy_node()
     finally:
         context.try_shutdown()
@@ -126,19 +136,18 @@ def alone_in_domain(namespace: str) -> Iterator[None]:
         if others:
             raise claims.AlreadyRunningError(
                 claims.already_running(domain, f'nodes {", ".join(others)}'))
-        yield
+        yield made
 
 
-def _in_graph(lookout: Node, names: Sequence[str]) -> list[str]:
+def _in_graph(lookout: Node, names: Sequence[str], deadline: float) -> list[str]:
     """Those of some nodes that are in the graph, looked for as long as there are none."""
-    deadline = time.monotonic() + LOOK_S
-    found: list[str] = []
-    while not found and time.monotonic() < deadline:
-        time.sleep(SLICE_S)
+    while True:
         there = {f'{space.rstrip("/")}/{name}'
                  for name, space in lookout.get_node_names_and_namespaces()}
         found = [name for name in names if name in there]
-    return found
+        if found or time.monotonic() > deadline:
+            return found
+        time.sleep(SLICE_S)
 
 
 def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: Path, say: Say,

@@ -84,17 +84,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _main(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> int:
-    plan = _planned(options, ros)
-    for section in unused_sections(plan.suite.file, ros.namespace, KINDS):
-        print(f"walk: '{plan.suite.file}': section '{section}' means no node in namespace "
-              f"'{ros.namespace or '/'}'; '/**/{section.rpartition('/')[2]}' would",
-              file=sys.stderr)
+    ros.namespace = ros_arguments.checked_namespace(options.namespace or ros.namespace)
     from dmp_cpg_ros.commands.fork_server import ForkServer
 
     with ForkServer() as server:  # imports what nodes need while this process does
         from dmp_cpg_ros.commands.suite_run import alone_in_domain
 
-        with alone_in_domain(ros.namespace):
+        with alone_in_domain(ros.namespace, lambda: _planned(options, ros)) as plan:
             return _walk(plan, server)
 
 
@@ -106,7 +102,6 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
         scenario = replace(scenario, duration_s=VIEWED_S)
     overrides = {**scenario.parameters, **motion_overrides(options.motion or ''),
                  **ros.parameters, **dict(map(ros_arguments.read_parameter, options.set))}
-    ros.namespace = ros_arguments.checked_namespace(options.namespace or ros.namespace)
     if options.parameters and ros.parameters_file:
         raise ParameterError('give --parameters or --params-file, not both')
     if options.robot is not None:
@@ -131,6 +126,10 @@ def _planned(options: argparse.Namespace, ros: ros_arguments.RosArguments) -> _P
         raise ParameterError(
             f'the gait is not certified to stop: {certificate.explained()} (certify --suggest '
             'proposes gains that hold; --set allow_uncertified:=true walks all the same)')
+    for section in unused_sections(suite.file, ros.namespace, KINDS):
+        print(f"walk: '{suite.file}': section '{section}' means no node in namespace "
+              f"'{ros.namespace or '/'}'; '/**/{section.rpartition('/')[2]}' would",
+              file=sys.stderr)
     if options.video:
         from dmp_cpg_ros.commands import film
 
