@@ -107,12 +107,6 @@ PROCESSES: dict[str, dict[str, tuple[str, ...]]] = {
 """How the nodes that walk share processes: names of the nodes by process, in starting order."""
 
 
-BATCH, FIFO, NORMAL = 'batch', 'fifo', 'normal'
-
-POLICIES = (BATCH, FIFO, NORMAL)
-"""Policies by which Linux schedules these processes: values of the parameter ``scheduling``."""
-
-
 def instances() -> Iterator[tuple[Kind, str, Mapping[str, str]]]:
     """Every node of the suite, the recorder first: its kind, its name, its own parameters."""
     for kind in (KINDS[RECORDER], *WALKING, KINDS[VISUALIZATION]):

@@ -124,8 +124,7 @@ def _timing(timing: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
     latency = _number(timing['latency_ms_p50'], 'median {:.2f} ms')
     late = _number(timing['latency_ms_p99'], '99% {:.2f} ms')
     return [Fact('The suite kept wall time', f'real-time factor {factor:.3f}, {rate}', kept),
-            Fact('Latency from state to last target', f'{latency}, {late}'
-                 f'{" (scheduling fifo)" * (timing.get("scheduling") == "fifo")}', None)]
+            Fact('Latency from state to last target', f'{latency}, {late}', None)]
 
 
 def _certificate(metrics: Mapping[str, Any]) -> list[Fact]:

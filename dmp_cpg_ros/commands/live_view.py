@@ -44,7 +44,12 @@ from dmp_cpg_ros.core.parameters import Parameters, shown
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.nodes.framework.execution import schedule
-from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters, ParameterTable, plain
+from dmp_cpg_ros.nodes.framework.parameters import (
+    BATCH,
+    LockStepParameters,
+    ParameterTable,
+    plain,
+)
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, interface
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, JointsReader, read_odom
@@ -52,7 +57,7 @@ from dmp_cpg_ros.nodes.messages.values import checked_numbers, header_ns
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.scene import Scene
 from dmp_cpg_ros.suite import load_gaits
-from dmp_cpg_ros.suite_table import BATCH, ROBOT
+from dmp_cpg_ros.suite_table import ROBOT
 
 OK, FAILED = 0, 1
 """Exit statuses: ended by Ctrl-C; nobody there."""

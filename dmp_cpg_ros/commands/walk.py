@@ -29,15 +29,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterErro
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.primitive_files import motion_overrides
 from dmp_cpg_ros.suite import Suite, load_suite
-from dmp_cpg_ros.suite_table import (
-    BATCH,
-    KINDS,
-    POLICIES,
-    RECORDED_WALK,
-    RECORDER,
-    WALKING,
-    namespace_rules,
-)
+from dmp_cpg_ros.suite_table import KINDS, RECORDED_WALK, RECORDER, WALKING, namespace_rules
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.commands.fork_server import ForkServer
@@ -200,8 +192,7 @@ def _run(plan: _Plan, folder: Path, server: ForkServer) -> int:
     options, ros = plan.options, plan.ros
     resolved = plan.resolved(gated=True)
     for values in resolved.values():
-        values.update(lock_step=options.lock_step, scheduling=options.scheduling,
-                      expected_nodes=list(RECORDED_WALK))
+        values.update(lock_step=options.lock_step, expected_nodes=list(RECORDED_WALK))
     resolved[RECORDER] = {'output': str(folder / 'bag'),
                           'expected_nodes': [kind.name for kind in WALKING]}
     rules = [*ros.remappings, *namespace_rules(ros.namespace)]
@@ -284,9 +275,6 @@ def _parser() -> argparse.ArgumentParser:
         help='a process for every node (default), or for every block: gait, posture, legs, robot')
     sharing.add_argument('--composed', dest='processes', action='store_const', const='composed',
                          help='all nodes in one process and one executor')
-    add('--scheduling', choices=POLICIES, default=BATCH,
-        help='policy of the Linux scheduler (default: batch); fifo, where it is permitted, lets '
-        'nodes that walk in real time run before everybody else')
     add('--respawn', action='store_true',
         help='start processes that end before their time again, all but the robot')
     add('--robot', metavar='FILE',

@@ -151,7 +151,6 @@ class MujocoRobotNode(SuiteNode):
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the robot has fallen or stands by itself."""
         return {**self._timing.values(), 'fell': self._fell, 'time_s': self._state.time_ns * 1e-9,
-                'scheduling': self.scheduling,
                 'silent_legs': ' '.join(self._guard.silent(self._state.time_ns)) or 'none'}
 
     def check_parameters(self, sets: Sets) -> None:

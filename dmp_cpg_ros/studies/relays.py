@@ -32,16 +32,9 @@ from rclpy.task import Future
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
 from dmp_cpg_ros.nodes.framework import execution
 from dmp_cpg_ros.nodes.framework.health import RobotTiming
+from dmp_cpg_ros.nodes.framework.parameters import BATCH
 from dmp_cpg_ros.nodes.messages import interfaces
-from dmp_cpg_ros.suite_table import (
-    BATCH,
-    KINDS,
-    POSTURE,
-    RECORDER,
-    ROBOT,
-    VISUALIZATION,
-    instances,
-)
+from dmp_cpg_ros.suite_table import KINDS, POSTURE, RECORDER, ROBOT, VISUALIZATION, instances
 
 STAMP = struct.Struct('<iI')
 STAMP_AT = 4

@@ -276,7 +276,6 @@ def test_real_time_run_stops_and_starts(
         'deadline_misses',
     ):
         assert metrics['timing'][name] is not None
-    assert metrics['timing']['scheduling'] == ('batch' if hasattr(os, 'SCHED_BATCH') else 'normal')
 
 
 def test_a_dead_node_ends_the_run_and_is_named(

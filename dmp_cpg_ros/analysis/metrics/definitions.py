@@ -75,7 +75,6 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
     'timing.real_time_factor': ('', "robot's time over wall time"),
     'timing.latency_ms_p50': ('ms', 'from a state to the last of its four targets, median'),
     'timing.latency_ms_p99': ('ms', 'the same, 99th percentile'),
-    'timing.scheduling': ('', "policy of the Linux scheduler for the robot's process"),
     'timing.deadline_misses': ('', 'ticks whose targets came after the next state'),
 }
 """Dotted name → (unit, meaning)."""

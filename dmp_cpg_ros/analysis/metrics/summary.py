@@ -220,12 +220,11 @@ def compute_metrics(
 
 def timing_metrics(recording: Recording) -> dict[str, Any]:
     """Group ``timing`` of ``metrics.json``, as the robot stated each key last."""
-    metrics: dict[str, Any] = dict.fromkeys((*TIMING, 'scheduling'))
+    metrics: dict[str, Any] = dict.fromkeys(TIMING)
     last = [status for name, status in recording.diagnostics.items() if ROBOT in name]
     for status in sorted(last, key=lambda status: status.time):
         metrics.update({key: value for key in TIMING
                         if (value := status.number(key)) is not None})
-        metrics['scheduling'] = status.values.get('scheduling')
     if metrics['deadline_misses'] is not None:
         metrics['deadline_misses'] = round(metrics['deadline_misses'])
     return metrics

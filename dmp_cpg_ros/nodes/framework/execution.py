@@ -5,13 +5,12 @@
 Every message wakes its reader, and a reader that Linux wakes takes the core from the writer, who
 has four more messages to publish: ten processes on two cores changed places 9,000 times a second.
 Under ``SCHED_BATCH`` (sched(7)) whoever is woken waits until the writer has finished its tick and
-sleeps. The policy needs no privilege and changes nobody's share of the processor. ``SCHED_FIFO``
-needs one, and puts the nodes that walk before everybody else.
+sleeps. The policy needs no privilege and changes nobody's share of the processor.
 """
 
 from __future__ import annotations
 
-import ctypes
+import contextlib
 import gc
 import os
 import signal
@@ -38,8 +37,8 @@ from rclpy.utilities import get_default_context, remove_ros_args
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.nodes.framework.claims import claim
-from dmp_cpg_ros.nodes.framework.parameters import LockStepParameters, NodeParameters, help_text
-from dmp_cpg_ros.suite_table import BATCH, FIFO, KINDS, NORMAL, WALKING
+from dmp_cpg_ros.nodes.framework.parameters import BATCH, NodeParameters, help_text
+from dmp_cpg_ros.suite_table import KINDS
 
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
@@ -65,51 +64,32 @@ def prepare_middleware() -> None:
 
 
 _THREADS = '/proc/self/task'
-_CURRENT_AND_FUTURE = 1 | 2
-
-FIFO_PRIORITY = 10
-"""Of all nodes that walk. They have the same one, since a reader with a higher one would take the
-core from a writer that has more to publish: measured, the slower the later it is in the chain.
-"""
 
 
-def schedule(policy: str, priority: int = 0) -> str:
+def schedule(policy: str) -> int:
     """Schedule all threads of this process; those that they start inherit the policy.
 
     Parameters
     ----------
     policy : str
-        ``fifo``, ``batch``, or ``normal`` for leaving everything as it is. A thread whose policy
-        somebody has chosen already (``chrt``) keeps it.
-    priority : int
-        Of ``fifo``; with 0 it means ``batch``. The process's memory is locked too.
+        ``batch``, or ``normal`` for leaving everything as it is. A thread whose policy somebody
+        has chosen already (``chrt``) keeps it, and so do all where the operating system has no
+        such policy.
 
     Returns
     -------
-    str
-        The policy that acts: ``batch`` where the system does not permit ``fifo``
-        (``CAP_SYS_NICE``), ``normal`` where it has no such policy.
+    int
+        Number of threads that changed.
     """
-    if policy == NORMAL or not hasattr(os, 'SCHED_BATCH') or not os.path.isdir(_THREADS):
-        return NORMAL
-    if policy == FIFO and priority and _schedule(os.SCHED_FIFO, priority):
-        ctypes.CDLL(None).mlockall(_CURRENT_AND_FUTURE)
-        return FIFO
-    _schedule(os.SCHED_BATCH, 0)
-    return BATCH
-
-
-def _schedule(number: int, priority: int) -> bool:
-    """Give a policy to all threads that have none of their own; returns whether it may."""
+    if policy != BATCH or not hasattr(os, 'SCHED_BATCH') or not os.path.isdir(_THREADS):
+        return 0
+    changed = 0
     for thread in map(int, os.listdir(_THREADS)):
-        try:
+        with contextlib.suppress(OSError):  # one that has just ended, or may not be changed
             if os.sched_getscheduler(thread) == os.SCHED_OTHER:
-                os.sched_setscheduler(thread, number, os.sched_param(priority))
-        except ProcessLookupError:  # it has just ended
-            continue
-        except OSError:
-            return False
-    return True
+                os.sched_setscheduler(thread, os.SCHED_BATCH, os.sched_param(0))
+                changed += 1
+    return changed
 
 
 FOREVER_S = 1e6
@@ -247,23 +227,9 @@ def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[Sui
     for node in nodes:
         node.start()
     parameters = nodes[0].parameters_of(NodeParameters)
-    _schedule_nodes(nodes, parameters.scheduling)
+    schedule(parameters.scheduling)
     spin(nodes, parameters.executor, until)
     del claims
-
-
-def _schedule_nodes(nodes: Iterable[SuiteNode], wanted: str) -> None:
-    """Schedule this process as its nodes want it; who walks in real time comes before others."""
-    walking = {kind.name for kind in WALKING}
-    first = any(node.KIND in walking and not node.parameters_of(LockStepParameters).lock_step
-                for node in nodes)
-    policy = schedule(wanted, FIFO_PRIORITY if first else 0)
-    for node in nodes:
-        node.scheduling = policy
-    if first and wanted == FIFO != policy:
-        get_logger('scheduling').warning(
-            'the system does not permit scheduling:=fifo, which needs CAP_SYS_NICE or an rtprio '
-            f'of {FIFO_PRIORITY} in /etc/security/limits.conf; going on with {policy}')
 
 
 def _status(program: str, body: Callable[[], object]) -> int:

@@ -23,7 +23,12 @@ from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.nodes.messages.interfaces import published_by, read_by, served_by
-from dmp_cpg_ros.suite_table import BATCH, KINDS, POLICIES, WALKING
+from dmp_cpg_ros.suite_table import KINDS, WALKING
+
+BATCH, NORMAL = 'batch', 'normal'
+
+POLICIES = (BATCH, NORMAL)
+"""Values of the parameter ``scheduling``."""
 
 P = TypeVar('P', bound=Parameters)
 
@@ -41,8 +46,7 @@ class NodeParameters(Parameters):
         'events', "rclpy's executor; events needs a quarter of the CPU time of single",
         choices=('events', 'single'))
     scheduling: str = parameter(
-        BATCH, 'policy of the Linux scheduler; batch keeps a reader from interrupting its writer, '
-        'fifo, where it is permitted, puts nodes that walk in real time before everybody else',
+        BATCH, 'policy of the Linux scheduler; batch keeps a reader from interrupting its writer',
         choices=POLICIES)
     expected_nodes: tuple[str, ...] = parameter(
         tuple(kind.name for kind in WALKING),

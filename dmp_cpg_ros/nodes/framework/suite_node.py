@@ -48,7 +48,7 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
     partners,
 )
 from dmp_cpg_ros.nodes.messages.values import counts_message, header_ns
-from dmp_cpg_ros.suite_table import KINDS, NORMAL
+from dmp_cpg_ros.suite_table import KINDS
 
 LOOK_EVERY_S = 0.2
 """How often the graph is asked for the publishers of a topic at most [s]."""
@@ -114,7 +114,6 @@ class SuiteNode(GuardedLifecycleNode):
     inputs: TickInputs
     following = False
     elapsed = 0.0
-    scheduling = NORMAL
 
     def __init__(self, name: str | None = None, **options: Any) -> None:
         """Create the node and check its parameters; raises ParameterError for a bad one."""
