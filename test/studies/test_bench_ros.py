@@ -54,7 +54,8 @@ def test_it_measures_the_suite_beside_relays(
     assert list(dict.fromkeys(row['row'] for row in rows)) == list(named)
     for row in rows:
         assert row['what'] in printed and row['floor_is'] in ('relays', 'relays connected')
-        if row['what'] != 'growth of all' and 'preempted' not in row['what']:
+        # Within a second a thread may not run at all, and nobody may have to wait.
+        if not any(word in row['what'] for word in ('growth', 'preempted', 'waiting', 'threads')):
             assert row['measured'] > 0.0 and row['floor'] > 0.0 and row['ratio'] > 0.0, row
 
 
