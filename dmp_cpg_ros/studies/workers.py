@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from multiprocessing import get_context
+from multiprocessing import Pool
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -50,7 +50,7 @@ class Workers:
 
     def __enter__(self) -> Workers:
         if not self._cluster:
-            self._pool = get_context().Pool(self._number)
+            self._pool = Pool(self._number)
             return self
         try:
             from distributed import Client
