@@ -21,7 +21,6 @@ from array import array
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
-from multiprocessing import Pool
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
@@ -33,6 +32,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.nodes.messages.cdr import FIELDS, serialized_reader
 from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table
+from dmp_cpg_ros.studies.workers import Workers
 
 KINDS = (JointState, TwistStamped, Imu)
 """Messages that have a reader of their own."""
@@ -177,8 +177,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     counts: Counter[str] = Counter()
     failures, worst = set[tuple[str, str]](), 0.0
     batches = -(-options.count // BATCH)
-    with Pool(options.workers, _quiet) as pool:
-        for found, failed, slowest in pool.imap_unordered(
+    with Workers(options.workers, prepare=_quiet) as workers:
+        for found, failed, slowest in workers.map(
                 partial(fuzz, seed=options.seed, count=BATCH), range(batches)):
             counts += found
             failures |= set(failed)

@@ -20,7 +20,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
-from multiprocessing import Pool
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.studies.certificate_settings import Arguments, grid, random_arguments
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table
+from dmp_cpg_ros.studies.workers import Workers
 
 Values = dict[str, Any]
 
@@ -59,25 +60,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add('--every', type=int, default=1, metavar='N', help='of the grid, every N-th only; 0: none')
     add('--seed', type=int, default=1, help='of the random settings and of what is spoiled')
     options = parser.parse_args(arguments)
-    with Pool(options.workers) as pool:
+    with Workers(options.workers, progress=False) as workers:
         cases = [case.arguments for case in grid()[::options.every]] if options.every else []
-        found, drawn = pool.map(attempt, cases, 8), list[tuple[bool, str]]()
+        found, drawn = list(workers.map(attempt, cases, 8)), list[tuple[bool, str]]()
         wrong = _told('grid', found)
         while sum(certified for certified, _ in drawn) < options.random:
-            drawn += pool.map(random_attempt, [
+            drawn += workers.map(random_attempt, [
                 (options.seed, len(drawn) + k) for k in range(50)], 5)
         wrong += _told('random', drawn)
     texts = [text for _, text in (*found, *drawn) if text]
     counts: Counter[tuple[str, str]] = Counter()
-    with Pool(options.workers, _keep, (texts,)) as pool:
-        false = [names for names in pool.map(_refuted, texts, 20) if names]
+    with Workers(options.workers, progress=False, prepare=partial(_keep, texts)) as workers:
+        false = [names for names in workers.map(_refuted, texts, 20) if names]
         print(f'claims of the {len(texts)} proofs that are refuted: {false or "none"}\n',
               flush=True)
         for first, kinds in enumerate((DAMAGES, FORGERIES)):
             done = 0
             while sum(counts[kind, REFUSED] for kind in kinds) < options.mutations // 2:
                 block = [(options.seed, first, done + k) for k in range(200)]
-                counts.update(pool.map(_spoilt, block, 10))
+                counts.update(workers.map(_spoilt, block, 10))
                 done += len(block)
     verdicts = [REFUSED, WRONG, TRUE, CAREFUL, SAME]
     print(markdown_table(['spoiled', *verdicts], [

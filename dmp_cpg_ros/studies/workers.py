@@ -8,10 +8,13 @@ depend neither on how many work nor on where.
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from multiprocessing import Pool
+from multiprocessing import get_context
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -35,22 +38,28 @@ class Workers:
         Address of a cluster's scheduler, which is used instead.
     progress : bool, optional
         Whether to count on standard error; without, where that is a terminal.
+    prepare : callable, optional
+        What every process of this machine does first.
 
     Raises
     ------
     DmpCpgError
-        On entry, if the cluster does not answer or its library is missing.
+        On entry, if the cluster does not answer or its library is missing; from :meth:`map`, if
+        a process ends before its case does.
     """
 
-    def __init__(self, number: int, cluster: str = '', progress: bool | None = None) -> None:
-        self._number, self._cluster = number, cluster
+    def __init__(self, number: int, cluster: str = '', progress: bool | None = None,
+                 prepare: Callable[[], object] | None = None) -> None:
+        self._number, self._cluster, self._prepare = number, cluster, prepare
         self._progress = sys.stderr.isatty() if progress is None else progress
-        self._pool: Any = None
+        self._pool: ProcessPoolExecutor | None = None
         self._client: Any = None
 
     def __enter__(self) -> Workers:
         if not self._cluster:
-            self._pool = Pool(self._number)
+            # Fresh processes: a fork has the locks, but not the threads, of whoever starts it.
+            self._pool = ProcessPoolExecutor(
+                self._number, get_context('spawn'), _begin, (self._prepare,))
             return self
         try:
             from distributed import Client
@@ -66,20 +75,35 @@ class Workers:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
         if self._pool is not None:
-            self._pool.terminate()
+            self._pool.shutdown(cancel_futures=True)
         if self._client is not None:
             with suppress(OSError):
                 self._client.close()
 
-    def map(self, trial: Callable[[Case], Result], cases: Sequence[Case]) -> Iterator[Result]:
-        """Results of all cases, in their order, each as soon as those before it are there."""
-        if self._client is None:
-            results = self._pool.imap(trial, cases)
+    def map(self, trial: Callable[[Case], Result], cases: Sequence[Case], batch: int = 1,
+            ) -> Iterator[Result]:
+        """Results of all cases, in their order, each as soon as those before it are there.
+
+        Short cases cost less in batches, which go to a process together.
+        """
+        if self._pool is not None:
+            results = self._pool.map(trial, cases, chunksize=batch)
         else:
             futures = self._client.map(trial, cases, pure=False)
             results = (future.result() for future in futures)
-        for count, result in enumerate(results, 1):
-            if self._progress:
-                end = '\n' if count == len(cases) else ''
-                print(f'\r{count}/{len(cases)} ', end=end, file=sys.stderr, flush=True)
-            yield result
+        try:
+            for count, result in enumerate(results, 1):
+                if self._progress:
+                    end = '\n' if count == len(cases) else ''
+                    print(f'\r{count}/{len(cases)} ', end=end, file=sys.stderr, flush=True)
+                yield result
+        except BrokenProcessPool:
+            raise DmpCpgError('a process of the study has ended before its case, killed perhaps '
+                              'for want of memory') from None
+
+
+def _begin(prepare: Callable[[], object] | None) -> None:
+    """Begin a process, which Ctrl-C ends without a word."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if prepare is not None:
+        prepare()

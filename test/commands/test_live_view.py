@@ -7,6 +7,7 @@ from __future__ import annotations
 import http.client
 import json
 import signal
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from ros_processes import (
     composed_suite,
     joined,
     reserved_domain,
+    wait_until,
 )
 
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -57,11 +59,17 @@ class Client:
 
     def scene(self) -> Any:
         """What is drawn, once the suite is there."""
-        while True:
+        found: list[Any] = []
+
+        def drawn() -> bool:
             answer = self.ask('/scene')
             assert self.process.running, self.process
             if answer.status == 200:
-                return json.loads(answer.read())
+                found.append(json.loads(answer.read()))
+            return bool(found)
+
+        wait_until(drawn, PATIENCE_S, what=lambda: f'the scene of {self.process}')
+        return found[0]
 
     def send(self, **command: Any) -> tuple[bool, str]:
         """A command's answer."""
@@ -71,19 +79,24 @@ class Client:
         return tuple(json.loads(text).values())
 
     def frames(self) -> Iterator[Any]:
-        """Frames as they come."""
+        """Frames as they come; lines without one keep the connection alive."""
         stream = self.ask('/frames')
         assert stream.status == 200
+        end = time.monotonic() + PATIENCE_S
         while line := stream.readline():
             if line.strip():
                 yield json.loads(line)
+            assert time.monotonic() < end, f'{PATIENCE_S} s of frames of {self.process}'
 
     def until(self, condition: Callable[[Any], object]) -> Any:
         """First frame of which a condition holds."""
-        for count, frame in enumerate(self.frames()):
-            if condition(frame):
-                return frame
-            assert count < 30 * PATIENCE_S, frame
+        frame = None
+        try:
+            for frame in self.frames():
+                if condition(frame):
+                    return frame
+        except AssertionError as error:
+            raise AssertionError(f'{error}, the last of which: {frame}') from error
         raise AssertionError(self.process)
 
 

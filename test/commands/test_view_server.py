@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from checkout import ROOT
+from ros_processes import wait_until
 
 from dmp_cpg_ros.commands import view_server
 from dmp_cpg_ros.commands.view_server import FILES, PAGE, Frames, ViewServer
@@ -155,16 +156,21 @@ def test_only_the_files_of_the_page_are_served(served: Served, path: str) -> Non
     assert served.ask(path).status == 404
 
 
+def next_line(stream: http.client.HTTPResponse) -> bytes:
+    """Next line with something in it; empty ones keep the connection alive."""
+    while line := stream.readline():
+        if line.strip():
+            return line
+    raise AssertionError('the stream ended')
+
+
 def test_frames_are_lines_the_newest_for_everybody(served: Served) -> None:
     first, second = served.ask('/frames'), served.ask('/frames')
     assert (first.status, second.status) == (200, 200)
     for number in range(3):
         served.frames.put(json.dumps({'number': number}).encode())
         for stream in (first, second):
-            line = b''
-            while not line.strip():  # empty lines keep the connection alive
-                line = stream.readline()
-            assert json.loads(line) == {'number': number}
+            assert json.loads(next_line(stream)) == {'number': number}
     assert served.frames.viewers == 2
 
 
@@ -174,8 +180,12 @@ def test_there_is_room_for_some_viewers_and_who_leaves_makes_room(
     first = served.ask('/frames')
     assert served.ask('/frames').status == 503
     first.close()
-    while served.frames.viewers:  # found out when a line is written
+
+    def found_out() -> bool:  # when a line is written
         served.frames.put(b'{}')
+        return not served.frames.viewers
+
+    wait_until(found_out, what=lambda: 'a viewer that has gone')
     assert served.ask('/frames').status == 200
 
 

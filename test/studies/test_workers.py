@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from functools import partial
 from math import sqrt
 
 import pytest
@@ -25,6 +27,16 @@ def test_results_come_in_the_order_of_the_cases(number: int) -> None:
 def test_what_a_trial_raises_ends_the_study() -> None:
     with pytest.raises(ValueError, match='math domain|nonnegative'), Workers(2) as workers:
         list(workers.map(sqrt, [1.0, -1.0, 2.0]))
+
+
+def test_a_process_that_dies_ends_the_study_and_nobody_waits_for_it() -> None:
+    with pytest.raises(DmpCpgError, match='ended before its case'), Workers(2) as workers:
+        list(workers.map(os._exit, [1, 1, 1]))
+
+
+def test_every_process_is_prepared() -> None:
+    with Workers(2, prepare=partial(os.putenv, 'PREPARED', 'yes')) as workers:
+        assert set(workers.map(os.system, ['test "$PREPARED" = yes'] * 9, batch=2)) == {0}
 
 
 def test_progress_is_counted_where_it_is_wanted(capfd: pytest.CaptureFixture[str]) -> None:

@@ -8,6 +8,7 @@ import base64
 import contextlib
 import json
 import os
+import select
 import shutil
 import subprocess
 import tempfile
@@ -122,10 +123,21 @@ class Page:
         return x, y
 
     def click(self, selector: str) -> None:
-        """Click on an element."""
+        """Click on an element, once the page around it no longer moves."""
+        end = time.monotonic() + DEADLINE_S
         x, y = self.centre(selector)
+        while (x, y) != (found := self._drawn(selector)):
+            if time.monotonic() > end:
+                raise BrowserError(f'waited {DEADLINE_S} s in vain until {selector} stood still')
+            x, y = found
         self.mouse('Pressed', x, y)
         self.mouse('Released', x, y)
+
+    def _drawn(self, selector: str) -> tuple[float, float]:
+        """Centre of an element after the page was drawn twice more."""
+        self.evaluate('new Promise(done => requestAnimationFrame(() => '
+                      'requestAnimationFrame(done)))')
+        return self.centre(selector)
 
     def picture(self) -> bytes:
         """What is seen, as PNG."""
@@ -133,6 +145,8 @@ class Page:
 
     def _read(self) -> dict[str, Any]:
         while b'\0' not in self._rest:
+            if not select.select([self._from], [], [], DEADLINE_S)[0]:
+                raise BrowserError(f'the browser has said nothing for {DEADLINE_S} s')
             read = os.read(self._from, 1 << 16)
             if not read:
                 raise BrowserError('the browser has ended')
