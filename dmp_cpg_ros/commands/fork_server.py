@@ -44,6 +44,9 @@ OWN = {'OPENBLAS_NUM_THREADS': '1', 'PYTHONUNBUFFERED': '1'}
 threads of the algebra library would contend for the cores; what nodes say is read at once.
 """
 
+ANSWERS_WITHIN_S = 120.0
+"""How long a request may take [s], the server's imports included."""
+
 TITLE_BYTES = 4000
 """Room for the command line that ``ps`` shows [bytes]."""
 
@@ -102,6 +105,7 @@ class ForkServer:
         """Start the server, in a working folder."""
         _prctl(PR_SET_CHILD_SUBREAPER, 1)
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.settimeout(ANSWERS_WITHIN_S)
         with theirs:
             self._server = subprocess.Popen(
                 [sys.executable, '-W', 'ignore::DeprecationWarning:__main__',  # of the tracer
@@ -126,12 +130,17 @@ class ForkServer:
         Raises
         ------
         OSError
-            If it cannot, because the server has ended perhaps.
+            If it cannot, because the server has ended perhaps or does not answer.
         """
         wanted = os.environ if environment is None else environment
         request = json.dumps([list(command), {**OWN, **wanted}]).encode()
-        socket.send_fds(self._socket, [request], [output, errors])
-        if answer := self._socket.recv(64):
+        try:
+            socket.send_fds(self._socket, [request], [output, errors])
+            answer = self._socket.recv(64)
+        except TimeoutError:
+            raise TimeoutError(f'the fork server does not answer within {ANSWERS_WITHIN_S:g} s'
+                               ) from None
+        if answer:
             return Forked(int(answer))
         raise ChildProcessError('the fork server has ended')
 

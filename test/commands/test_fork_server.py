@@ -86,3 +86,11 @@ def test_a_server_that_has_ended_says_so() -> None:
         pass
     with pytest.raises(OSError):
         ended.start(NODE)
+
+
+def test_a_server_that_does_not_answer_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fork_server, 'ANSWERS_WITHIN_S', 0.2)
+    with ForkServer() as stopped:
+        os.kill(stopped._server.pid, signal.SIGSTOP)
+        with pytest.raises(TimeoutError, match='does not answer'):
+            stopped.start(NODE)
