@@ -97,7 +97,7 @@ class Blocks:
         past = self._count + len(block.stamp)
         if not self._kept or past > len(self._kept[-1].stamp):
             self._trim()
-            rows = AT_ONCE << min(len(self._kept), 6)
+            rows = AT_ONCE << min(len(self._kept), 4)
             self._kept.append(Block(*(_mapped(rows, of) for of in block)))
             self._count, past = 0, len(block.stamp)
         for mine, of in zip(self._kept[-1], block, strict=True):
@@ -108,6 +108,10 @@ class Blocks:
         """Return the large blocks."""
         self._trim()
         return self._kept
+
+    def forget_record_times(self) -> None:
+        """Give their memory back."""
+        self._kept = [of._replace(bag_ns=of.bag_ns[:0].copy()) for of in self.all()]
 
     def _trim(self) -> None:
         if self._kept:
@@ -151,6 +155,7 @@ class Topic:
     def __init__(self, name: str, fields: Sequence[str]) -> None:
         """Nothing has come."""
         self.fields, self._rows = fields, ROWS.get(name, '')
+        self._read = FIELDS[name] if self._rows else fields  # all of what seldom changes
         self.blocks: dict[tuple[tuple[str, ...], str], Blocks] = defaultdict(Blocks)
         self.statuses: list[tuple[str, StatusEvent]] = []
         self.text = ''
@@ -173,13 +178,23 @@ class Topic:
             self.skipped[topic] += count
 
     def joined(self, values: int = 0) -> Block:
-        """All messages in the order of their record times, with so many numbers of each."""
+        """All messages in the order of their record times; with so many numbers of each, which
+        the topic then has no more.
+        """
         blocks = [block for of in self.blocks.values() for block in of.all()]
         bag_ns, stamp = (np.concatenate([np.empty(0, np.int64), *(of[k] for of in blocks)])
                          for k in (0, 1))
-        order = np.argsort(bag_ns, kind='stable')
-        numbers = np.concatenate([np.empty((0, values)), *(of.values for of in blocks if values)])
-        return Block(bag_ns[order], stamp[order], numbers[order] if values else numbers)
+        numbers = np.empty((len(stamp), values))
+        if values:
+            self.blocks.clear()
+            row = 0
+            while blocks:  # what is copied is given back at once
+                of = blocks.pop(0).values
+                numbers[row : row + len(of)] = of
+                row += len(of)
+        if (np.diff(bag_ns) >= 0).all():
+            return Block(bag_ns, stamp, numbers)
+        return _cut(Block(bag_ns, stamp, numbers), np.argsort(bag_ns, kind='stable'))
 
     def _take_numbers(self, kind: str, bag_ns: NDArray[np.int64], raws: Sequence[bytes]) -> int:
         """Take numbers; returns of how many messages."""
@@ -200,6 +215,9 @@ class Topic:
                     _changes_of(block._replace(values=block.values[..., rare])))
                 block = block._replace(values=block.values[..., ~rare])
                 key = tuple(np.array(names)[~rare]), ''
+            if len(self.fields) < len(self._read):
+                fields = [self._read.index(of) for of in self.fields]
+                block = block._replace(values=block.values[:, fields])
             if key[0] or not names:
                 self.blocks[key].add(block)
         return taken
@@ -212,8 +230,8 @@ class Topic:
             return ((), ''), np.concatenate(columns or [np.empty((count, 0))], axis=1)
         names = group.first.name
         kept = [k for k, name in enumerate(names) if name.startswith(self._rows)]
-        values = np.full((count, len(self.fields), len(kept)), np.nan)
-        for k, field in enumerate(self.fields):
+        values = np.full((count, len(self._read), len(kept)), np.nan)
+        for k, field in enumerate(self._read):
             if len(getattr(group.first, field)) == len(names):  # a message may leave a field out
                 values[:, k] = group.numbers(field)[:, kept]
         return (tuple(names[k] for k in kept), group.first.header.frame_id), values
@@ -341,8 +359,10 @@ def _on_robot_clock(topics: Mapping[str, Topic]) -> Block:
 
 def _rows(block: Block, widths: Sequence[int]) -> list[Array]:
     """Times and columns in the order of the stamps; of one stamp the last counts."""
-    stamps, last = np.unique(block.stamp[::-1], return_index=True)
-    values = block.values[::-1][last].reshape(-1, sum(widths))
+    stamps, values = block.stamp, block.values.reshape(-1, sum(widths))
+    if (np.diff(stamps) <= 0).any():
+        stamps, last = np.unique(stamps[::-1], return_index=True)
+        values = values[::-1][last]
     return [stamps / 1e9, *np.split(values, np.cumsum(widths)[:-1], axis=1)]
 
 
@@ -356,10 +376,17 @@ def _table(topic: Topic, names: Sequence[str]) -> list[Array]:
     """
     groups = {key: topic.blocks.pop(key).all() for key in list(topic.blocks)
               if set(names) & set(key[0])}
-    stamps = np.unique(np.concatenate(
-        [np.empty(0, np.int64), *(of.stamp for blocks in groups.values() for of in blocks)]))
+    stamps = np.empty(0, np.int64)
+    for blocks in groups.values():
+        own = np.concatenate([of.stamp for of in blocks])
+        if not (np.diff(own) > 0).all():
+            own = np.unique(own)
+        if not np.array_equal(own, stamps):
+            stamps = np.union1d(stamps, own) if stamps.size else own
     is_whole = len(groups) == 1 and set(names) <= set(next(iter(groups))[0])
-    table = [np.empty((len(stamps), len(names))) for _ in topic.fields]
+    held_fields = next((blocks[0].values.shape[1] for blocks in groups.values()),
+                       len(topic.fields))
+    table = [np.empty((len(stamps), len(names))) for _ in range(held_fields)]
     for values in table:
         if not is_whole:
             values[:] = np.nan
@@ -429,12 +456,18 @@ def _feet(topic: Topic) -> recording.FootForceSeries:
 
 
 def _arrivals(topics: Mapping[str, Topic]) -> recording.ArrivalSeries:
-    states, targets = topics['joint_states'].joined(), topics['joint_targets'].joined()
-    known, last = np.unique(targets.stamp[::-1], return_index=True)
-    answer = np.full(len(states.stamp), np.nan)
-    if known.size:
-        row = np.minimum(np.searchsorted(known, states.stamp), known.size - 1)
-        answer = np.where(known[row] == states.stamp, targets.bag_ns[::-1][last][row], np.nan)
+    states = topics['joint_states'].joined()
+    known, row = np.unique(states.stamp, return_inverse=True)
+    last = np.full(len(known) + 1, -np.inf)  # the last is of targets without a state
+    for blocks in topics['joint_targets'].blocks.values():
+        for of in blocks.all() if known.size else ():
+            at = np.searchsorted(known, of.stamp)
+            at[known[np.minimum(at, len(known) - 1)] != of.stamp] = -1
+            np.maximum.at(last, at, of.bag_ns)
+    for topic in ('joint_states', 'joint_targets'):
+        for blocks in topics[topic].blocks.values():
+            blocks.forget_record_times()
+    answer = np.where(np.isfinite(last), last, np.nan)[row]
     return recording.ArrivalSeries(states.stamp / 1e9, states.bag_ns / 1e9, answer / 1e9)
 
 

@@ -4,7 +4,8 @@
 
 from __future__ import annotations
 
-from functools import reduce
+from collections.abc import Callable
+from functools import partial, reduce
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,9 @@ from dmp_cpg_ros.analysis.recording import (
 from dmp_cpg_ros.core.robot_model import world
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 
+BLOCK = 1 << 16
+"""Rows that are worked on at a time."""
+
 
 def rotations(quaternion: Array) -> Array:
     """Rotation matrices R_world_base of quaternions x, y, z, w: (n, 4) → (n, 3, 3)."""
@@ -35,21 +39,37 @@ def rotations(quaternion: Array) -> Array:
 
 def roll_pitch_yaw(quaternion: Array) -> Array:
     """Angles about x, y, z in the order yaw, pitch, roll; yaw unwrapped: (n, 4) → (n, 3) [rad]."""
+    angles = _in_blocks(_angles, quaternion)
+    angles[:, 2] = np.unwrap(angles[:, 2])
+    return angles
+
+
+def rotated(quaternion: Array, vector: Array) -> Array:
+    """Vectors of the base in the world: (n, 4), (n, 3) → (n, 3)."""
+    return _in_blocks(lambda of, v: np.einsum('nij,nj->ni', rotations(of), v), quaternion, vector)
+
+
+def _angles(quaternion: Array) -> Array:
     R = rotations(quaternion)
-    roll = np.arctan2(R[:, 2, 1], R[:, 2, 2])
-    pitch = -np.arcsin(np.clip(R[:, 2, 0], -1.0, 1.0))
-    yaw = np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0]))
-    return np.stack([roll, pitch, yaw], axis=1)
+    return np.stack([np.arctan2(R[:, 2, 1], R[:, 2, 2]),
+                     -np.arcsin(np.clip(R[:, 2, 0], -1.0, 1.0)),
+                     np.arctan2(R[:, 1, 0], R[:, 0, 0])], axis=1)
+
+
+def _in_blocks(of_rows: Callable[..., Array], *values: Array) -> Array:
+    """A function of rows for all of them, some at a time: an hour's matrices take much memory."""
+    starts = range(0, max(len(values[0]), 1), BLOCK)
+    return np.concatenate([of_rows(*(of[k : k + BLOCK] for of in values)) for k in starts])
 
 
 def tilt(quaternion: Array) -> Array:
     """Angle between the base's z axis and the vertical, ndarray (n,) [rad]."""
-    return np.arccos(np.clip(rotations(quaternion)[:, 2, 2], -1.0, 1.0))
+    return _in_blocks(lambda of: np.arccos(np.clip(rotations(of)[:, 2, 2], -1.0, 1.0)), quaternion)
 
 
 def velocity_in_world(odometry: OdometrySeries) -> Array:
     """Velocity of the base, ndarray (n, 3) [m/s]."""
-    return np.einsum('nij,nj->ni', rotations(odometry.quaternion), odometry.velocity_in_base)
+    return rotated(odometry.quaternion, odometry.velocity_in_base)
 
 
 def velocity_in_heading(odometry: OdometrySeries) -> Array:
@@ -57,15 +77,18 @@ def velocity_in_heading(odometry: OdometrySeries) -> Array:
 
     This is the frame in which v is commanded: pitching and rolling do not leak into it.
     """
-    v = velocity_in_world(odometry)
-    yaw = roll_pitch_yaw(odometry.quaternion)[:, 2]
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.stack([c * v[:, 0] + s * v[:, 1], -s * v[:, 0] + c * v[:, 1], v[:, 2]], axis=1)
+    def turned(quaternion: Array, velocity: Array, yaw: Array) -> Array:
+        v, c, s = rotated(quaternion, velocity), np.cos(yaw), np.sin(yaw)
+        return np.stack([c * v[:, 0] + s * v[:, 1], -s * v[:, 0] + c * v[:, 1], v[:, 2]], axis=1)
+
+    return _in_blocks(turned, odometry.quaternion, odometry.velocity_in_base,
+                      roll_pitch_yaw(odometry.quaternion)[:, 2].copy())
 
 
 def yaw_rate(odometry: OdometrySeries) -> Array:
     """Turn rate about the vertical, ndarray (n,) [rad/s]."""
-    return np.einsum('nj,nj->n', rotations(odometry.quaternion)[:, 2], odometry.rate_in_base)
+    return _in_blocks(lambda of, rate: np.einsum('nj,nj->n', rotations(of)[:, 2], rate),
+                      odometry.quaternion, odometry.rate_in_base)
 
 
 def held(time: Array, values: Array, at: ArrayLike) -> Array:
@@ -96,9 +119,21 @@ def smoothed(time: Array, values: Array, window: float) -> Array:
     index = np.arange(len(time))
     half = np.minimum(round(0.5 * window / float(np.median(np.diff(time)))),
                       np.minimum(index, index[::-1]))
-    running = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
-    width = (2 * half + 1).reshape(-1, *(1,) * (values.ndim - 1))
-    return (running[index + half + 1] - running[index - half]) / width
+    first, past, width, means = index - half, index + half + 1, 2 * half + 1, np.empty_like(values)
+    for place in np.ndindex(values.shape[1:]):
+        at = (slice(None), *place)
+        running = np.concatenate([[0.0], np.cumsum(values[at])])
+        means[at] = (running[past] - running[first]) / width
+    return means
+
+
+def thinned(time: Array, value: Array, most: int) -> tuple[Array, Array]:
+    """Line of at most so many points, with the extremes of what is left out: (n,), (n,)."""
+    if len(time) <= most:
+        return time, value
+    parts = np.array_split(np.arange(len(time)), most // 2)
+    rows = np.sort([part[pick(value[part])] for part in parts for pick in (np.argmin, np.argmax)])
+    return time[rows], value[rows]
 
 
 def root_mean_square(values: Array) -> list[float]:
@@ -169,12 +204,12 @@ ROWS_AT_ONCE = 100_000
 
 def _foot_slip(joints: JointSeries, odometry: OdometrySeries, feet: FootForceSeries,
                robot: RobotDescription, contact_force: float) -> Array:
-    R, dt = rotations(odometry.quaternion), np.diff(joints.time)[:, None]
+    dt = np.diff(joints.time)[:, None]
     slips = []
     for i, leg in enumerate(robot.legs):
         q, q_dot = (of[:, 3 * i : 3 * i + 3] for of in (joints.position, joints.velocity))
-        rate = np.einsum(
-            'nij,nj->ni', R, odometry.rate_in_base + shank_rate_in_base(leg, q, q_dot))
+        rate = rotated(odometry.quaternion,
+                       odometry.rate_in_base + shank_rate_in_base(leg, q, q_dot))
         rolling = leg.foot_radius * np.stack([rate[:, 1], -rate[:, 0]], axis=1)  # ω × (radius ẑ)
         rolled = 0.5 * (rolling[1:] + rolling[:-1]) * dt
         steps = np.hypot(*(np.diff(feet_in_world(leg, q, odometry)[:, :2], axis=0) - rolled).T)
@@ -185,8 +220,8 @@ def _foot_slip(joints: JointSeries, odometry: OdometrySeries, feet: FootForceSer
 
 def feet_in_world(leg: LegGeometry, q: Array, odometry: OdometrySeries) -> Array:
     """Places of a leg's foot, (n, 3) [m], of its joint angles (n, 3) and the base at each."""
-    return odometry.position_in_world + np.einsum(
-        'nij,nj->ni', rotations(odometry.quaternion), feet_in_base(leg, q))
+    return odometry.position_in_world + rotated(
+        odometry.quaternion, _in_blocks(partial(feet_in_base, leg), q))
 
 
 def feet_in_base(leg: LegGeometry, q: Array) -> Array:

@@ -44,7 +44,8 @@ def story(recording: Recording, metrics: Mapping[str, Any]) -> str:
     floor = low - 2.0 * LANE * (high - low)
     shapes = [*_shades(recording, low, high), *_promises(stops, low, (high - low) * LANE)]
     for name, (time, value) in lines.items():
-        points = ' '.join(f'{t:.3f},{v:.4f}' for t, v in zip(*_thinned(time, value), strict=True))
+        points = ' '.join(f'{t:.3f},{v:.4f}' for t, v in zip(
+            *motion.thinned(time, value, MOST_POINTS), strict=True))
         shapes.append(f'<polyline class="{name}" points="{points}"/>')
     ticks = ''.join(
         f'<span class="y" style="bottom:{100 * (v - floor) / (high - floor):.2f}%">{v:g}</span>'
@@ -73,15 +74,6 @@ def _steps(time: Array, value: Array, end: float) -> tuple[Array, Array]:
     if not len(time):
         return time, value
     return np.append(np.repeat(time, 2)[1:], end), np.repeat(value, 2)
-
-
-def _thinned(time: Array, value: Array) -> tuple[Array, Array]:
-    """Line of few points with the extremes of what is left out."""
-    if len(time) <= MOST_POINTS:
-        return time, value
-    parts = np.array_split(np.arange(len(time)), MOST_POINTS // 2)
-    rows = np.sort([part[pick(value[part])] for part in parts for pick in (np.argmin, np.argmax)])
-    return time[rows], value[rows]
 
 
 def _shades(recording: Recording, low: float, high: float) -> Iterable[str]:

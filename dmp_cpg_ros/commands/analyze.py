@@ -5,6 +5,8 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import ctypes
 import logging
 import os
 import sys
@@ -101,7 +103,12 @@ def analyze_run(
                          draw, report, tell)
 
 
-SHOWN = {'joint_targets': ('position',)}
+M_MMAP_THRESHOLD, LARGE = -3, 4 << 20
+"""Of mallopt(3), and arrays [bytes] whose memory goes back to the system when they do; otherwise
+what an hour's take in turn adds up.
+"""
+
+SHOWN = {'joint_targets': ('position',), 'canonical_state': ('position',)}
 """Fields that a report shows of topics of which it does not show all."""
 
 
@@ -140,6 +147,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _analyze(options: argparse.Namespace, _: RosArguments) -> int:
+    with contextlib.suppress(AttributeError, OSError):  # another C library than glibc
+        ctypes.CDLL(None).mallopt(M_MMAP_THRESHOLD, LARGE)
+
     def export(recording: Recording) -> None:
         for folder, write in ((options.csv, write_csv), (options.parquet, write_parquet)):
             if folder is not None:

@@ -158,7 +158,7 @@ def _worked(cases: Sequence[tuple[str, int]], seed: int, tell: Callable[[Outcome
             worker.join()
 
 
-def fuzz(count: int, seed: int, kinds: Sequence[str] = samples.KINDS, jobs: int = 2,
+def fuzz(count: int, seed: int, kinds: Sequence[str] = samples.KINDS, workers: int = 2,
          tell: Callable[[Outcome], None] = lambda _: None) -> list[Outcome]:
     """Read mutated files.
 
@@ -170,7 +170,7 @@ def fuzz(count: int, seed: int, kinds: Sequence[str] = samples.KINDS, jobs: int 
         The same seed makes the same files.
     kinds : sequence of str
         Of :data:`~dmp_cpg_ros.studies.fuzz_samples.KINDS`.
-    jobs : int
+    workers : int
         Number of processes.
     tell : callable (outcome)
         Told of every file.
@@ -187,9 +187,9 @@ def fuzz(count: int, seed: int, kinds: Sequence[str] = samples.KINDS, jobs: int 
 
     cases = [(kinds[i % len(kinds)], i // len(kinds)) for i in range(count)]
     random.Random(seed).shuffle(cases)
-    with ThreadPoolExecutor(jobs) as pool:
+    with ThreadPoolExecutor(workers) as pool:
         list(pool.map(lambda share: _worked(share, seed, note),
-                      [cases[i::jobs] for i in range(jobs)]))
+                      [cases[i::workers] for i in range(workers)]))
     return outcomes
 
 
@@ -209,7 +209,9 @@ def table(outcomes: Sequence[Outcome]) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status: 1 when a file did anything else."""
-    parser = parser_of('fuzz_files', __doc__, 'every outcome that is wrong')
+    parser = parser_of('fuzz_files', __doc__, 'every outcome that is wrong', jobs=False)
+    parser.add_argument('--workers', '--jobs', type=at_least_one, default=2, metavar='N',
+                        help='processes (default: 2)')
     parser.add_argument('--count', type=at_least_one, default=20_000, help='number of files')
     parser.add_argument('--seed', type=int, default=0, help='default: 0')
     parser.add_argument('--kinds', nargs='+', choices=samples.KINDS, default=samples.KINDS)
@@ -223,7 +225,7 @@ def _study(options: argparse.Namespace, _: Any) -> int:
                   flush=True)
 
     began = time.monotonic()
-    outcomes = fuzz(options.count, options.seed, options.kinds, options.jobs, tell)
+    outcomes = fuzz(options.count, options.seed, options.kinds, options.workers, tell)
     wrong = [outcome for outcome in outcomes if not outcome.is_good]
     print(table(outcomes))
     print(f'\n{len(outcomes):,} files in {time.monotonic() - began:.0f} s, {len(wrong)} wrong; at '

@@ -14,13 +14,16 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.studies import fuzz_samples
-from dmp_cpg_ros.studies.fuzz_files import Outcome, fuzz, table
+from dmp_cpg_ros.studies.fuzz_files import Outcome, fuzz, main, table
 
 FILES_PER_KIND = 25
 
 
-def test_spoiled_files_are_taken_or_refused_in_one_line() -> None:
-    outcomes = fuzz(FILES_PER_KIND * len(fuzz_samples.KINDS), seed=11, jobs=2)
+def test_spoiled_files_are_taken_or_refused_in_one_line(
+        capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['--count', '5', '--kinds', 'csv', '--workers', '1']) == 0
+    assert '5 files' in capsys.readouterr().out
+    outcomes = fuzz(FILES_PER_KIND * len(fuzz_samples.KINDS), seed=11, workers=2)
     assert [outcome for outcome in outcomes if not outcome.is_good] == []
     for kind in fuzz_samples.KINDS:
         assert sum(outcome.kind == kind for outcome in outcomes) == FILES_PER_KIND

@@ -97,10 +97,10 @@ def speed_tracking(recording: Recording, context: RunContext) -> Figure | None:
         recording, 1.6 * len(columns) + 0.6, [SPEEDS[column] for column in columns])
     look: Any = {'color': style.MEASURED}
     for panel, k in zip(panels, columns, strict=True):
-        panel.plot(odometry.time, measured[:, k], alpha=0.28, linewidth=0.6, **look)
-        panel.plot(odometry.time, mean[:, k], linewidth=1.5, **look)
+        style.line(panel, odometry.time, measured[:, k], alpha=0.28, linewidth=0.6, **look)
+        style.line(panel, odometry.time, mean[:, k], linewidth=1.5, **look)
         panel.step(commands.time, commands.value[:, k], where='post', linewidth=1.0, **COMMANDED)
-        panel.plot(reference.time, reference.value[:, k], linewidth=1.0, **FILTERED)
+        style.line(panel, reference.time, reference.value[:, k], linewidth=1.0, **FILTERED)
     return style.legend(figure, [
         style.key('command', **COMMANDED), style.key('reference', **FILTERED),
         style.key('measured', linewidth=1.5, **look), *shades])
@@ -120,13 +120,13 @@ def attitude(recording: Recording, context: RunContext) -> Figure | None:
     figure, (tilts, heights, yaws), shades = style.time_panels(
         recording, 4.6, ('tilt [°]', 'height [cm]', 'yaw [°]'))
     style.plot_lines(tilts, odometry.time, angles[:, :2], COLOURS, linewidth=0.9)
-    heights.plot(odometry.time, height, color=style.VIOLET, linewidth=0.9)
-    yaws.plot(odometry.time, yaw, color=style.VIOLET)
+    style.line(heights, odometry.time, height, color=style.VIOLET, linewidth=0.9)
+    style.line(yaws, odometry.time, yaw, color=style.VIOLET)
     if context.robot is not None:
         heights.axhline(100.0 * context.robot.stance_height, linewidth=0.9, **ASKED_FOR)
     if reference.time.size > 1:
         turned = np.rad2deg(motion.integral(reference.time, reference.value[:, 2]))
-        yaws.plot(reference.time, turned + yaw[0], linewidth=0.9, **ASKED_FOR)
+        style.line(yaws, reference.time, turned + yaw[0], linewidth=0.9, **ASKED_FOR)
     return style.legend(figure, [
         *style.keys(('roll', 'pitch', 'height, yaw'), COLOURS),
         style.key('asked for', **ASKED_FOR), *shades])
@@ -147,7 +147,7 @@ def estimation(recording: Recording, context: RunContext) -> Figure | None:
     style.plot_lines(
         velocities, errors.time, 1e3 * errors.velocity_in_base, COLOURS, linewidth=0.7)
     style.plot_lines(tilts, errors.time, np.rad2deg(errors.tilt), COLOURS, linewidth=0.9)
-    yaws.plot(errors.time, np.rad2deg(errors.yaw), color=COLOURS[2])
+    style.line(yaws, errors.time, np.rad2deg(errors.yaw), color=COLOURS[2])
     return style.legend(figure, [*style.keys(('x, roll', 'y, pitch', 'z, yaw'), COLOURS), *shades])
 
 

@@ -20,7 +20,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.episodes import STOPPING, episodes, requested_stops
-from dmp_cpg_ros.analysis.motion import spans
+from dmp_cpg_ros.analysis.motion import spans, thinned
 from dmp_cpg_ros.analysis.recording import Array, Recording
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -29,6 +29,9 @@ Window = tuple[float, float]
 
 WIDTH = 7.2
 """Width of every figure [inch], that of a page."""
+
+MOST_POINTS = 20_000
+"""Points that are drawn of a line, more than can be told apart."""
 
 DPI = 200
 
@@ -115,11 +118,16 @@ def time_panels(recording: Recording, height: float, labels: Sequence[str],
     return figure, panels, shades
 
 
+def line(axes: Axes, time: Array, values: Array, **look: Any) -> None:
+    """Draw values (n,) over time (n,)."""
+    axes.plot(*thinned(time, values, MOST_POINTS), **look)
+
+
 def plot_lines(axes: Axes, time: Array, values: Array,
                colours: Iterable[str] = LEG_COLOURS.values(), **look: Any) -> None:
     """Draw a line per column of values (n, k) over time (n,), in the colours of the legs."""
     for colour, column in zip(colours, values.T, strict=False):
-        axes.plot(time, column, color=colour, **look)
+        line(axes, time, column, color=colour, **look)
 
 
 def leg_rows(axes: Axes) -> None:
