@@ -25,6 +25,7 @@ EXECUTABLES = (
     # The nodes, in the order of the data flow.
     'reference_filter', 'canonical_oscillators', 'inhibition', 'posture_control',
     'leg_transformation', 'mujoco_robot', 'bag_recorder', 'visualization',
+    'ros2_control_driver',
     # The commands.
     'walk', 'certify', 'analyze', 'learn', 'inspect_robot', 'robot_client', 'live_view',
     'composed_suite', 'study_stops', 'benchmark_walking', 'study_recovery',

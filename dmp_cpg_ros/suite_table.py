@@ -22,8 +22,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 
-LEG, POSTURE, ROBOT, RECORDER, VISUALIZATION = (
-    'leg_transformation', 'posture_control', 'mujoco_robot', 'bag_recorder', 'visualization')
+LEG, POSTURE, ROBOT, RECORDER, VISUALIZATION, DRIVER = (
+    'leg_transformation', 'posture_control', 'mujoco_robot', 'bag_recorder', 'visualization',
+    'ros2_control_driver')
 
 ABSOLUTE_TOPICS = ('/clock', '/diagnostics', '/tf', '/tf_static')
 """Topics that ROS names absolutely, once for all nodes of a domain."""
@@ -76,17 +77,20 @@ SUITE_TABLE: tuple[Kind, ...] = (
     _single(RECORDER, 'BagRecorder'),
     _single(VISUALIZATION, 'Visualization',
             LegParameters, core.GaitParameters, core.RobotFileParameters),
+    _single(DRIVER, 'Ros2ControlDriver',
+            core.DriveParameters, core.TickParameters, core.RobotFileParameters),
 )
 """All kinds of nodes in the order of the data flow; the robot comes last of those that walk, so
-that its first state finds everybody listening. After it come those that look on.
+that its first state finds everybody listening. After it come those that look on, and who stands
+for the robot where that is a real one.
 """
 
 KINDS: dict[str, Kind] = {kind.name: kind for kind in SUITE_TABLE}
 """The table by the name of the kind."""
 
 WALKING: tuple[Kind, ...] = tuple(
-    kind for kind in SUITE_TABLE if kind.name not in (RECORDER, VISUALIZATION))
-"""Kinds of nodes that walk: all but those that look on."""
+    kind for kind in SUITE_TABLE if kind.name not in (RECORDER, VISUALIZATION, DRIVER))
+"""Kinds of nodes that walk in simulation: all but those that look on."""
 
 RECORDED_WALK: tuple[str, ...] = (*(kind.name for kind in WALKING), RECORDER)
 """Names of the kinds that wait for one another where a walk is recorded."""

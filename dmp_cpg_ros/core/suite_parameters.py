@@ -116,7 +116,19 @@ class LegChoice(Parameters):
 
 
 @dataclass(frozen=True)
-class RobotParameters(Parameters):
+class DriveParameters(Parameters):
+    """How whatever moves the joints treats their targets."""
+
+    target_timeout: float = parameter(
+        0.2, "age of a leg's targets after which the fallback controller takes over", 0.01, 10.0,
+        unit='s')
+    target_lead: float = parameter(
+        0.0, 'time after its tick at which a target acts, for which it is computed', 0.0, 0.06,
+        unit='s')
+
+
+@dataclass(frozen=True)
+class RobotParameters(DriveParameters):
     """How the robot behind the port is run."""
 
     physics: str = parameter(
@@ -137,15 +149,9 @@ class RobotParameters(Parameters):
     initial_spread: float = parameter(
         0.0, 'joints start at the home pose plus a uniform draw from plus or minus this', 0.0, 0.3,
         unit='rad')
-    target_timeout: float = parameter(
-        0.2, "age of a leg's targets after which the fallback controller takes over", 0.01, 10.0,
-        unit='s')
     longest_lag: float = parameter(
         0.024, "real time: age of a leg's targets beyond which the simulation waits for newer "
         'ones, up to target_timeout of wall time; 0: it never waits', 0.0, 10.0, unit='s')
-    target_lead: float = parameter(
-        0.0, 'time after its tick at which a target acts, for which it is computed', 0.0, 0.06,
-        unit='s')
     viewer: bool = parameter(False, 'whether to open a window with the robot')
     fail: str = parameter(
         '', 'failure to inject when it is set, such as {component: imu, kind: stuck, for_s: 0.5}')

@@ -26,23 +26,19 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.scenario.fault import Fault, FaultInjector
 from dmp_cpg_ros.nodes.framework.certified import Sets
-from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers, RobotTiming
+from dmp_cpg_ros.nodes.framework.driven_robot import DrivenRobot
+from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers
 from dmp_cpg_ros.nodes.framework.parameters import NodeParameters
-from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.interfaces import BODY_TOPICS, Interface
 from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
-from dmp_cpg_ros.nodes.messages.values import header_ns, set_stamp, stamp_ns
+from dmp_cpg_ros.nodes.messages.values import set_stamp, stamp_ns
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.robot.port import Robot, RobotError
 from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.urdf import urdf
-from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT
-
-INCIDENT_NS = 1_000_000_000
-"""Time that all legs must have been heard for until their silence counts as over [ns]."""
 
 READY_PERIOD_S = 0.05
 """How often a lock-step robot without a gate asks whether its partners are there [s]."""
@@ -63,12 +59,8 @@ STATE_TOPICS = ('/clock', 'imu', 'ground_truth', 'foot_contacts', 'joint_states'
 it leads to runs before its publication ends.
 """
 
-RETREATS = {'stand': 'it takes up a stand', 'lie': 'it lowers itself onto its belly',
-            'damp': 'its joints are damped'}
-"""What the robot does by itself, in words."""
 
-
-class MujocoRobotNode(SuiteNode):
+class MujocoRobotNode(DrivenRobot):
     """Publishes the robot's state at every control tick and moves its joints to their targets."""
 
     KIND = ROBOT
@@ -79,20 +71,17 @@ class MujocoRobotNode(SuiteNode):
         self._options = self.parameters_of(core.RobotParameters)
         self._tick_ns = self.parameters_of(core.TickParameters).tick_ns
         self._robot = self._make_robot()
-        self._guard = self._new_guard()
         self._body_mode = 'standing' if self._options.start_pose == 'standing' else 'lying'
         names = self._robot.description.joint_names
-        self._timing, self._writer, self._reader = (
-            RobotTiming(), RobotStateWriter(names), conversions.JointTargetsReader(names))
+        self._writer = RobotStateWriter(names)
         self._state = self._robot.reset()
         self._fell, self._holding, self._open_until, self._waits = False, True, -1, 0
-        self._silent_ns = -1
         self._faults: FaultInjector | None = None
         self._arrived: dict[str, int] = {}
         work = () if self._state.joint_work is None else ('joint_work',)
         self._state_publishers = {name: self.publisher(name) for name in (*work, *STATE_TOPICS)}
         self.publisher('robot_description').publish(String(data=urdf(self._file)))
-        self._drive_mode, self._drive_publisher = '', self.publisher('drive_mode')
+        self.prepare_drive(self._robot.description, self._options)
         self.listen('joint_targets', self._on_targets)
         self.listen('body_mode', self._on_body_mode)
         self.listen('push', self._on_push, command=True)
@@ -108,7 +97,7 @@ class MujocoRobotNode(SuiteNode):
     def activate(self) -> None:
         """Begin with the first tick: at the gate, when all nodes are connected, or at once."""
         self._timer: Any = None
-        self._tell_drive('')
+        self.tell_drive('')
         if self._options.gated:
             self._hold()
         elif self.lock_step:
@@ -143,10 +132,6 @@ class MujocoRobotNode(SuiteNode):
             core.CANONICAL: name == 'foot_contacts' and options.contact_feedback,
         }
         return (*super().readers(topic), *self.outside(kind for kind in reads if reads[kind]))
-
-    def leg_of(self, joint: str) -> str:
-        """Leg of a joint by the robot's names."""
-        return self._reader.leg_of.get(joint, '')
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the robot has fallen or stands by itself."""
@@ -215,7 +200,7 @@ class MujocoRobotNode(SuiteNode):
         targets = self._guard.targets(self._state)
         if self._faults is not None:
             targets = self._faults.driven(targets)
-        self._watch_silence(now)
+        self.watch_silence(now)
         try:
             self._state = self._robot.step(targets)
         except RobotError as error:
@@ -227,37 +212,11 @@ class MujocoRobotNode(SuiteNode):
         if self._viewer is not None and self._viewer.is_running():
             self._viewer.sync()
 
-    def _watch_silence(self, now: int) -> None:
-        """Tell once that legs are silent, until all have been heard for a while."""
-        silent = self._guard.silent(now)
-        if any(self._guard.stamps):
-            self._tell_drive(self._guard.fallback)
-        if not silent:
-            if now - self._silent_ns > INCIDENT_NS:
-                self.clear('silent')
-        elif any(self._guard.stamps):
-            self._silent_ns = now
-            if not self.health.has_problem('silent'):
-                self.warn('silent', f'no targets from {", ".join(silent)} for '
-                          f'{self._options.target_timeout} s: the robot looks after itself: '
-                          f'{RETREATS[self._guard.fallback]}', error=True)
-
-    def _tell_drive(self, fallback: str) -> None:
-        """Say whether the joints follow the legs, or what the robot does by itself."""
-        mode = fallback or conversions.DRIVE_MODES[0]
-        if mode != self._drive_mode:
-            self._drive_mode = mode
-            self._drive_publisher.publish(String(data=mode))
-            if fallback == 'damp' and not self._fell:
-                self._fell = True
-                self.warn('fell', f'the robot fell at {self._state.time_ns * 1e-9:.3f} s while it '
-                          'looked after itself', error=True)
-
     def _start_over(self, time_ns: int, why: str) -> None:
         """Put the robot back when its simulation has diverged; time goes on."""
         self.warn('diverged', f'{why}; the robot is back in its start pose', error=True)
         self._state = self._robot.reset(time_ns)
-        self._guard = self._new_guard()
+        self.forget_targets()
 
     def _on_body_mode(self, message: Any) -> None:
         """Know when lying is no fall; a fall is over when the robot stands again."""
@@ -268,11 +227,7 @@ class MujocoRobotNode(SuiteNode):
         self._body_mode = mode
 
     def _on_targets(self, message: Any) -> None:
-        leg, targets = self._reader.read(message)
-        stamp, now = header_ns(message), self._state.time_ns
-        if stamp > now:
-            raise DataError(f'the stamp {stamp * 1e-9:.3f} s of {leg} is ahead of the clock, '
-                            f'{now * 1e-9:.3f} s')
+        leg, stamp, targets = self.read_targets(message)
         known: Collection[int | None] = self._guard.stamps
         if self._faults is None:
             self._guard.accept(leg, stamp, targets)
@@ -282,6 +237,7 @@ class MujocoRobotNode(SuiteNode):
             for message in self._faults.sent([(leg, stamp, targets)]):
                 self._guard.accept(*message)
         self._timing.arrived(stamp)
+        now = self._state.time_ns
         if self.lock_step and not self._holding and all(of == now for of in known):
             self._step()
             self._hold()
@@ -368,11 +324,6 @@ class MujocoRobotNode(SuiteNode):
         return True
 
     # Inside --------------------------------------------------------------------------------------
-
-    def _new_guard(self) -> CommandWatchdog:
-        p = self._options
-        return CommandWatchdog(self._robot.description, round(p.target_timeout * 1e9),
-                               round(p.target_lead * 1e9))
 
     @property
     def _file(self) -> Path:

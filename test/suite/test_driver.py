@@ -1,9 +1,12 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""A driver in the place of ``mujoco_robot`` that does what doc/how_to/hardware.md says."""
+"""The suite moves a robot through ros2_control's topics: a low-level interface at 500 Hz behind
+``ros2_control_driver``, as doc/how_to/hardware.md says. Time is the robot's: it waits for answers.
+"""
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -15,96 +18,146 @@ pytest.importorskip('mujoco')
 
 import ros_processes
 import yaml
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist
+from low_level import LowLevel
 from ros_processes import Processes, Ros
-from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, JointState
-from std_srvs.srv import SetBool
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
 
-from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.suite import load_suite
-from dmp_cpg_ros.suite_table import ROBOT, WALKING, WALKING_NODES
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, interface
+from dmp_cpg_ros.suite_table import DRIVER, ROBOT, WALKING, WALKING_NODES
 
 processes, ros, ros_domain = (
     ros_processes.processes, ros_processes.ros, ros_processes.ros_domain)
 
+TICK_NS = 4_000_000
 
-class Driver:
-    """A robot behind topics, with messages as anybody makes them."""
 
-    def __init__(self, ros: Ros) -> None:
-        suite = load_suite()
-        self.robot = MujocoRobot(suite.robot_file, suite.tick_ns, sensors=suite.sensors)
-        self.state = self.robot.reset()
-        node = self.node = ros.node
-        self.clock, self.imu, self.feet, self.joints = (
-            node.create_publisher(kind, name, 10) for kind, name in (
-                (Clock, '/clock'), (Imu, 'imu'), (JointState, 'foot_contacts'),
-                (JointState, 'joint_states')))
-        self.command = node.create_publisher(Twist, 'cmd_vel', 10)
-        self.targets: dict[str, JointState] = {}
-        self.speed = 0.0
-        node.create_subscription(JointState, 'joint_targets', self.take, 100)
+class Session:
+    """Suite, driver and robot, and what the test hears of them."""
 
-    def publish(self) -> None:
-        """One tick: all with one stamp, joint_states last."""
-        state, clock = self.state, Clock()
-        clock.clock.sec, clock.clock.nanosec = divmod(state.time_ns, 10**9)
-        self.clock.publish(clock)
-        imu = Imu()
-        imu.header.stamp, imu.header.frame_id = clock.clock, 'base_link'
-        imu.orientation_covariance[0] = -1.0
-        for vector, values in ((imu.angular_velocity, state.measured_rate_in_base),
-                               (imu.linear_acceleration, state.acceleration_in_base)):
-            vector.x, vector.y, vector.z = map(float, values)
-        self.imu.publish(imu)
-        feet = JointState(name=[f'{leg}_foot' for leg in LEGS], effort=state.foot_force.tolist())
-        joints = JointState(
-            name=list(JOINT_NAMES), position=state.joint_position.tolist(),
-            velocity=state.joint_velocity.tolist(), effort=state.joint_effort.tolist())
-        feet.header.stamp = joints.header.stamp = clock.clock
-        self.feet.publish(feet)
-        self.joints.publish(joints)
-        if state.time_ns % 100_000_000 == 0:
-            command = Twist()
-            command.linear.x = self.speed
-            self.command.publish(command)
+    def __init__(self, processes: Processes, ros: Ros, folder: Path,
+                 interfaces: tuple[str, ...]) -> None:
+        own: dict[str, Any] = {f'/**/leg_transformation_{leg}': {'ros__parameters': {'leg': leg}}
+                               for leg in LEGS}
+        expected = [kind.name for kind in WALKING if kind.name != ROBOT]
+        file = folder / 'my_suite.yaml'
+        file.write_text(yaml.safe_dump({'/**': {'ros__parameters': {
+            'expected_nodes': expected, 'start_mode': 'lying', 'gait': 'amble'}}, **own}),
+            encoding='utf-8')
+        self.suite = processes.executable(
+            'composed_suite', *(name for name in WALKING_NODES if name != ROBOT),
+            '--ros-args', '--params-file', str(file))
+        self.driver = processes.node(DRIVER, command_interfaces=list(interfaces))
+        self.ros, self.robot = ros, LowLevel(ros, interfaces)
+        self.answered = {leg: -1 for leg in LEGS}
+        self.heard: dict[str, str] = {}
+        self.stop: dict[str, str] = {}
+        node = ros.node
+        node.create_subscription(JointState, 'joint_targets', self._on_targets, 100)
+        for name in ('body_mode', 'drive_mode'):
+            node.create_subscription(String, name, self._hearing(name),
+                                     interface(name).reader_qos)
+        node.create_subscription(DiagnosticArray, 'inhibition_state', self._on_stop,
+                                 interface('inhibition_state').reader_qos)
+        self._command, self.speed = node.create_publisher(Twist, 'cmd_vel', 10), 0.0
+        self.commanded = self.silent = False
+        self._wanted_ns = -1
+        ros.spin_until(lambda: self.robot.matched
+                       and node.count_publishers('joint_targets') == len(LEGS), 90.0)
+        again = node.create_timer(0.5, self.robot.publish)       # until all have met
+        ros.spin_until(lambda: min(self.answered.values()) == 0, 90.0)
+        node.destroy_timer(again)
 
-    def take(self, message: JointState) -> None:
-        """Take the targets of one leg; those of all four at this tick make the next."""
+    def _hearing(self, name: str) -> Any:
+        return lambda message: self.heard.update({name: message.data})
+
+    def _on_targets(self, message: JointState) -> None:
         stamp = message.header.stamp
-        if stamp.sec * 10**9 + stamp.nanosec != self.state.time_ns:
-            return
-        self.targets[message.name[0][:2]] = message
-        if len(self.targets) == len(LEGS):
-            legs = [self.targets.pop(leg) for leg in LEGS]
-            self.state = self.robot.step(JointTargets(*(
-                np.concatenate([getattr(leg, what) for leg in legs])
-                for what in ('position', 'velocity', 'effort'))))
-            self.publish()
+        self.answered[message.name[0][:2]] = stamp.sec * 10**9 + stamp.nanosec
+
+    def _on_stop(self, message: DiagnosticArray) -> None:
+        status = message.status[0]
+        self.stop = {'state': status.message, **{entry.key: entry.value
+                                                 for entry in status.values}}
+
+    def run(self, seconds: float) -> None:
+        """Let the robot's time go on."""
+        robot, end = self.robot, self.robot.state.time_ns + round(seconds * 1e9)
+        while robot.state.time_ns < end:
+            robot.step()
+            now, taken = robot.state.time_ns, robot.taken
+            if now % 100_000_000 == 0:
+                command = Twist()
+                command.linear.x = self.speed
+                self._command.publish(command)
+            robot.publish()
+            if not self.silent:
+                tick = now - now % TICK_NS
+                self.ros.spin_until(lambda tick=tick: min(self.answered.values()) >= tick, 60.0)
+            if self.commanded:
+                self.ros.spin_until(lambda taken=taken: robot.taken > taken, 60.0)
+
+    def run_until(self, condition: Any, seconds: float) -> None:
+        """Let the robot's time go on until something holds; fails after so long."""
+        end = self.robot.state.time_ns + round(seconds * 1e9)
+        while not condition():
+            assert self.robot.state.time_ns < end, f"{self.heard} {self.stop}"
+            self.run(0.02)
+
+    @property
+    def at_rest(self) -> bool:
+        state = self.robot.state
+        return bool(np.abs(state.base_velocity_in_base).max() < 0.02
+                    and np.abs(state.base_rate_in_base).max() < 0.05)
 
 
-def test_a_driver_in_place_of_the_robot_walks_and_stops(
+def test_a_low_level_interface_walks_stops_and_is_left_alone_safely(
         processes: Processes, ros: Ros, tmp_path: Path) -> None:
-    own: dict[str, Any] = {f'/**/leg_transformation_{leg}': {'ros__parameters': {'leg': leg}}
-                           for leg in LEGS}
-    expected = [kind.name for kind in WALKING if kind.name != ROBOT]
-    file = tmp_path / 'my_suite.yaml'
-    file.write_text(yaml.safe_dump({
-        '/**': {'ros__parameters': {'expected_nodes': expected}}, **own}), encoding='utf-8')
-    processes.executable('composed_suite', *(name for name in WALKING_NODES if name != ROBOT),
-                         '--ros-args', '--params-file', str(file))
-    driver = Driver(ros)
-    ros.spin_until(lambda: driver.joints.get_subscription_count() >= 1
-                   and driver.node.count_publishers('joint_targets') == len(LEGS))
-    driver.node.create_timer(0.5, lambda: driver.targets or driver.publish())  # until all are met
-    ros.spin_until(lambda: driver.state.time_ns > 200_000_000, 120.0)
-    driver.speed = 0.4
-    ros.spin_until(lambda: driver.state.base_position_in_world[0] > 0.4, 120.0)
+    session = Session(processes, ros, tmp_path, COMMAND_INTERFACES)
+    robot = session.robot
+    session.run(0.1)
+    assert robot.taken == 0                                      # the dead man's switch is off
+    answer = ros.call(SetBool, f'{DRIVER}/enable', SetBool.Request(data=True))
+    assert answer.success, answer.message
+    session.commanded = True
+    before = robot.state.joint_position
+    session.run(0.02)
+    assert np.abs(robot.state.joint_position - before).max() < 0.2   # no jump
+    session.run_until(lambda: session.heard.get('drive_mode') == 'following', 6.0)
+    answer = ros.call(Trigger, 'stand_up', Trigger.Request())
+    assert answer.success, answer.message
+    session.run_until(lambda: session.heard.get('body_mode') == 'standing', 8.0)
+
+    session.speed = 0.4
+    start = robot.state.base_position_in_world[0]
+    session.run_until(lambda: robot.state.base_position_in_world[0] > start + 0.4, 6.0)
     answer = ros.call(SetBool, 'inhibit', SetBool.Request(data=True))
     assert answer.success and 'at rest in' in answer.message
-    then = driver.state.time_ns
-    ros.spin_until(lambda: driver.state.time_ns > then + 3_500_000_000, 120.0)
-    assert np.abs(driver.state.base_velocity_in_base).max() < 0.02
-    assert not driver.robot.fallen
+    session.run_until(lambda: isfinite(float(session.stop.get('measured_s', 'nan'))), 4.0)
+    predicted, bound, measured = (
+        float(session.stop[name]) for name in ('predicted_s', 'bound_s', 'measured_s'))
+    assert abs(measured - predicted) < 0.05 and measured <= bound
+    session.run(1.0)
+    assert session.at_rest and not robot.robot.fallen
+
+    assert ros.call(SetBool, 'inhibit', SetBool.Request(data=False)).success
+    session.run(1.5)
+    assert not session.at_rest
+    assert ros.call(SetBool, f'{DRIVER}/enable', SetBool.Request(data=False)).success
+    session.run_until(lambda: session.heard['drive_mode'] == 'stand', 1.0)
+    session.run(2.5)
+    assert session.at_rest and not robot.robot.fallen
+
+    assert ros.call(SetBool, f'{DRIVER}/enable', SetBool.Request(data=True)).success
+    session.run_until(lambda: session.heard['drive_mode'] == 'following', 6.0)
+    session.run(1.5)
+    assert not session.at_rest
+    session.suite.kill()
+    session.silent = True
+    session.run(3.0)
+    assert session.heard['drive_mode'] == 'stand'
+    assert session.at_rest and not robot.robot.fallen

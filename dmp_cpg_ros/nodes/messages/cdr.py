@@ -39,7 +39,7 @@ FIELDS = ('position', 'velocity', 'effort')
 """The arrays of a ``JointState``, in the order of its definition."""
 
 _STAMP, _HEADER, _COUNT = struct.Struct('<iI'), struct.Struct('<iII'), struct.Struct('<I')
-_TWIST, _IMU = struct.Struct('<6d'), struct.Struct('<104x3d72x3d72x')
+_TWIST, _IMU = struct.Struct('<6d'), struct.Struct('<5d64x3d72x3d72x')
 
 
 class Serialized:
@@ -130,16 +130,18 @@ class SerializedImu(Serialized):
 
     Attributes
     ----------
+    orientation : tuple of float
+        Quaternion x, y, z, w, and the first entry of its covariance: -1 where it is not known.
     rate, force : tuple of float
         Angular velocity [rad/s] and linear acceleration [m/s^2].
     """
 
-    __slots__ = ('force', 'rate')
+    __slots__ = ('force', 'orientation', 'rate')
     KIND = Imu
 
     def _read(self, at: int) -> None:
         numbers = _IMU.unpack_from(self.serialized, aligned(at, 8))
-        self.rate, self.force = numbers[:3], numbers[3:]
+        self.orientation, self.rate, self.force = numbers[:5], numbers[5:8], numbers[8:]
 
 
 class SerializedOdometry(Serialized):

@@ -28,15 +28,24 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import String
+from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
 from visualization_msgs.msg import MarkerArray
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.estimation.parameters import ESTIMATE, GROUND_TRUTH
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION, REFERENCE
 from dmp_cpg_ros.nodes.messages.transforms import TFMessage
-from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, RECORDER, ROBOT, VISUALIZATION
+from dmp_cpg_ros.suite_table import (
+    DRIVER,
+    KINDS,
+    LEG,
+    POSTURE,
+    RECORDER,
+    ROBOT,
+    VISUALIZATION,
+)
 
 PUBLISHER_DEPTH = 2000
 """Messages that a publisher of every tick keeps for readers that lag: 4 s at 500 Hz, more than the
@@ -50,6 +59,26 @@ RECORDER_DEPTH = 8000
 
 GATE_OWNER = ROBOT
 """The node that holds the gate; its private topics bear its name."""
+
+DRIVEN = ('joint_states', 'imu', 'foot_contacts', '/clock', 'drive_mode', 'joint_targets')
+"""What the driver of a real robot writes and reads in the place of ``ROBOT``."""
+
+JOINT_BROADCASTER, IMU_BROADCASTER = 'joint_state_broadcaster', 'imu_sensor_broadcaster'
+"""Broadcasters of ros2_control that the driver reads, by their usual names."""
+
+COMMAND_INTERFACES = ('position', 'velocity', 'effort', 'kp', 'kd')
+"""Command interfaces of joints that the driver can write, in the terms of ros2_control."""
+
+
+def foot_wrench(leg: str) -> str:
+    """Topic of the force_torque_sensor_broadcaster of a foot."""
+    return f'{leg}_foot_broadcaster/wrench'
+
+
+def commands_of(command_interface: str) -> str:
+    """Topic of the forward_command_controller of a command interface."""
+    return f'{command_interface}_controller/commands'
+
 
 FEELING = (CANONICAL, LEG, INHIBITION, POSTURE)
 """Kinds of nodes that can read the feet."""
@@ -220,6 +249,19 @@ TOPICS: tuple[Interface, ...] = (
     Interface('~/recorded', JointState,
               'how many messages (position) of each topic (names) are in the bag, at each flush',
               (RECORDER,), ('user',), latched=True, recorded=False),
+    Interface(f'{JOINT_BROADCASTER}/joint_states', JointState,
+              "a real robot's joints, in any order and at any rate", ('user',), (DRIVER,),
+              recorded=False),
+    Interface(f'{IMU_BROADCASTER}/imu', Imu,
+              "a real robot's IMU, with its orientation, in the axes of base_link",
+              ('user',), (DRIVER,), recorded=False),
+    *(Interface(foot_wrench(leg), WrenchStamped,
+                f"force on a real robot's foot {leg}; its size counts", ('user',), (DRIVER,),
+                recorded=False) for leg in LEGS),
+    *(Interface(commands_of(name), Float64MultiArray,
+                f'{name} of the twelve joints in the order of the robot file, once enabled',
+                (DRIVER,), ('user',), sometimes=(DRIVER,), recorded=False)
+      for name in COMMAND_INTERFACES),
 )
 """Topics of the suite."""
 
@@ -243,6 +285,9 @@ SERVICES: tuple[Interface, ...] = (
     Interface('lie_down', Trigger, 'stop the gait and lie down on the belly',
               (POSTURE,), ('user',)),
     Interface('recover', Trigger, 'after a fall: roll over and stand up', (POSTURE,), ('user',)),
+    Interface('~/enable', SetBool,
+              'true lets the driver command the joints; false stops following the legs, and the '
+              'robot looks after itself', (DRIVER,), ('user',)),
     Interface('~/ready', Trigger, 'whether the node is active and connected with its neighbours',
               tuple(KINDS), ('user',)),
 )
@@ -269,13 +314,17 @@ def interface(name: str) -> Interface:
 
 def published_by(kind: str) -> tuple[Interface, ...]:
     """Topics that a kind of node writes."""
-    return tuple(topic for topic in TOPICS if kind in topic.publishers)
+    return tuple(topic for topic in TOPICS if _is_among(kind, topic, topic.publishers))
 
 
 def read_by(kind: str) -> tuple[Interface, ...]:
     """Topics that a kind of node reads."""
     return RECORDED if kind == RECORDER else tuple(
-        topic for topic in TOPICS if kind in topic.subscribers)
+        topic for topic in TOPICS if _is_among(kind, topic, topic.subscribers))
+
+
+def _is_among(kind: str, topic: Interface, ends: Sequence[str]) -> bool:
+    return kind in ends or (kind == DRIVER and ROBOT in ends and topic.name in DRIVEN)
 
 
 def served_by(kind: str) -> tuple[Interface, ...]:

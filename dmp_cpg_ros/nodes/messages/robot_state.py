@@ -179,10 +179,7 @@ def read_odom(message: Odometry) -> BaseMotion:
     """Read an ``Odometry``; raises DataError, also for a quaternion that is no rotation."""
     pose, twist = message.pose.pose, message.twist.twist
     q = pose.orientation
-    quaternion = np.array((q.x, q.y, q.z, q.w))
-    norm = hypot(q.x, q.y, q.z, q.w)
-    if not abs(norm * norm - 1.0) < 0.01:
-        raise DataError(f'quaternion {quaternion} must have length 1')
+    quaternion = _rotation((q.x, q.y, q.z, q.w))
     position, velocity, rate = (
         checked(np.array((vector.x, vector.y, vector.z)), what) for vector, what in (
             (pose.position, 'position'), (twist.linear, 'linear velocity'),
@@ -201,3 +198,21 @@ def read_imu(message: Imu | cdr.SerializedImu) -> tuple[Array, Array]:
         of_rate, of_force = message.angular_velocity, message.linear_acceleration
         rate, force = (of_rate.x, of_rate.y, of_rate.z), (of_force.x, of_force.y, of_force.z)
     return sensed(np.array(rate)), sensed(np.array(force))
+
+
+def read_orientation(message: Imu | cdr.SerializedImu) -> Array | None:
+    """Quaternion x, y, z, w of an IMU, or None of one that knows none; raises DataError."""
+    if isinstance(message, cdr.SerializedImu):
+        *quaternion, unknown = message.orientation
+    else:
+        q, unknown = message.orientation, message.orientation_covariance[0]
+        quaternion = [q.x, q.y, q.z, q.w]
+    return None if unknown == -1.0 else _rotation(quaternion)
+
+
+def _rotation(quaternion: Sequence[float]) -> Array:
+    """Quaternion x, y, z, w, checked to be a rotation."""
+    norm = hypot(*quaternion)
+    if not abs(norm * norm - 1.0) < 0.01:
+        raise DataError(f'quaternion {list(quaternion)} must have length 1')
+    return np.array(quaternion)

@@ -1,0 +1,88 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What every node does that moves a robot's joints by ``joint_targets``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from std_msgs.msg import String
+
+from dmp_cpg_ros.core.errors import DataError
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
+from dmp_cpg_ros.core.suite_parameters import DriveParameters
+from dmp_cpg_ros.nodes.framework.health import RobotTiming
+from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
+from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
+
+INCIDENT_NS = 1_000_000_000
+"""Time that all legs must have been heard for until their silence counts as over [ns]."""
+
+RETREATS = {'stand': 'it takes up a stand', 'lie': 'it lowers itself onto its belly',
+            'damp': 'its joints are damped'}
+"""What the robot does by itself, in words."""
+
+
+class DrivenRobot(SuiteNode):
+    """Reads targets of the joints, watches their age, and says what the joints do."""
+
+    _state: RobotState
+    _guard: CommandWatchdog
+    _fell = False
+
+    def prepare_drive(self, description: RobotDescription, options: DriveParameters) -> None:
+        """Begin without targets; for ``configure``."""
+        self._description, self._drive_options = description, options
+        self._timing, self._reader = (
+            RobotTiming(), conversions.JointTargetsReader(description.joint_names))
+        self._drive_mode, self._drive_publisher = '', self.publisher('drive_mode')
+        self._silent_ns = -1
+        self.forget_targets()
+
+    def forget_targets(self) -> None:
+        """Begin with a new watchdog."""
+        p = self._drive_options
+        self._guard = CommandWatchdog(self._description, round(p.target_timeout * 1e9),
+                                      round(p.target_lead * 1e9))
+
+    def leg_of(self, joint: str) -> str:
+        """Leg of a joint by the robot's names."""
+        return self._reader.leg_of.get(joint, '')
+
+    def read_targets(self, message: Any) -> tuple[str, int, JointTargets]:
+        """Leg, stamp [ns] and targets of a message; raises DataError."""
+        leg, targets = self._reader.read(message)
+        stamp, now = header_ns(message), self._state.time_ns
+        if stamp > now:
+            raise DataError(f'the stamp {stamp * 1e-9:.3f} s of {leg} is ahead of the clock, '
+                            f'{now * 1e-9:.3f} s')
+        return leg, stamp, targets
+
+    def watch_silence(self, now: int) -> None:
+        """Tell once that legs are silent, until all have been heard for a while."""
+        silent = self._guard.silent(now)
+        if any(self._guard.stamps):
+            self.tell_drive(self._guard.fallback)
+        if not silent:
+            if now - self._silent_ns > INCIDENT_NS:
+                self.clear('silent')
+        elif any(self._guard.stamps):
+            self._silent_ns = now
+            if not self.health.has_problem('silent'):
+                self.warn('silent', f'no targets from {", ".join(silent)} for '
+                          f'{self._drive_options.target_timeout} s: the robot looks after itself: '
+                          f'{RETREATS[self._guard.fallback]}', error=True)
+
+    def tell_drive(self, fallback: str) -> None:
+        """Say whether the joints follow the legs, or what the robot does by itself."""
+        mode = fallback or conversions.DRIVE_MODES[0]
+        if mode != self._drive_mode:
+            self._drive_mode = mode
+            self._drive_publisher.publish(String(data=mode))
+            if fallback == 'damp' and not self._fell:
+                self._fell = True
+                self.warn('fell', f'the robot fell at {self._state.time_ns * 1e-9:.3f} s while it '
+                          'looked after itself', error=True)
