@@ -59,6 +59,7 @@ def test_a_bad_parameter_is_named_with_what_is_valid(processes: Processes, name:
         'mujoco_robot': ('control_rate', 333.0, 'whole microseconds'),
         'bag_recorder': ('storage', 'tape', 'mcap'),
         'visualization': ('drawing_rate', 0.0, '0.1'),
+        'ros2_control_driver': ('command_interfaces', '[torque]', 'position, velocity, effort'),
     }
     parameter, value, valid = bad[name]
     text = '.nan' if isinstance(value, float) and math.isnan(value) else str(value)

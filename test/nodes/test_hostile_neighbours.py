@@ -57,7 +57,7 @@ from dmp_cpg_ros.nodes.messages.robot_state import read_imu
 from dmp_cpg_ros.nodes.messages.values import set_stamp
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
-from dmp_cpg_ros.suite_table import KINDS
+from dmp_cpg_ros.suite_table import DRIVER, KINDS
 
 processes, ros, ros_domain = (
     ros_processes.processes,
@@ -544,7 +544,7 @@ def test_a_leg_tells_the_gait_that_it_follows(ros: Ros) -> None:
 
 def test_the_suite_walks_on_among_garbage(processes: Processes, ros: Ros) -> None:
     """All nodes in real time, and garbage on every topic ten times a second."""
-    kinds = [name for name in CONTROLLERS if name != 'leg_transformation']
+    kinds = [name for name in CONTROLLERS if name not in ('leg_transformation', DRIVER)]
     gated = {'mujoco_robot': {'gated': True}}
     nodes = [processes.node(kind, **gated.get(kind, {})) for kind in kinds]
     nodes += [processes.node('leg_transformation', leg=leg) for leg in LEGS]

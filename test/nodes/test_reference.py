@@ -20,8 +20,13 @@ from ros_processes import Processes, Ros, composed_suite
 from dmp_cpg_ros.commands import reference
 from dmp_cpg_ros.core.scenario.scenario import EVENT_KINDS
 from dmp_cpg_ros.nodes.framework.parameters import FOREIGN_PREFIXES
-from dmp_cpg_ros.nodes.messages.interfaces import SERVICES, TOPICS, Interface
-from dmp_cpg_ros.suite_table import KINDS, RECORDER, VISUALIZATION, instances
+from dmp_cpg_ros.nodes.messages.interfaces import (
+    COMMAND_INTERFACES,
+    SERVICES,
+    TOPICS,
+    Interface,
+)
+from dmp_cpg_ros.suite_table import DRIVER, KINDS, RECORDER, VISUALIZATION
 
 shared_domain, shared_ros = ros_processes.shared_domain, ros_processes.shared_ros
 
@@ -56,6 +61,7 @@ def suite(shared_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Itera
     with composed_suite(shared_domain, folder, **ALL_OF_IT) as started:
         started.node(RECORDER, output=str(folder / 'bag'))
         started.node(VISUALIZATION)
+        started.node(DRIVER, command_interfaces=list(COMMAND_INTERFACES))
         yield started
 
 
@@ -79,8 +85,10 @@ def test_the_graph_has_the_topics_of_the_reference_and_no_others(
 def test_every_node_has_the_services_of_the_reference_and_no_others(
         suite: Processes, shared_ros: Ros) -> None:
     private = {name for name in documented('services') if name.startswith('~')}
+    owned = {service.name: service.publishers for service in SERVICES}
     expected = {f'/{name}' for name in documented('services') - private} | {
-        entry.replace('~', f'/{name}') for _, name, _ in instances() for entry in private}
+        entry.replace('~', f'/{name}') for kind in KINDS.values() for name in kind.instances
+        for entry in private if kind.name in owned.get(entry, KINDS)}
     assert set(in_the_graph(SERVICES)) <= expected
 
     def found() -> set[str]:
@@ -94,7 +102,7 @@ def test_every_node_has_the_services_of_the_reference_and_no_others(
 def test_every_node_has_the_parameters_of_the_reference_and_no_others(
         suite: Processes, shared_ros: Ros) -> None:
     everything = set()
-    for kind, name, _ in instances():
+    for name, kind in {name: kind for kind in KINDS.values() for name in kind.instances}.items():
         answer = shared_ros.call(ListParameters, f'/{name}/list_parameters',
                                  ListParameters.Request())
         found = {each for each in answer.result.names if not each.startswith(FOREIGN_PREFIXES)}

@@ -105,7 +105,7 @@ class Session:
         """Let the robot's time go on until something holds; fails after so long."""
         end = self.robot.state.time_ns + round(seconds * 1e9)
         while not condition():
-            assert self.robot.state.time_ns < end, f"{self.heard} {self.stop}"
+            assert self.robot.state.time_ns < end, f'{self.heard} {self.stop}'
             self.run(0.02)
 
     def comes_to_rest(self, seconds: float) -> None:
