@@ -102,11 +102,11 @@ def test_every_node_has_the_services_of_the_reference_and_no_others(
 def test_every_node_has_the_parameters_of_the_reference_and_no_others(
         suite: Processes, shared_ros: Ros) -> None:
     everything = set()
-    for name, kind in {name: kind for kind in KINDS.values() for name in kind.instances}.items():
+    for name, of in {name: kind for kind in KINDS.values() for name in kind.instances}.items():
         answer = shared_ros.call(ListParameters, f'/{name}/list_parameters',
                                  ListParameters.Request())
         found = {each for each in answer.result.names if not each.startswith(FOREIGN_PREFIXES)}
-        assert found == set(reference.tables_of_parameters()[kind.name].fields), name
+        assert found == set(reference.tables_of_parameters()[of.name].fields), name
         everything |= found
     assert everything == documented('parameters')
 

@@ -1,0 +1,56 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Examples of the how-to pages name what there is, here and in the packages of others."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from checkout import ROOT
+
+from dmp_cpg_ros.configuration import parse_yaml
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS
+
+CONTROLLERS = {
+    'joint_state_broadcaster/JointStateBroadcaster': {
+        'use_local_topics', 'joints', 'extra_joints', 'interfaces', 'map_interface_to_joint_state',
+        'use_urdf_to_filter'},
+    'imu_sensor_broadcaster/IMUSensorBroadcaster': {
+        'sensor_name', 'frame_id', 'static_covariance_orientation',
+        'static_covariance_angular_velocity', 'static_covariance_linear_acceleration'},
+    'force_torque_sensor_broadcaster/ForceTorqueSensorBroadcaster': {
+        'sensor_name', 'frame_id', 'interface_names'},
+    'forward_command_controller/ForwardCommandController': {'joints', 'interface_name'},
+}
+"""Parameters of the controllers of ros2_controllers for Jazzy that the page uses, as their files
+``*_parameters.yaml`` declare them."""
+
+
+def example(page: str, first: str) -> str:
+    """The block of YAML of a page that begins with a name."""
+    text = (ROOT / 'doc' / 'how_to' / page).read_text(encoding='utf-8')
+    (block,) = (block for block in re.findall(r'```yaml\n(.*?)```', text, re.DOTALL)
+                if block.startswith(first))
+    return str(block)
+
+
+def test_the_controllers_of_the_hardware_page_are_those_that_the_driver_speaks_with() -> None:
+    pytest.importorskip('rclpy')
+    from dmp_cpg_ros.nodes.messages.interfaces import COMMAND_INTERFACES, commands_of, foot_wrench
+
+    content = parse_yaml(example('hardware.md', 'controller_manager'), 'hardware.md')
+    manager = content.pop('controller_manager')['ros__parameters']
+    assert manager.pop('update_rate') == 500
+    assert manager.keys() == content.keys()
+    for name, section in content.items():
+        given = section['ros__parameters']
+        assert given.keys() <= CONTROLLERS[manager[name]['type']], name
+        if 'joints' in given:
+            assert given['joints'] == list(JOINT_NAMES)
+            assert name == commands_of(given['interface_name']).partition('/')[0]
+    forwarded = {commands_of(name).partition('/')[0] for name in COMMAND_INTERFACES}
+    feet = {foot_wrench(leg).partition('/')[0] for leg in LEGS}
+    assert set(content) == {
+        'joint_state_broadcaster', 'imu_sensor_broadcaster', *forwarded, *feet}
+    assert content['joint_state_broadcaster']['ros__parameters'] == {'use_local_topics': True}
