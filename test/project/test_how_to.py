@@ -54,3 +54,15 @@ def test_the_controllers_of_the_hardware_page_are_those_that_the_driver_speaks_w
     assert set(content) == {
         'joint_state_broadcaster', 'imu_sensor_broadcaster', *forwarded, *feet}
     assert content['joint_state_broadcaster']['ros__parameters'] == {'use_local_topics': True}
+
+
+@pytest.mark.parametrize(('gait', 'column'), [('amble', 3), ('walk', 4), ('trot', 5)])
+def test_the_table_of_the_nav2_page_is_what_the_command_prints(gait: str, column: int) -> None:
+    pytest.importorskip('mujoco')
+    from dmp_cpg_ros.commands.nav2_limits import axis_limits
+    from dmp_cpg_ros.suite import load_suite
+
+    text = (ROOT / 'doc' / 'how_to' / 'nav2.md').read_text(encoding='utf-8')
+    rows = [line.split('|') for line in text.splitlines() if line.startswith('| `max_')]
+    told = [[float(value) for value in row[column].split(',')] for row in rows]
+    assert told == list(axis_limits(load_suite(None, {'gait': gait})))
