@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from xml.sax.saxutils import quoteattr
 
 from dmp_cpg_ros.nodes.messages import interfaces
-from dmp_cpg_ros.suite_table import KINDS, RECORDER, instances
+from dmp_cpg_ros.suite_table import KINDS, RECORDER
 
 ENCLAVE = '/dmp_cpg_ros'
 """Above the enclave of each node."""
@@ -29,6 +29,9 @@ LIFECYCLE_SERVICES = tuple(f'~/{name}' for name in (
     'get_transition_graph'))
 """Services that rclpy gives to every node, and to every managed one."""
 
+KIND_OF = {name: kind.name for kind in KINDS.values() for name in kind.instances}
+"""Kind of every node that there can be."""
+
 Rules = dict[tuple[str, str], set[str]]
 """Names by verb and kind, such as ``('publish', 'topic')``."""
 
@@ -42,8 +45,8 @@ def rules_of(kind: str) -> Rules:
             topic.name for topic in interfaces.read_by(kind))},
         ('reply', 'service'): {*PARAMETER_SERVICES, *LIFECYCLE_SERVICES, *(
             service.name for service in interfaces.served_by(kind))},
-        ('request', 'service'): {f'/{name}/get_parameters' for of, name, _ in instances()
-                                 if of.name not in (kind, RECORDER)}}
+        ('request', 'service'): {f'/{name}/get_parameters' for name, of in KIND_OF.items()
+                                 if of not in (kind, RECORDER)}}
 
 
 def rules_of_user() -> Rules:
@@ -57,7 +60,6 @@ def rules_of_user() -> Rules:
                           for name in KINDS[owner].instances}
         return found
 
-    nodes = [name for _, name, _ in instances()]
     return {
         ('publish', 'topic'): {'/rosout', '/parameter_events',
                                *named(interfaces.TOPICS, 'publishers')},
@@ -66,13 +68,13 @@ def rules_of_user() -> Rules:
         ('reply', 'service'): set(PARAMETER_SERVICES),
         ('request', 'service'): {
             *named(interfaces.SERVICES, 'subscribers'),
-            *(f'/{node}/{name[2:]}' for node in nodes
+            *(f'/{node}/{name[2:]}' for node in KIND_OF
               for name in ('~/change_state', '~/get_parameters', '~/set_parameters_atomically'))}}
 
 
 def policies() -> dict[str, Rules]:
     """Rules by the name of the node."""
-    return {**{name: rules_of(kind.name) for kind, name, _ in instances()},
+    return {**{name: rules_of(kind) for name, kind in KIND_OF.items()},
             PLAYER: rules_of_user()}
 
 

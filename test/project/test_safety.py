@@ -13,8 +13,8 @@ from checkout import ROOT
 pytest.importorskip('rclpy')
 
 from dmp_cpg_ros.commands import security_policy
-from dmp_cpg_ros.nodes.messages.interfaces import SERVICES, TOPICS
-from dmp_cpg_ros.suite_table import RECORDER, instances
+from dmp_cpg_ros.nodes.messages.interfaces import DRIVEN, SERVICES, TOPICS
+from dmp_cpg_ros.suite_table import DRIVER, KINDS, RECORDER, ROBOT
 
 PAGE = (ROOT / 'doc' / 'safety.md').read_text(encoding='utf-8')
 POLICY = ROOT / 'config' / 'security' / 'policy.xml'
@@ -41,9 +41,11 @@ def test_the_policy_is_that_of_the_tables() -> None:
 
 def test_each_node_may_do_what_the_tables_say_and_no_more() -> None:
     enclaves = ElementTree.parse(POLICY).getroot().findall('.//enclave')
+    nodes = [(kind, name) for kind in KINDS.values() for name in kind.instances]
     assert {of.get('path') for of in enclaves} == {
-        f'/dmp_cpg_ros/{name}' for name in ('scenario_player', *(n for _, n, _ in instances()))}
-    for kind, name, _ in instances():
+        f'/dmp_cpg_ros/{name}' for name in ('scenario_player', *(name for _, name in nodes))}
+    for kind, name in nodes:
+        stands_for = {kind.name: None, **({ROBOT: DRIVEN} if kind.name == DRIVER else {})}
         (profile,) = (of for enclave in enclaves if enclave.get('path') == f'/dmp_cpg_ros/{name}'
                       for of in enclave.findall('.//profile'))
 
@@ -53,9 +55,12 @@ def test_each_node_may_do_what_the_tables_say_and_no_more() -> None:
 
         ours = {topic.name for topic in TOPICS}
         assert allowed('topic', 'publish') & ours == {
-            topic.name for topic in TOPICS if kind.name in topic.publishers}
-        assert allowed('topic', 'subscribe') & ours == {topic.name for topic in TOPICS if (
-            topic.recorded if kind.name == RECORDER else kind.name in topic.subscribers)}
+            topic.name for topic in TOPICS for of, only in stands_for.items()
+            if of in topic.publishers and (only is None or topic.name in only)}
+        assert allowed('topic', 'subscribe') & ours == {
+            topic.name for topic in TOPICS for of, only in stands_for.items() if (
+                topic.recorded if kind.name == RECORDER else of in topic.subscribers)
+            and (only is None or topic.name in only)}
         assert allowed('service', 'reply') & {service.name for service in SERVICES} == {
             service.name for service in SERVICES if kind.name in service.publishers}
         assert not allowed('topic', 'publish') & {'cmd_vel', 'push', 'votes'}
