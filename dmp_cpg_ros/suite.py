@@ -87,7 +87,7 @@ def load_gaits(name: str | Path = 'gaits.yaml') -> dict[str, Gait]:
 def load_gait(name: str, file: str | Path = 'gaits.yaml') -> Gait:
     """Read one gait; raises ParameterError with the valid names when it is not there."""
     gaits = load_gaits(file)
-    if name not in gaits:
+    if not isinstance(name, str) or name not in gaits:
         raise ParameterError(f"there is no gait {shown(name)}; valid are {', '.join(gaits)}")
     return gaits[name]
 

@@ -85,7 +85,11 @@ def _main(options: argparse.Namespace, _: RosArguments) -> int:
                           for read in demonstrations]
     began = perf_counter()
     with naming(', '.join(map(str, options.demonstrations))):
-        primitive, errors = _learn(demonstrations, options)
+        try:
+            with np.errstate(over='raise', invalid='raise'):
+                primitive, errors = _learn(demonstrations, options)
+        except (FloatingPointError, np.linalg.LinAlgError):
+            raise DataError('its numbers are too large or too small to be learned') from None
     seconds = perf_counter() - began
     save_primitive(primitive, options.out)
     kind, time = (('discrete', f'duration {primitive.duration:.6g} s')

@@ -80,7 +80,7 @@ def two_sided(lag: NDArray[np.float64], duty: float, grid: int = 400) -> float:
     at = (np.arange(grid)[:, None] / grid - lag + 0.5) % 1.0 - 0.5
     left, right = (np.any((np.abs(at) > 0.5 * (1.0 - duty))[:, legs], axis=1)
                    for legs in ([0, 2], [1, 3]))
-    return float(np.sum(left & right) / np.sum(left | right))
+    return float(np.sum(left & right) / max(1, np.sum(left | right)))
 
 
 def planned_bounce(cycle_position: float, groups: int, duty: float, omega: float) -> Bounce:

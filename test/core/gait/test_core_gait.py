@@ -11,9 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.com_height import two_sided
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.suite import load_gait
 
 SCALE = BodyScale(0.28, 0.22)
 MIRRORED = [1, 0, 3, 2]  # fl with fr, rl with rr
@@ -116,3 +118,14 @@ def test_foot_speed_bounds_the_speed_of_every_foot(
 def test_impossible_gaits_are_refused(changes: dict[str, object], words: str) -> None:
     with pytest.raises(ParameterError, match=words):
         made(**changes)
+
+
+def test_feet_that_hardly_ever_stand_share_no_stance() -> None:
+    with np.errstate(all='raise'):
+        assert two_sided(np.array([0.1234, 0.2345, 0.3456, 0.4567]), 1e-6) == 0.0
+
+
+@pytest.mark.parametrize('name', ['gallop', ['trot'], None, 7, {}])
+def test_a_gait_that_there_is_not_is_refused_with_the_valid_names(name: object) -> None:
+    with pytest.raises(ParameterError, match='valid are amble'):
+        load_gait(name)  # type: ignore[arg-type]
