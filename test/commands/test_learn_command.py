@@ -241,7 +241,8 @@ def test_what_has_no_rhythm_is_refused(tmp_path, capsys):
 def test_a_movement_that_no_number_can_describe_is_refused_in_one_line(tmp_path, capfd):
     times = np.linspace(0.0, 1.0, 50)
     for size, duration in ((1e200, 1.0), (1e11, 1e-150), (1.0, 1e-200), (1e-300, 1e-170)):
-        np.save(tmp_path / 'odd.npy', np.column_stack([duration * times, size * np.sin(6 * times)]))
+        np.save(tmp_path / 'odd.npy',
+                np.column_stack([duration * times, size * np.sin(6.0 * times)]))
         out = str(tmp_path / 'out.yaml')
         assert main([str(tmp_path / 'odd.npy'), '--out', out]) == BAD_INPUT
         told = capfd.readouterr().err
