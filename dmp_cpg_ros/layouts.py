@@ -43,7 +43,7 @@ phase of its canonical system, 0 while it does not move the legs.
 """
 
 GAIN_ROWS = (*LEGS, 'region_radius', 'rest_phase', 'requested', 'at_rest', 'automatic',
-             'opposite', 'share')
+             'opposite', 'share', 'quickness')
 """Of ``inhibition_gains``: α_i [1/s] of each leg, r₀, the phase of fl at rest [rad], and four
 flags that are 0 or 1.
 """

@@ -270,7 +270,10 @@ class WalkingLoop:
 
     def time_to_rest(self) -> float:
         """Bound on the time to rest of a stop that is requested now [s]."""
-        return self.in_force().time_to_rest(self.network, self.x, self.r)
+        canon = self.canon
+        slow = self.canonical.gaits.at_cadence(canon.gait, canon.cadence_scale)
+        return self.in_force().time_to_rest(
+            self.network.of(slow), self.x, self.r, self.stop.quickness)
 
     def in_force(self) -> Running:
         """What runs, in the gait in force or in the change between two."""

@@ -15,10 +15,12 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_bound
 from dmp_cpg_ros.core.gait.contact_feedback import initial_contact_state
-from dmp_cpg_ros.core.gait.network import CanonicalParameters
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.running import CanonicalState
+from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
+from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
@@ -69,7 +71,7 @@ class InhibitionNode(SuiteNode):
         gaits = self.certified.gaits
         self._inbox, self._weight = VoteInbox(), description_of(self).mass * GRAVITY
         self._build()
-        self._network = self._running_gait.network(gaits.named(gait_name(self)))
+        self._network = self._slow = self._running_gait.network(gaits.named(gait_name(self)))
         self._votes = self._voting.initial_state(self._network)
         self._state = self._supervisor.initial_state(
             leg=self.parameters_of(CanonicalParameters).first_leg)
@@ -139,7 +141,7 @@ class InhibitionNode(SuiteNode):
         self._network = network = self._running_gait.network(gait)
         if not self._joined and not self._join(stamp_ns):
             return
-        before = self._state
+        self._slow, before = self._unhurried(gait), self._state
         self._body_mode, margins = values['posture_feedback'] or (self._body_mode, None)
         self._votes = self._voting.step(
             self._votes, stamp_ns, network, _vote_sensors(stamp_ns, values), self._x, self._r,
@@ -153,16 +155,26 @@ class InhibitionNode(SuiteNode):
         news = self._news() != self._told
         if news:
             self._publish()
-        if (news or self.lock_step or self._state.share != before.share
+        balance = (self._state.share, self._state.quickness)
+        if (news or self.lock_step or balance != (before.share, before.quickness)
                 or stamp_ns - self._told_ns >= HEARTBEAT_NS):
             self._publish_gains()
         if self.lock_step:
             self._memory.publish(
-                self._memory_writer.fill(stamp_ns, self._x, self._x_dot, gait, self._r))
+                self._memory_writer.fill(
+                    stamp_ns, self._x, self._x_dot, self._slow.gait, self._r))
         if self._blind:
             self._blind = ''
             self.clear('blind')
         self._watch_bound(stamp_ns)
+
+    def _unhurried(self, gait: GaitInForce) -> GaitNetwork:
+        """Oscillators at the cadence that a gait has but for the quickness that acts."""
+        quickness = self._acting.quickness
+        if quickness == 1.0:
+            return self._network
+        return self._network.of(
+            self.certified.gaits.at_cadence(gait, gait.cadence_scale / quickness))
 
     # Restarts, and what is missing -------------------------------------------------------------
 
@@ -233,7 +245,7 @@ class InhibitionNode(SuiteNode):
     def _acting_now(self) -> Acting:
         if self._x is None:
             return Acting()
-        return Acting(self._network.gait.cadence_scale, (self._network, self._acting, self._x))
+        return Acting(self._slow.gait.cadence_scale, (self._network, self._acting, self._x))
 
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop."""
@@ -290,8 +302,8 @@ class InhibitionNode(SuiteNode):
         """Look ahead to the rest or the walk that was just requested."""
         gait = self._network.gait
         canon = CanonicalState(
-            gait, self.certified.gaits.named(gait_name(self)), gait.cadence_scale, self._x,
-            self._x_dot, initial_contact_state())
+            gait, self.certified.gaits.named(gait_name(self)), self._slow.gait.cadence_scale,
+            self._x, self._x_dot, initial_contact_state())
         self._outlook = outlook = look_ahead(
             self._supervisor, self._reference, self._running_gait, self._state, self._acting,
             canon, self._r, self._gate.at(self._state.time_ns),
@@ -305,7 +317,8 @@ class InhibitionNode(SuiteNode):
         if self._state.requested and self._state.voted:
             self._bound = self._bound_by_votes()
         elif self._state.requested:
-            self._bound = running.time_to_rest(self._network, self._x, self._r)
+            self._bound = running.time_to_rest(
+                self._slow, self._x, self._r, self._state.quickness)
         else:
             self._bound = self.certified.certificate_in(gait).time_to_walking
         requested = self._state.requested and isfinite(self._bound)
@@ -316,8 +329,9 @@ class InhibitionNode(SuiteNode):
         of = self.parameters_of
         suite = SuiteParameters(reference=of(ReferenceParameters), leg=of(LegParameters),
                                 inhibition=self._supervisor.parameters)
-        return vote_bound(Setting.of(self._network, suite, of(TickParameters).tick_ns * 1e-9),
-                          self._supervisor.inhibition(replace(self._state, armed=True)).gains)
+        armed = self._supervisor.inhibition(replace(self._state, armed=True))
+        return time_to_slow(armed.quickness) + vote_bound(Setting.of(
+            self._slow, suite, of(TickParameters).tick_ns * 1e-9), armed.gains)
 
     # What is told ------------------------------------------------------------------------------
 

@@ -43,6 +43,8 @@ class InhibitionParameters(Parameters):
         'the robot stands again')
     caution: bool = parameter(
         True, 'whether a walking robot that is disturbed follows less of its command')
+    step_timing: bool = parameter(
+        True, 'whether a robot that is pushed steps faster until it has its balance again')
 
     def __post_init__(self) -> None:
         """Validate; at least one leg, none twice."""
@@ -99,6 +101,8 @@ class Inhibition:
         in all directions, so that what holds for one phase holds for each.
     share : float
         Share of the command that the reference follows, in (0, 1].
+    quickness : float
+        Factor on the cadence, at least 1.
     """
 
     requested: bool
@@ -109,6 +113,7 @@ class Inhibition:
     opposite: bool = False
     rest_phase: float = 0.0
     share: float = 1.0
+    quickness: float = 1.0
 
     def acting_gains(self, x: Array, target: Array) -> Array:
         """Gains that act at a state: α_i inside C_i and zero outside.

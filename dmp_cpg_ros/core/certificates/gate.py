@@ -29,13 +29,14 @@ from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.entry import eligible_legs
+from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
 
 UNCERTIFIED = frozenset(
-    ('auto_inhibit', 'auto_delay', 'push_recovery', 'caution', 'start_inhibited',
+    ('auto_inhibit', 'auto_delay', 'push_recovery', 'caution', 'step_timing', 'start_inhibited',
      'cmd_vel_timeout', 'allow_uncertified', 'auto_speeds', 'auto_hysteresis', *UNCERTIFIED_VOTES,
      *VOTE_SOURCES))
 """Parameters of certified nodes that no inequality depends on."""
@@ -89,17 +90,20 @@ class Running:
         """Whether the cadence that acts is not that of the parameters."""
         return self.acting_cadence not in (None, self.parameters.canonical.cadence_scale)
 
-    def time_to_rest(self, network: GaitNetwork, x: Array, r: Array) -> float:
+    def time_to_rest(self, network: GaitNetwork, x: Array, r: Array,
+                     quickness: float = 1.0) -> float:
         """Bound on the time to rest of a stop that is requested in a known state [s].
 
         Parameters
         ----------
         network : GaitNetwork
-            That acts.
+            That acts, at the cadence that it has without the quickness of a pushed robot.
         x, r : ndarray (4, 2), (3,)
             States and reference.
+        quickness : float
+            Factor on the cadence, which falls to 1 before inhibition is armed.
         """
-        return self.certificate().time_to_rest + later_arming(
+        return self.certificate().time_to_rest + time_to_slow(quickness) + later_arming(
             Setting.of(network, self.parameters, self.tick_s), x, r)
 
     def stop_distance(self, r: Array, command: tuple[float, float, float]) -> float:

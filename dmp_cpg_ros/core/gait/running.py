@@ -165,7 +165,8 @@ class CanonicalState:
     wanted : Gait
         The gait that was asked for last.
     cadence_scale : float
-        Factor on the cadence that acts; that of the parameters once it has arrived.
+        Factor on the cadence that acts, but for the quickness of a pushed robot; that of the
+        parameters once it has arrived.
     x, x_dot : ndarray (4, 2)
         States and rates of the oscillators.
     contact : ContactState
@@ -278,7 +279,7 @@ class RunningGait:
         wanted = state.wanted
         if self.choice.auto_gait:
             wanted = self.gaits.named(chosen_gait(self.choice, wanted.name, r, self.scale))
-        gait, cadence_scale = self._at_cadence(state, dt)
+        gait, cadence_scale = self._at_cadence(state, inhibition.quickness, dt)
         turns = inhibition.opposite and float(np.abs(state.x_dot).max()) <= AT_REST
         network, x = self._begin_change(
             self.network(gait), -state.x if turns else state.x, r, wanted, inhibition)
@@ -293,13 +294,13 @@ class RunningGait:
         x_dot = network.rate(x, r, inhibition, feedback)
         return CanonicalState(network.gait, wanted, cadence_scale, x, x_dot, contact)
 
-    def _at_cadence(self, state: CanonicalState, dt: float) -> tuple[GaitInForce, float]:
-        """Gait in force at a cadence nearer to that of the parameters."""
-        wanted, factor = self.parameters.cadence_scale, state.cadence_scale
-        if factor == wanted:
+    def _at_cadence(self, state: CanonicalState, quickness: float, dt: float
+                    ) -> tuple[GaitInForce, float]:
+        """Gait in force at a cadence nearer to that of the parameters, times the quickness."""
+        factor = approached(state.cadence_scale, self.parameters.cadence_scale, dt)
+        if factor * quickness == state.gait.cadence_scale:
             return state.gait, factor
-        factor = approached(factor, wanted, dt)
-        return self.gaits.at_cadence(state.gait, factor), factor
+        return self.gaits.at_cadence(state.gait, factor * quickness), factor
 
     def _begin_change(self, network: GaitNetwork, x: Array, r: Array, wanted: Gait,
                       inhibition: Inhibition) -> tuple[GaitNetwork, Array]:

@@ -58,6 +58,10 @@ def followed_share(share: float, margins: Sequence[float] | None, leg_length: fl
     regained = min(1.0, share + REGAIN * dt)
     if margins is None:
         return regained
+    return min(regained, max(LEAST, room(margins, leg_length, two_sided)))
+
+
+def room(margins: Sequence[float], leg_length: float, two_sided: float) -> float:
+    """Where the least margin [m] is from ``DISTURBED``, 0, to ``EASY``, 1, of a gait."""
     q = NARROW + (1.0 - NARROW) * min(1.0, two_sided / WIDE_STANCE)
-    room = (min(margins) / (q * leg_length) - DISTURBED) / (EASY - DISTURBED)
-    return min(regained, max(LEAST, room))
+    return (min(margins) / (q * leg_length) - DISTURBED) / (EASY - DISTURBED)

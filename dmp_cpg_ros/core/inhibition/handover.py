@@ -32,7 +32,7 @@ def adopted(acting: Inhibition, time_ns: int) -> SupervisorState:
         time_ns, word, stop, acting.automatic, time_ns, acting.at_rest,
         np.full(len(LEGS), 0.0 if acting.at_rest else 1.0),
         measured_s=0.0 if acting.at_rest else float('nan'), asked=stop,
-        leg=int(np.argmax(acting.gains)), rest_phase=acting.rest_phase)
+        leg=int(np.argmax(acting.gains)), rest_phase=acting.rest_phase, quickness=acting.quickness)
 
 
 class SilentStop:

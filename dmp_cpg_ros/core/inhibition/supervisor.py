@@ -27,6 +27,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.caution import followed_share
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, PushState, push_step
+from dmp_cpg_ros.core.inhibition.step_timing import quickened
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
 from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
 from dmp_cpg_ros.core.maths import Array
@@ -84,7 +85,7 @@ class SupervisorState:
     asked : bool
         Whether the service or ``auto_inhibit`` asks for the stop.
     voted : bool
-        Whether votes have overcome the threshold and hold the stop.
+        Whether votes hold the stop.
     vote_gains : ndarray (4,)
         Largest gains of the votes since then [1/s]: what holds the gait does not fade.
     tally : Tally
@@ -94,9 +95,9 @@ class SupervisorState:
     leg : int
         Leg that is inhibited where it is chosen.
     rest_phase : float
-        Phase of fl at which the gait is brought to rest [rad].
-    share : float
-        Share of the command that the reference follows.
+        Phase of fl at rest [rad].
+    share, quickness : float
+        Share of the command that the reference follows, and factor on the cadence.
     """
 
     time_ns: int
@@ -116,6 +117,7 @@ class SupervisorState:
     leg: int = 0
     rest_phase: float = 0.0
     share: float = 1.0
+    quickness: float = 1.0
 
     @property
     def in_force(self) -> bool:
@@ -158,7 +160,7 @@ class GaitSupervisor:
         """
         return Inhibition(state.in_force, self._gains(state, state.armed),
                           self.parameters.region_radius, state.state == 'at_rest', state.automatic,
-                          state.push.opposite, state.rest_phase, state.share)
+                          state.push.opposite, state.rest_phase, state.share, state.quickness)
 
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
         if not state.requested:
@@ -218,21 +220,23 @@ class GaitSupervisor:
             state = self._automatic(state, any(command))
         state = self._voted(state, tally or state.tally)
         state = self._pushed(state, network, x, margins, body_mode)
-        if self.parameters.caution:
-            state = self._cautious(state, margins, network, dt)
+        quick, state = state.quickness > 1.0, self._balancing(state, margins, network, dt)
         if state.requested:
-            return self._stopping(state, network, x, rates, speed)
+            return (replace_unchecked(state, armed=False, state='waiting') if quick
+                    else self._stopping(state, network, x, rates, speed))
         return self._running(state, network.phase_errors(x), speed)
 
-    @staticmethod
-    def _cautious(state: SupervisorState, margins: Sequence[float] | None, network: GaitNetwork,
-                  dt: float) -> SupervisorState:
-        """Follow less of the command while the body is disturbed."""
-        share = 1.0
-        if not (state.in_force or state.state == 'releasing'):
-            share = followed_share(
-                state.share, margins, network.scale.leg_length, dt, network.gait.two_sided)
-        return state if share == state.share else replace_unchecked(state, share=share)
+    def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
+                   network: GaitNetwork, dt: float) -> SupervisorState:
+        """Follow less of the command, and step faster, while the body is disturbed."""
+        p, of = self.parameters, (network.scale.leg_length, dt, network.gait.two_sided)
+        predicted = state.requested or state.state == 'releasing'
+        cautious = p.caution and not (predicted or state.push.acts)
+        share = followed_share(state.share, margins, *of) if cautious else 1.0
+        free = p.step_timing and (state.push.acts or not predicted)
+        quickness = quickened(state.quickness, margins if free else None, *of)
+        same = (share, quickness) == (state.share, state.quickness)
+        return state if same else replace_unchecked(state, share=share, quickness=quickness)
 
     def _automatic(self, state: SupervisorState, commanded: bool) -> SupervisorState:
         """Stop after a time of zero command, and start at a command."""

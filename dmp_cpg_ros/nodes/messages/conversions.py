@@ -26,6 +26,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
@@ -336,7 +337,7 @@ class InhibitionGainsWriter:
         return self._writer.fill(time_ns, np.array((
             *inhibition.gains, inhibition.region_radius, inhibition.rest_phase,
             inhibition.requested, inhibition.at_rest, inhibition.automatic, inhibition.opposite,
-            inhibition.share)))
+            inhibition.share, inhibition.quickness)))
 
 
 _LARGEST_GAIN = (range_of(InhibitionParameters, 'inhibition_gain')[1]
@@ -354,20 +355,24 @@ class InhibitionGainsReader:
     def read(self, message: AnyJointState) -> Inhibition:
         """Inhibition that is announced; raises DataError for numbers that no parameters allow."""
         (values,) = self._reader.read(message)
-        gains, (radius, rest, *flags, share) = values[:len(LEGS)], values[len(LEGS):].tolist()
+        gains, (radius, rest, *flags, share, quickness) = (
+            values[:len(LEGS)], values[len(LEGS):].tolist())
         if not (0.0 <= gains.min() and gains.max() <= _LARGEST_GAIN):
             raise DataError(f'gains {gains} must be from 0 to {_LARGEST_GAIN:g}')
         low, high = _RADII
         if not low <= radius <= high:
             raise DataError(f'region_radius = {radius} must be from {low:g} to {high:g}')
         if not {0.0, 1.0}.issuperset(flags):
-            raise DataError(f'{", ".join(layouts.GAIN_ROWS[-5:-1])} must be 0 or 1, not {flags}')
+            raise DataError(f'{", ".join(layouts.GAIN_ROWS[-6:-2])} must be 0 or 1, not {flags}')
         if not 0.0 <= rest <= 2.0 * pi:
             raise DataError(f'rest_phase = {rest} must be from 0 to 2 pi')
         if not 0.0 < share <= 1.0:
             raise DataError(f'share = {share} must be above 0 and at most 1')
+        if not 1.0 <= quickness <= QUICKEST:
+            raise DataError(f'quickness = {quickness} must be from 1 to {QUICKEST:g}')
         requested, at_rest, automatic, opposite = map(bool, flags)
-        return Inhibition(requested, gains, radius, at_rest, automatic, opposite, rest, share)
+        return Inhibition(requested, gains, radius, at_rest, automatic, opposite, rest, share,
+                          quickness)
 
 
 def read_votes(message: JointState) -> tuple[dict[str, float], str]:
