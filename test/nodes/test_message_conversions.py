@@ -317,11 +317,12 @@ def test_inhibition_state(time_ns: int, number: float, flag: bool) -> None:
 def test_inhibition_gains(time_ns: int, values: np.ndarray, requested: bool, rests: bool,
                           opposite: bool) -> None:
     gains = np.minimum(np.abs(values), 1000.0)
-    sent = Inhibition(requested, gains, 0.25, rests, opposite=opposite)
+    sent = Inhibition(requested, gains, 0.25, rests, opposite=opposite, share=0.5, quickness=1.75)
     message = wire(InhibitionGainsWriter().fill(time_ns, sent))
     read = InhibitionGainsReader().read(message)
     assert bits(read.gains, read.region_radius) == bits(gains, 0.25)
     assert (read.requested, read.at_rest, read.opposite) == (requested, rests, opposite)
+    assert (read.share, read.quickness) == (0.5, 1.75)
     assert header_ns(message) == time_ns
 
 

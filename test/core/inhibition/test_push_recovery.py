@@ -103,7 +103,7 @@ def test_a_push_during_a_stop_is_answered_too() -> None:
     run.loop.request(True)
     run.until('captured')
     body.margins = TO_THE_RIGHT
-    run.until('releasing')
+    run.until('releasing', 'stepping')
     assert not run.loop.stop.push.opposite
     run.go(0.5)
     body.margins = WIDE
@@ -115,8 +115,9 @@ def test_it_ends_whatever_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     run, body = resting()
     body.margins = TO_THE_LEFT
     run.go(12.0)
-    assert run.words().count('releasing') == MOST_RELEASES
-    assert run.loop.stop.state == 'at_rest'
+    acts = [tick.supervisor.push.acts for tick in run.ticks]
+    assert np.count_nonzero(np.diff(acts)) == 2 * MOST_RELEASES
+    assert run.loop.stop.push.releases == MOST_RELEASES and run.loop.stop.state == 'at_rest'
     body.margins = WIDE
     run.go(0.1)
     body.margins = TO_THE_LEFT

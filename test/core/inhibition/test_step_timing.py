@@ -1,0 +1,109 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A pushed robot steps faster; phases, stops and starts do not notice."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_core_supervisor import TICK, Run, walking
+from test_push_recovery import TO_THE_LEFT, resting, told
+
+from dmp_cpg_ros.core.balance.capture_point import WIDE
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.inhibition.caution import DISTURBED, EASY
+from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST, RISING, SLOWING, quickened
+
+FALLING = (1.0, 1.0, -1.0, 1.0)
+
+
+def pushed(**changes: object) -> Run:
+    """A run that walks as fast as a push makes it."""
+    run = walking(**changes)
+    told(run).margins = FALLING
+    return run.go(0.1)
+
+
+def test_the_factor_grows_as_the_least_margin_falls_and_is_never_beyond_its_bounds() -> None:
+    factors = [quickened(1.0, (1.0, m, 1.0, 1.0), 0.5, 1.0) for m in np.linspace(-0.5, 0.5)]
+    assert np.all(np.diff(factors) <= 0.0) and {min(factors), max(factors)} == {1.0, QUICKEST}
+    middle = 0.25 * (DISTURBED + EASY)
+    assert quickened(1.0, (middle,) * 4, 0.5, 1.0) == pytest.approx(0.5 * (1.0 + QUICKEST))
+    assert quickened(1.0, (EASY * 0.5,) * 4, 0.5, 1.0) == 1.0
+
+
+def test_it_rises_and_falls_at_its_rates() -> None:
+    assert quickened(1.0, FALLING, 0.3, 0.5 * RISING) == pytest.approx(0.5 * (1.0 + QUICKEST))
+    for margins in (None, WIDE):
+        assert quickened(QUICKEST, margins, 0.3, 0.1) == pytest.approx(QUICKEST - 0.1 * SLOWING)
+        assert quickened(QUICKEST, margins, 0.3, 10.0) == 1.0
+
+
+def test_who_is_not_pushed_does_not_notice() -> None:
+    run, without = walking(), walking(inhibition=InhibitionParameters(step_timing=False))
+    for of in (run, without):
+        of.go(1.0)
+    assert run.loop.stop.quickness == 1.0
+    assert np.array_equal(run.loop.x, without.loop.x)
+
+
+@pytest.mark.parametrize('gait', ['amble', 'trot'])
+def test_all_legs_go_faster_by_the_factor_and_keep_their_places(gait: str) -> None:
+    run = pushed(gait=gait)
+    assert run.loop.stop.quickness == QUICKEST
+    network = run.loop.network
+    slow = network.of(run.loop.canonical.gaits.named(gait))
+    assert network.omega(run.loop.r) == pytest.approx(QUICKEST * slow.omega(run.loop.r))
+    run.ticks.clear()
+    run.go(1.0)
+    errors = [np.abs(network.phase_errors(tick.x)).max() for tick in run.ticks]
+    radii = [np.hypot(*tick.x.T) for tick in run.ticks]
+    assert max(errors) < 1e-9 and np.ptp(radii) < 1e-3
+
+
+def test_without_the_parameter_the_cadence_stays() -> None:
+    run = pushed(inhibition=InhibitionParameters(step_timing=False))
+    assert run.loop.stop.quickness == 1.0 == run.loop.canon.gait.cadence_scale
+
+
+@pytest.mark.parametrize('gait', ['amble', 'trot'])
+@pytest.mark.parametrize('seconds', [2 * TICK, 0.1, 0.73])
+def test_a_stop_of_a_robot_that_is_pushed_comes_when_it_was_said(
+        gait: str, seconds: float) -> None:
+    """Whatever its margins are from then on, inhibition is armed at the cadence of the gait."""
+    run = walking(gait=gait, inhibition=InhibitionParameters(push_recovery=False))
+    told(run).margins = FALLING
+    run.go(seconds)
+    assert run.loop.stop.quickness > 1.0
+    bound, predicted = run.loop.time_to_rest(), run.loop.request(True)
+    run.ticks.clear()
+    run.until('at_rest')
+    assert run.loop.stop.measured_s == pytest.approx(predicted, abs=1e-9)
+    assert predicted <= bound
+    factors = [tick.supervisor.quickness for tick in run.ticks]
+    assert np.all(np.diff(factors) <= 0.0) and factors[-1] == 1.0
+    assert not any(tick.supervisor.armed and tick.gait.cadence_scale != 1.0 for tick in run.ticks)
+    predicted = run.loop.request(False)
+    run.until('walking', 'free')
+    assert run.loop.stop.measured_s == pytest.approx(predicted, abs=1e-9)
+
+
+def test_a_cadence_that_moves_and_the_factor_multiply_and_part_again() -> None:
+    run = pushed()
+    run.loop.change({'cadence_scale': 1.1})
+    run.go(0.3)
+    assert run.loop.canon.cadence_scale == 1.1
+    assert run.loop.canon.gait.cadence_scale == pytest.approx(1.1 * QUICKEST)
+    told(run).margins = WIDE
+    run.go(2.0)
+    assert run.loop.canon.gait.cadence_scale == 1.1
+
+
+def test_steps_out_of_a_rest_are_quick_too() -> None:
+    run, body = resting()
+    body.margins = TO_THE_LEFT
+    run.until('stepping')
+    assert run.loop.stop.quickness > 1.0
+    body.margins = WIDE
+    run.until('at_rest')
+    assert run.loop.stop.quickness == 1.0
