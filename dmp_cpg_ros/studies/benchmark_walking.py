@@ -3,12 +3,13 @@
 """Measures how the robot walks, from fixed seeds, and prints the tables of doc/results.md.
 
 speeds: steady velocities against the commanded ones. pushes: largest speed change survived, in
-eight directions at every phase. manoeuvres: falls by pushes at rest, while stopping, starting,
-changing gait and turning. unpushed: stops that nobody pushes against. rough: share of seeds that
-cross 5 m of rough ground. contacts: the same with and without the feedback of touchdown and the
-stumbling reflex. delays: targets that arrive late. gaits: every ordered pair of gaits changed
-while moving. robots: other robots, with their files alone; those of the extra `robots` are left
-out where it is not installed.
+eight directions at every phase. timing: falls by drawn pushes in other gaits, of other robots and
+on blocks too, with and without quicker steps. manoeuvres: falls by pushes at rest, while stopping,
+starting, changing gait and turning. unpushed: stops that nobody pushes against. rough: share of
+seeds that cross 5 m of rough ground. contacts: the same with and without the feedback of touchdown
+and the stumbling reflex. delays: targets that arrive late. gaits: every ordered pair of gaits
+changed while moving. robots: other robots, with their files alone; those of the extra `robots` are
+left out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """
@@ -78,6 +79,18 @@ OTHERS: tuple[tuple[str, trials.Velocity], ...] = (
 ROBOTS = tuple(f'robots/{name}.yaml' for name in
                ('mini_quadruped', 'mini_cheetah', 'go1', 'go2', 'aliengo'))
 """Robots by their files; all but the first need the extra ``robots``."""
+
+TIMED: tuple[dict[str, Any], ...] = (
+    *({'gait': gait, 'speed': speed} for gait, speed in (
+        ('amble', 0.5), ('trot', 0.5), ('trot', 1.5), ('walk', 0.5), ('pace', 0.5),
+        ('bound', 0.5))),
+    {'gait': 'amble', 'speed': 0.5, 'ground': 'blocks'},
+    *({'gait': 'trot', 'speed': 0.5, 'robot': f'robots/{name}.yaml'}
+      for name in ('mini_cheetah', 'go1', 'go2')))
+"""Walks that are pushed with and without quicker steps."""
+
+TIMED_CHANGES = (1.2, 2.0)
+"""Speed changes by their pushes [m/s]."""
 
 STOPPED = ('at rest', 'stopping')
 """Manoeuvres in which a stop is in force, and steps may catch a push."""
@@ -203,6 +216,25 @@ def pushes(workers: Workers, seeds: int, phases: int) -> Table:
     return Table(f'Pushes: speed change in m/s that is survived at every one of {phases} phases / '
                  'at half of them; times the mass it is the impulse in N s',
                  ('walking', *DIRECTIONS), rows, results)
+
+
+def timing(workers: Workers, seeds: int, phases: int) -> Table:
+    """Falls by drawn pushes, without and with quicker steps; as many pushes as ``phases``."""
+    walks = [walk for walk in TIMED if 'robot' not in walk or _is_there(walk['robot'])]
+    results = _run(workers, trials.caught, [
+        {**walk, 'speed_change': change, 'case': case, 'quick': quick}
+        for walk in walks for quick in (False, True) for change in TIMED_CHANGES
+        for case in range(phases)])
+    fell = [sum(not upright for _, upright in results[k:k + phases])
+            for k in range(0, len(results), phases)]
+    count = len(TIMED_CHANGES)
+    rows = [(f'{walk["gait"]} {walk["speed"]:g} m/s', Path(walk.get('robot', 'its own')).stem,
+             walk.get('ground', 'flat'), *(
+                 f'{fell[2 * count * k + i]} / {fell[2 * count * k + count + i]}'
+                 for i in range(count))) for k, walk in enumerate(walks)]
+    return Table(f'Falls of {phases} drawn pushes without / with quicker steps',
+                 ('walking', 'robot', 'ground', *(f'{change:g} m/s' for change in TIMED_CHANGES)),
+                 rows, [(case, {'upright': upright}) for case, upright in results])
 
 
 def manoeuvres(workers: Workers, seeds: int, phases: int) -> Table:
@@ -400,7 +432,7 @@ def _is_there(file: str) -> bool:
 
 
 TABLES = {make.__name__: make for make in (
-    speeds, pushes, manoeuvres, unpushed, rough, contacts, delays, gaits, robots)}
+    speeds, pushes, timing, manoeuvres, unpushed, rough, contacts, delays, gaits, robots)}
 """What can be measured."""
 
 

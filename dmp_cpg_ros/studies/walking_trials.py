@@ -374,6 +374,29 @@ def pushed(manoeuvre: str, speed_change: float, case: int, cases: int, drawn: bo
     return PushedOutcome(False, run.loop.stop.state == 'at_rest', releases, reference)
 
 
+@lru_cache(maxsize=1)
+def _steady(gait: str, speed: float, robot: str | None, ground: str, quick: bool) -> Walk:
+    world = WORLDS[ground](**({'height': 0.03, 'seed': 1} if ground == 'blocks' else {}))
+    run = Walk(gait, robot, world, values=(('step_timing', quick),))
+    run.settle((speed, 0.0, 0.0))
+    return run
+
+
+def caught(gait: str, speed: float, speed_change: float, case: int, quick: bool = True,
+           robot: str | None = None, ground: str = 'flat') -> bool:
+    """Whether a walk stays on its feet for ``RECOVERY`` after a push whose time in the cycle,
+    direction and duration are drawn from the case as seed; with steps that are quicker or not.
+    """
+    draw = np.random.default_rng(2000 + case)
+    run, angle = deepcopy(_steady(gait, speed, robot, ground, quick)), draw.uniform(0.0, 2.0 * pi)
+    duration = round(draw.uniform(*PUSH_DURATIONS), 3)
+    run.walk(draw.uniform(0.0, run.period()))
+    angle += float(_attitude([run.state])[0, 2])
+    force = run.robot.description.mass * speed_change / duration
+    run.robot.apply_push(force * np.array((cos(angle), sin(angle), 0.0)), round(duration * 1e9))
+    return run.walk(RECOVERY + duration)
+
+
 def unpushed(gait: str, speed: float, seed: int, kind: str, numbers: Mapping[str, float],
              payload: float = 0.0) -> PushedOutcome:
     """Stop from a speed [m/s] at a drawn time without a push, with a payload as share of the

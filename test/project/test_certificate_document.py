@@ -11,7 +11,7 @@ from core_examples import TICK, network, suite_parameters
 
 from dmp_cpg_ros.core.certificates.certify import certify
 
-CONDITIONS = {'in places', 'together', 'holding', 'prediction'}
+CONDITIONS = {'in places', 'together', 'holding', 'prediction', 'quickness'}
 
 
 def lines() -> list[list[str]]:
@@ -22,7 +22,7 @@ def lines() -> list[list[str]]:
 
 
 def test_the_proof_has_all_its_lines() -> None:
-    assert [int(line[0]) for line in lines()] == list(range(1, 24))
+    assert [int(line[0]) for line in lines()] == list(range(1, 25))
 
 
 def test_every_line_names_an_inequality_that_certify_prints_or_a_condition() -> None:
