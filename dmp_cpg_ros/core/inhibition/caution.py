@@ -58,10 +58,11 @@ def followed_share(share: float, margins: Sequence[float] | None, leg_length: fl
     regained = min(1.0, share + REGAIN * dt)
     if margins is None:
         return regained
-    return min(regained, max(LEAST, room(margins, leg_length, two_sided)))
+    room = (least(margins, leg_length, two_sided) - DISTURBED) / (EASY - DISTURBED)
+    return min(regained, max(LEAST, room))
 
 
-def room(margins: Sequence[float], leg_length: float, two_sided: float) -> float:
-    """Where the least margin [m] is from ``DISTURBED``, 0, to ``EASY``, 1, of a gait."""
+def least(margins: Sequence[float], leg_length: float, two_sided: float) -> float:
+    """The least of the margins [m] of a gait, in q l."""
     q = NARROW + (1.0 - NARROW) * min(1.0, two_sided / WIDE_STANCE)
-    return (min(margins) / (q * leg_length) - DISTURBED) / (EASY - DISTURBED)
+    return min(margins) / (q * leg_length)

@@ -13,10 +13,11 @@ a foot that comes earlier need not go as far (Khadiv, Herzog, Moosavian & Righet
 legs go through their cycles κ times as fast while the least margin m of the capture point in the
 support polygon is small,
 
-    κ = 1 + (QUICKEST − 1) (1 − sat(room)),   room = (m/(q l) − DISTURBED) / (EASY − DISTURBED)
+    κ = 1 + (QUICKEST − 1) (1 − sat(m / (DISTURBED q l))) ,
 
-with the room of :mod:`~dmp_cpg_ros.core.inhibition.caution`, which is 1 in undisturbed walking. κ
-rises within ``RISING`` and falls at ``SLOWING``: the steps after the next one are early too.
+with q as for :mod:`~dmp_cpg_ros.core.inhibition.caution`: from what standing legs can just bear to
+a capture point on the edge of the support. Steady walking has more room, but at limits of what is
+declared. κ rises within ``RISING`` and falls at ``SLOWING``: later steps are early too.
 
 ω is common to all oscillators. In the frame that turns with it nothing changes, so that phase
 relations stay, and what is certified of free legs holds for any ω(t). In a stop, and in a start
@@ -29,7 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dmp_cpg_ros.core.inhibition.caution import room
+from dmp_cpg_ros.core.inhibition.caution import DISTURBED, least
 
 QUICKEST = 2.5
 """Largest factor on the cadence: legs that swing faster come down no more where they are to."""
@@ -63,7 +64,7 @@ def quickened(quickness: float, margins: Sequence[float] | None, leg_length: flo
     slower = max(1.0, quickness - SLOWING * dt)
     if margins is None:
         return slower
-    left = min(max(room(margins, leg_length, two_sided), 0.0), 1.0)
+    left = min(max(least(margins, leg_length, two_sided) / DISTURBED, 0.0), 1.0)
     wanted = 1.0 + (QUICKEST - 1.0) * (1.0 - left)
     return max(slower, min(wanted, quickness + (QUICKEST - 1.0) * dt / RISING))
 

@@ -11,7 +11,7 @@ from test_push_recovery import TO_THE_LEFT, resting, told
 
 from dmp_cpg_ros.core.balance.capture_point import WIDE
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.inhibition.caution import DISTURBED, EASY
+from dmp_cpg_ros.core.inhibition.caution import DISTURBED
 from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST, RISING, SLOWING, quickened
 
 FALLING = (1.0, 1.0, -1.0, 1.0)
@@ -27,9 +27,9 @@ def pushed(**changes: object) -> Run:
 def test_the_factor_grows_as_the_least_margin_falls_and_is_never_beyond_its_bounds() -> None:
     factors = [quickened(1.0, (1.0, m, 1.0, 1.0), 0.5, 1.0) for m in np.linspace(-0.5, 0.5)]
     assert np.all(np.diff(factors) <= 0.0) and {min(factors), max(factors)} == {1.0, QUICKEST}
-    middle = 0.25 * (DISTURBED + EASY)
-    assert quickened(1.0, (middle,) * 4, 0.5, 1.0) == pytest.approx(0.5 * (1.0 + QUICKEST))
-    assert quickened(1.0, (EASY * 0.5,) * 4, 0.5, 1.0) == 1.0
+    half = quickened(1.0, (0.25 * DISTURBED,) * 4, 0.5, 1.0)
+    assert half == pytest.approx(0.5 * (1.0 + QUICKEST))
+    assert quickened(1.0, (0.5 * DISTURBED,) * 4, 0.5, 1.0) == 1.0
 
 
 def test_it_rises_and_falls_at_its_rates() -> None:
