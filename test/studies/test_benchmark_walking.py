@@ -73,6 +73,13 @@ def test_an_estimate_from_the_stamps_alone_misses_more_the_fewer_they_are() -> N
     assert 0.0 < missed[0] < 0.5 * missed[1]
 
 
+@pytest.mark.parametrize('quick', [False, True])
+def test_a_push_that_slow_steps_do_not_catch_is_caught_by_quicker_ones(quick: bool) -> None:
+    run = Walk('trot', values=(('step_timing', quick),))
+    assert run.reach((0.3, 0.0, 0.0))
+    assert survives(run, 0.5 * pi, 2.4) == quick
+
+
 def test_a_push_is_felt_and_a_blow_is_fatal() -> None:
     run = Walk('trot')
     assert run.reach((0.3, 0.0, 0.0))
