@@ -89,7 +89,7 @@ TIMED: tuple[dict[str, Any], ...] = (
       for name in ('mini_cheetah', 'go1', 'go2')))
 """Walks that are pushed with and without quicker steps."""
 
-TIMED_CHANGES = (1.2, 2.0)
+TIMED_CHANGES = (1.6, 2.4)
 """Speed changes by their pushes [m/s]."""
 
 STOPPED = ('at rest', 'stopping')
