@@ -54,6 +54,7 @@ class Oscillators(WalkingLoop):
         super().__init__(description, GAITS[case['gait']],
                          start.changed(case['parameters']).parameters, GAITS)
         self._dt, self._weaken, self.now_ns = case['tick_s'], weaken, 0
+        self._margins, self._pushed_until_ns = (np.inf,) * 4, 0
         nothing = np.full(3, np.nan)
         self._sensors = VoteSensors(0, 0, np.full(4, 0.25), nothing, nothing)
         self._leave_out_places()
@@ -85,6 +86,11 @@ class Oscillators(WalkingLoop):
             return self.in_force().certificate().time_to_rest
         return super().time_to_rest()
 
+    def push(self, margin: float, duration: float) -> None:
+        """Let the body be disturbed: the least margin of its capture point [m], for a time [s]."""
+        self._margins = (margin, *self._margins[1:])
+        self._pushed_until_ns = self.now_ns + round(duration * 1e9)
+
     def advance(self) -> None:
         """Run one tick of what the certificate speaks of."""
         self.now_ns += self.tick_ns
@@ -99,7 +105,8 @@ class Oscillators(WalkingLoop):
             self.stop.state in ('walking', 'free'), self.inbox.take())
         self.stop = self.supervisor.step(
             self.stop, self.now_ns, self.network, canon.x, canon.x_dot, self.r, command,
-            self.votes.tally)
+            self.votes.tally,
+            margins=self._margins if self.now_ns <= self._pushed_until_ns else None)
         self.inhibition = self.supervisor.inhibition(self.stop)
 
     @property
@@ -145,7 +152,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
         The robot.
     case : dict
         ``gait``, ``tick_s``, ``parameters`` by name, and ``events``: lists of a wait [s], a kind
-        (``stop``, ``start``, ``command``, ``set``, ``gait``, ``vote``) and a value.
+        (``stop``, ``start``, ``command``, ``set``, ``gait``, ``vote``, ``push``) and a value.
     weaken : str
         What is left out, one of ``CONDITIONS``.
     counts : Counter, optional
@@ -217,6 +224,8 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, fl
     elif kind == 'vote':
         loop.vote(value)
         return None
+    elif kind == 'push':
+        loop.push(*value)
     else:
         try:
             accepted = not loop.change({'gait': value} if kind == 'gait' else value)
@@ -232,7 +241,8 @@ _GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 _NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain': (60.0, 4000.0),
             'region_radius': (0.03, 1.2), 'cadence_scale': (0.25, 4.0), 'alpha_r': (0.7, 20.0),
             'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0), 'braking': (0.2, 20.0)}
-_DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': False}
+_DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': False,
+             'push_recovery': False}  # a stop that a push releases has no bound
 
 
 def _change(rng: np.random.Generator, names: Sequence[str]) -> Case:
@@ -267,8 +277,8 @@ def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
     if rng.random() < 0.6:
         return events + _telling(rng)
     for _ in range(rng.integers(3, 14)):
-        kind = str(rng.choice(['stop', 'start', 'set', 'gait', 'command', 'vote'],
-                              p=(0.33, 0.25, 0.25, 0.05, 0.09, 0.03)))
+        kind = str(rng.choice(['stop', 'start', 'set', 'gait', 'command', 'vote', 'push'],
+                              p=(0.3, 0.22, 0.22, 0.05, 0.08, 0.03, 0.1)))
         value: Any = None
         if kind == 'set':
             value = _change(rng, [*_NUMBERS, 'inhibited_legs', 'coupling_graph'])
@@ -280,9 +290,16 @@ def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
             if not voting:
                 continue
             value = {str(leg): 1.0 for leg in rng.permutation(LEGS)[:rng.integers(1, 5)]}
+        elif kind == 'push':
+            value = _push(rng)
         wait = float(np.exp(rng.uniform(np.log(0.004), np.log(3.0))))
         events.append([wait, kind, value])
     return events
+
+
+def _push(rng: np.random.Generator) -> list[float]:
+    """Margin [m], and how long it lasts [s]."""
+    return [float(rng.uniform(-0.05, 0.1)), float(np.exp(rng.uniform(np.log(0.004), np.log(1.0))))]
 
 
 def _telling(rng: np.random.Generator) -> list[list[Any]]:
@@ -293,7 +310,7 @@ def _telling(rng: np.random.Generator) -> list[list[Any]]:
     def soon() -> float:
         return float(np.exp(rng.uniform(np.log(0.004), np.log(0.6))))
 
-    kind = rng.integers(4)
+    kind = rng.integers(5)
     if kind == 0:                                            # stops within starts
         return [entry for _ in range(3) for entry in (
             [2.0, 'stop', None], [2.0, 'start', None], [soon(), 'stop', None],
@@ -307,6 +324,10 @@ def _telling(rng: np.random.Generator) -> list[list[Any]]:
         return [[1.0, 'stop', None], *([2.0, 'set', change(
             'inhibited_legs', 'coupling_gain', 'inhibition_gain', 'region_radius', 'rho')]
             for _ in range(3)), [2.0, 'start', None]]
+    if kind == 3:                                            # stops of a robot that was pushed
+        return [entry for _ in range(3) for entry in (
+            [soon(), 'push', _push(rng)], [soon(), 'stop', None], [soon(), 'push', _push(rng)],
+            [2.0, 'start', None])]
     return [[0.0, 'command', [3.0, 0.0, 0.0]], [1.5, 'set', change('max_speed', 'alpha_r')],
             [soon(), 'stop', None]]
 
