@@ -83,26 +83,35 @@ class Bench:
     def __init__(self, options: argparse.Namespace, folder: Path) -> None:
         self._options, self._folder = options, folder
         self._runs: dict[tuple[str, bool, bool], tuple[Run, Run]] = {}
+        self._failed: dict[tuple[str, bool, bool], DmpCpgError] = {}
         self.known: dict[str, relays.Sample] = {}
 
     def runs(self, way: str, lock_step: bool = False, busy: bool = False) -> tuple[Run, Run]:
         """A run of the suite, and one of the relays that send its messages right after it."""
         key = (way, lock_step, busy)
+        if key in self._failed:
+            raise self._failed[key]
         if key not in self._runs:
-            timed = self._options.minutes and not lock_step and way == self.ways[0]
-            seconds = 60.0 * self._options.minutes if timed else self._options.seconds
-            folder = self._folder / self._name(*key)
-            with bench_runs.competitor(busy):
-                _say(f'{SHARING[way]}, {"lock-step" if lock_step else "real time"}'
-                     f'{", with a competitor" * busy}: the suite')
-                suite = bench_runs.run_suite(way, folder, seconds, lock_step)
-                known = bench_runs.write_samples(folder / 'run', folder / 'samples.json')
-                self.known = self.known if lock_step else known
-                _say('    its relays')
-                floor = bench_runs.run_relays(shared(way), folder / 'samples.json', seconds,
-                                   *['--lock-step'] * lock_step)
-            self._runs[key] = suite, floor
+            try:
+                self._runs[key] = self._made(*key)
+            except DmpCpgError as error:
+                self._failed[key] = error
+                raise
         return self._runs[key]
+
+    def _made(self, way: str, lock_step: bool, busy: bool) -> tuple[Run, Run]:
+        timed = self._options.minutes and not lock_step and way == self.ways[0]
+        seconds = 60.0 * self._options.minutes if timed else self._options.seconds
+        folder = self._folder / self._name(way, lock_step, busy)
+        with bench_runs.competitor(busy):
+            _say(f'{SHARING[way]}, {"lock-step" if lock_step else "real time"}'
+                 f'{", with a competitor" * busy}: the suite')
+            suite = bench_runs.run_suite(way, folder, seconds, lock_step)
+            known = bench_runs.write_samples(folder / 'run', folder / 'samples.json')
+            self.known = self.known if lock_step else known
+            _say('    its relays')
+            return suite, bench_runs.run_relays(shared(way), folder / 'samples.json', seconds,
+                                                *['--lock-step'] * lock_step)
 
     def _recorded(self) -> Path:
         """Folder of a run in real time."""

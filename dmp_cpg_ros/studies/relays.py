@@ -34,7 +34,7 @@ from dmp_cpg_ros.nodes.framework import execution
 from dmp_cpg_ros.nodes.framework.health import RobotTiming
 from dmp_cpg_ros.nodes.framework.parameters import BATCH
 from dmp_cpg_ros.nodes.messages import interfaces
-from dmp_cpg_ros.suite_table import KINDS, POSTURE, RECORDER, ROBOT, VISUALIZATION, instances
+from dmp_cpg_ros.suite_table import KINDS, POSTURE, RECORDED_WALK, RECORDER, ROBOT, instances
 
 STAMP = struct.Struct('<iI')
 STAMP_AT = 4
@@ -87,7 +87,7 @@ def writers(topic: interfaces.Interface) -> int:
 def reads(kind: str, topic: interfaces.Interface) -> bool:
     """Whether a kind of node reads a topic as the parameters are by default."""
     body = interfaces.BODY_TOPICS[StateSourceParameters().state_source]
-    return kind != VISUALIZATION and topic in interfaces.read_by(kind) and (
+    return kind in RECORDED_WALK and topic in interfaces.read_by(kind) and (
         kind not in topic.sometimes or (kind == POSTURE and topic.name in body))
 
 
