@@ -35,6 +35,11 @@ AT_REST = case({'coupling_gain': 25.0}, (1.0, 'set', {'inhibited_legs': ('rr',)}
 BROKEN = {'places': WITHIN_A_START, 'arming': LOWERED_LIMIT, 'acting': CADENCE, 'holding': AT_REST}
 
 
+@pytest.mark.xfail(strict=True, reason='votes alone do not hold a bound that is set at rest')
+def test_a_bound_set_while_votes_hold_the_gait_is_held() -> None:
+    assert play(ROBOT, case({'voting': True}, (0.1, 'start', None), (1.4, 'gait', 'bound')))[0] == ''
+
+
 @pytest.mark.parametrize('weaken', CONDITIONS)
 def test_a_condition_that_is_left_out_is_noticed(weaken: str) -> None:
     assert Oscillators(ROBOT, BROKEN[weaken]).certified()
