@@ -37,7 +37,8 @@ BROKEN = {'places': WITHIN_A_START, 'arming': LOWERED_LIMIT, 'acting': CADENCE, 
 
 @pytest.mark.xfail(strict=True, reason='votes alone do not hold a bound that is set at rest')
 def test_a_bound_set_while_votes_hold_the_gait_is_held() -> None:
-    assert play(ROBOT, case({'voting': True}, (0.1, 'start', None), (1.4, 'gait', 'bound')))[0] == ''
+    held = case({'voting': True}, (0.1, 'start', None), (1.4, 'gait', 'bound'))
+    assert play(ROBOT, held)[0] == ''
 
 
 @pytest.mark.parametrize('weaken', CONDITIONS)
