@@ -10,7 +10,6 @@ from pathlib import Path
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
 from launch.launch_description_sources import PythonLaunchDescriptionSource
-from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from dmp_cpg_ros.commands.nav2_limits import nav2_limits
@@ -48,11 +47,9 @@ def generate_launch_description() -> LaunchDescription:
 
 def nodes(context: LaunchContext) -> list[Node | IncludeLaunchDescription]:
     """Make the nodes, with the limits of the suite's robot and gait."""
-    def given(name: str) -> str:
-        return LaunchConfiguration(name).perform(context)
-
-    robot = {'robot': given('robot')} if given('robot') else {}
-    limits = nav2_limits(load_suite(given('parameters') or None, robot))
+    given = context.launch_configurations
+    robot = {'robot': given['robot']} if given['robot'] else {}
+    limits = nav2_limits(load_suite(given['parameters'] or None, robot))
     lifecycle = ['map_server', *SERVERS, *COMMANDS, 'velocity_smoother']
 
     def node(package: str, name: str, *remappings: tuple[str, str], **values: object) -> Node:
@@ -60,20 +57,20 @@ def nodes(context: LaunchContext) -> list[Node | IncludeLaunchDescription]:
         own = {} if name == 'controller_server' else {'name': name}
         return Node(
             package=package, executable=name, **own, output='screen', remappings=remappings,
-            parameters=[given('nav2_parameters'),
+            parameters=[given['nav2_parameters'],
                         {**limits.get(name, {}), 'use_sim_time': True, **values}])
 
     described = [
-        node('nav2_map_server', 'map_server', yaml_filename=given('map')),
+        node('nav2_map_server', 'map_server', yaml_filename=given['map']),
         *(node(package, name) for name, package in SERVERS.items()),
         *(node(package, name, ('cmd_vel', 'cmd_vel_nav')) for name, package in COMMANDS.items()),
         node('nav2_velocity_smoother', 'velocity_smoother', ('cmd_vel', 'cmd_vel_nav'),
              ('cmd_vel_smoothed', 'cmd_vel')),
         node('nav2_lifecycle_manager', 'lifecycle_manager', autostart=True, node_names=lifecycle)]
-    if given('loopback') == 'true':
+    if given['loopback'] == 'true':
         return [*described, Node(  # the clock is its own
             package='nav2_loopback_sim', executable='loopback_simulator',
-            name='loopback_simulator', output='screen', parameters=[given('nav2_parameters')])]
+            name='loopback_simulator', output='screen', parameters=[given['nav2_parameters']])]
     # Dead reckoning from where the robot was switched on: nothing here corrects it.
     described.append(Node(
         package='tf2_ros', executable='static_transform_publisher', name='map_to_odom',
@@ -82,4 +79,4 @@ def nodes(context: LaunchContext) -> list[Node | IncludeLaunchDescription]:
     suite = Path(__file__).with_name('suite.launch.py')
     return [*described, IncludeLaunchDescription(
         PythonLaunchDescriptionSource(str(suite)),
-        launch_arguments={name: given(name) for name in ('parameters', 'robot')}.items())]
+        launch_arguments={name: given[name] for name in ('parameters', 'robot')}.items())]

@@ -11,7 +11,6 @@ from pathlib import Path
 from ament_index_python.packages import get_packages_with_prefixes
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
-from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
@@ -78,32 +77,30 @@ def nodes(context: LaunchContext) -> list[Node]:
 
     Files are looked for here already, so that a wrong one is one error and not one of each node.
     """
-    def given(name: str) -> str:
-        return LaunchConfiguration(name).perform(context)
-
-    words = given('namespace').strip('/')
+    given = context.launch_configurations
+    words = given['namespace'].strip('/')
     namespace = f'/{words}' if words else ''
-    robot = {'robot': given('robot')} if given('robot') else {}
-    suite = load_suite(given('parameters') or None, robot, namespace)
+    robot = {'robot': given['robot']} if given['robot'] else {}
+    suite = load_suite(given['parameters'] or None, robot, namespace)
     shared = {name: str(suite.robot_file) for name in robot}
-    if given('lock_step'):
-        shared['lock_step'] = given('lock_step') == 'true'
-    recording = given('record') == 'true'
+    if given['lock_step']:
+        shared['lock_step'] = given['lock_step'] == 'true'
+    recording = given['record'] == 'true'
     if recording:
         shared['expected_nodes'] = list(RECORDED_WALK)
-        if Path(given('bag')).exists():
-            raise FileExistsError(f"'{given('bag')}' exists; name another folder with bag:=FOLDER")
+        if Path(given['bag']).exists():
+            raise FileExistsError(f"'{given['bag']}' exists; name another folder with bag:=FOLDER")
     described = []
-    if given(FRAMES) == 'true' or (
-            given(FRAMES) == 'auto' and FRAMES in get_packages_with_prefixes()):
+    if given[FRAMES] == 'true' or (
+            given[FRAMES] == 'auto' and FRAMES in get_packages_with_prefixes()):
         described.append(frames_of(suite.robot_file, namespace))
     table = {name: (kind.name, own) for kind, name, own in instances()}
     looking_on = [name for name, wanted in (
-        (RECORDER, recording), (VISUALIZATION, given(VISUALIZATION) == 'true')) if wanted]
+        (RECORDER, recording), (VISUALIZATION, given[VISUALIZATION] == 'true')) if wanted]
     for process, names in {**{name: (name,) for name in looking_on},
-                           **PROCESSES[given('processes')]}.items():
+                           **PROCESSES[given['processes']]}.items():
         kind, own = table[names[0]]
-        parameters = {'output': given('bag')} if kind == RECORDER else dict(shared)
+        parameters = {'output': given['bag']} if kind == RECORDER else dict(shared)
         if len(names) == 1:
             place = {'executable': kind, 'name': process}
             parameters.update(own)
@@ -119,7 +116,7 @@ def nodes(context: LaunchContext) -> list[Node]:
             output='screen', emulate_tty=True,
             # Without the robot there is nothing to walk: the others end with it.
             on_exit=Shutdown() if ROBOT in names else None,
-            respawn=given('respawn') == 'true' and ROBOT not in names))
+            respawn=given['respawn'] == 'true' and ROBOT not in names))
     return described
 
 

@@ -6,10 +6,9 @@ started with the command lines that the real one makes of them, become ready.
 
 from __future__ import annotations
 
-import importlib.util
-import sys
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import Any
 
 import pytest
@@ -18,7 +17,7 @@ pytest.importorskip('rclpy')
 
 import ros_processes
 import yaml
-from checkout import ROOT
+from launch_files import read_launch_file, with_arguments
 from ros_processes import NodeProcess, Processes, Ros, wait_until
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
@@ -45,37 +44,18 @@ UP_S = 90.0
 """How long nine processes may take to start and to find each other on a loaded machine [s]."""
 
 
-class Recorded(SimpleNamespace):
-    """Anything of launch: keeps what it was made with."""
-
-    def __init__(self, *positional: Any, **named: Any) -> None:
-        super().__init__(positional=positional, **named)
-
-    def perform(self, context: dict[str, str]) -> str:
-        return context[self.positional[0]]
+Described = Callable[[Mapping[str, str]], list[Any]]
 
 
 @pytest.fixture
 def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    names = {
-        'launch': ['LaunchContext', 'LaunchDescription'],
-        'launch.actions': ['DeclareLaunchArgument', 'OpaqueFunction', 'Shutdown'],
-        'launch.substitutions': ['LaunchConfiguration'],
-        'launch_ros': [],
-        'launch_ros.actions': ['Node'],
-        'launch_ros.parameter_descriptions': ['ParameterValue'],
-    }
-    for module, members in names.items():
-        stand_in = ModuleType(module)
-        for member in members:
-            setattr(stand_in, member, type(member, (Recorded,), {}))
-        monkeypatch.setitem(sys.modules, module, stand_in)
-    path = ROOT / 'launch' / 'suite.launch.py'
-    spec = importlib.util.spec_from_file_location('suite_launch', path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return read_launch_file('suite', monkeypatch)
+
+
+@pytest.fixture
+def described(launch_file: ModuleType) -> Described:
+    """Nodes that the launch file makes of its arguments."""
+    return lambda arguments: launch_file.nodes(with_arguments(arguments))
 
 
 def start(processes: Processes, node: Any, folder: Path) -> NodeProcess:
@@ -98,12 +78,11 @@ def start(processes: Processes, node: Any, folder: Path) -> NodeProcess:
                                 *words)
 
 
-def test_launched_nodes_are_those_of_the_table(launch_file: ModuleType) -> None:
-    described = launch_file.nodes(ARGUMENTS)
-    assert sorted(node.name for node in described) == sorted(WALKING_NODES)
-    recording = launch_file.nodes({**ARGUMENTS, 'record': 'true'})
+def test_launched_nodes_are_those_of_the_table(described: Described) -> None:
+    assert sorted(node.name for node in described(ARGUMENTS)) == sorted(WALKING_NODES)
+    recording = described({**ARGUMENTS, 'record': 'true'})
     assert {node.name for node in recording} == {*WALKING_NODES, RECORDER}
-    drawn = launch_file.nodes({**ARGUMENTS, 'visualization': 'true'})
+    drawn = described({**ARGUMENTS, 'visualization': 'true'})
     assert {node.name for node in drawn} == {*WALKING_NODES, VISUALIZATION}
     for node in recording:
         assert node.name in KINDS[node.executable].instances
@@ -112,11 +91,11 @@ def test_launched_nodes_are_those_of_the_table(launch_file: ModuleType) -> None:
     assert sections - {'**'} <= {*WALKING_NODES, RECORDER}
 
 
-def test_all_but_the_robot_come_back_where_that_is_asked_for(launch_file: ModuleType) -> None:
+def test_all_but_the_robot_come_back_where_that_is_asked_for(described: Described) -> None:
     for respawn in ('true', 'false'):
         for shared in ('each', 'blocks'):
             given = {**ARGUMENTS, 'respawn': respawn, 'processes': shared, 'record': 'true'}
-            *others, robot = launch_file.nodes(given)
+            *others, robot = described(given)
             assert {node.respawn for node in others} == {respawn == 'true'}
             assert robot.on_exit is not None and not robot.respawn
 
@@ -124,13 +103,13 @@ def test_all_but_the_robot_come_back_where_that_is_asked_for(launch_file: Module
 @pytest.mark.parametrize(('lock_step', 'namespace', 'shared'), [
     ('', '', 'each'), ('true', 'robot1', 'blocks')])
 def test_what_is_launched_becomes_ready_and_ticks(
-        launch_file: ModuleType, processes: Processes, ros: Ros, tmp_path: Path,
+        described: Described, processes: Processes, ros: Ros, tmp_path: Path,
         lock_step: str, namespace: str, shared: str) -> None:
     given = {**ARGUMENTS, 'lock_step': lock_step, 'namespace': namespace, 'record': 'true',
              'processes': shared, 'bag': str(tmp_path / 'bag')}
     space = f'/{namespace}' if namespace else ''
     ticks = ros.collect(Clock, f'{space}/clock')
-    for node in launch_file.nodes(given):
+    for node in described(given):
         start(processes, node, tmp_path)
     for name in (*WALKING_NODES, RECORDER):
         answers: list[Any] = []
@@ -152,17 +131,17 @@ def test_a_lock_step_robot_says_what_it_waits_for(processes: Processes) -> None:
 
 
 def test_a_lock_step_robot_that_is_recorded_waits_for_the_recorder(
-        launch_file: ModuleType, processes: Processes, tmp_path: Path) -> None:
+        described: Described, processes: Processes, tmp_path: Path) -> None:
     given = {**ARGUMENTS, 'lock_step': 'true', 'record': 'true', 'bag': str(tmp_path / 'bag')}
-    robot, = (node for node in launch_file.nodes(given) if node.name == ROBOT)
+    robot, = (node for node in described(given) if node.name == ROBOT)
     start(processes, robot, tmp_path).wait_for_output(f'waiting for .*{RECORDER}')
 
 
 def test_arguments_left_empty_override_nothing_and_given_ones_reach_the_nodes(
-        launch_file: ModuleType) -> None:
-    quiet = {node.name: node.parameters[1:] for node in launch_file.nodes(ARGUMENTS)}
+        described: Described) -> None:
+    quiet = {node.name: node.parameters[1:] for node in described(ARGUMENTS)}
     assert quiet['mujoco_robot'] == quiet['reference_filter'] == quiet['inhibition'] == []
-    given = {node.name: node.parameters[1] for node in launch_file.nodes(
+    given = {node.name: node.parameters[1] for node in described(
         {**ARGUMENTS, 'robot': 'robots/mini_quadruped.yaml', 'lock_step': 'true'})}
     file = str(find_config('robots/mini_quadruped.yaml'))
     assert given['mujoco_robot'] == {'lock_step': True, 'robot': file}
@@ -171,14 +150,15 @@ def test_arguments_left_empty_override_nothing_and_given_ones_reach_the_nodes(
 
 @pytest.mark.parametrize('namespace', ['', 'robot1'])
 def test_the_frames_of_the_links_come_from_the_robots_description_where_that_is_installed(
-        launch_file: ModuleType, monkeypatch: pytest.MonkeyPatch, namespace: str) -> None:
+        described: Described, launch_file: ModuleType,
+        monkeypatch: pytest.MonkeyPatch, namespace: str) -> None:
     given = {**ARGUMENTS, 'namespace': namespace, 'robot': 'robots/mini_quadruped.yaml'}
     frames = 'robot_state_publisher'
     monkeypatch.setattr(launch_file, 'get_packages_with_prefixes', dict)
-    without = launch_file.nodes(given)
+    without = described(given)
     assert sorted(node.name for node in without) == sorted(WALKING_NODES)
     monkeypatch.setattr(launch_file, 'get_packages_with_prefixes', lambda: {frames: '/opt/ros'})
-    node, *others = launch_file.nodes(given)
+    node, *others = described(given)
     assert [other.name for other in others] == [other.name for other in without]
     assert (node.package, node.executable, node.name) == (frames, frames, frames)
     assert node.namespace == (f'/{namespace}' if namespace else None)
@@ -188,27 +168,27 @@ def test_the_frames_of_the_links_come_from_the_robots_description_where_that_is_
     assert parameters['use_sim_time'] is True and node.output == 'screen'
     assert remappings.pop('robot_description') == f'{frames}/robot_description'
     assert remappings == ({name: name[1:] for name in ABSOLUTE_TOPICS} if namespace else {})
-    assert len(launch_file.nodes({**given, frames: 'false'})) == len(without)
+    assert len(described({**given, frames: 'false'})) == len(without)
 
 
 @pytest.mark.parametrize('name', ['parameters', 'robot'])
 def test_a_file_that_is_not_there_is_one_error_before_any_node(
-        launch_file: ModuleType, name: str) -> None:
+        described: Described, name: str) -> None:
     with pytest.raises(DmpCpgError, match=r'nosuch\.yaml'):
-        launch_file.nodes({**ARGUMENTS, name: 'nosuch.yaml'})
+        described({**ARGUMENTS, name: 'nosuch.yaml'})
 
 
 def test_a_bag_that_exists_is_an_error_before_any_node(
-        launch_file: ModuleType, tmp_path: Path) -> None:
+        described: Described, tmp_path: Path) -> None:
     with pytest.raises(FileExistsError, match='bag:=FOLDER'):
-        launch_file.nodes({**ARGUMENTS, 'record': 'true', 'bag': str(tmp_path)})
+        described({**ARGUMENTS, 'record': 'true', 'bag': str(tmp_path)})
 
 
 def test_the_bag_is_where_its_argument_says(
-        launch_file: ModuleType, processes: Processes, tmp_path: Path) -> None:
+        described: Described, processes: Processes, tmp_path: Path) -> None:
     bag = tmp_path / 'outing'
-    described = launch_file.nodes({**ARGUMENTS, 'record': 'true', 'bag': str(bag)})
-    recorder, = (node for node in described if node.name == RECORDER)
+    recorder, = (node for node in described({**ARGUMENTS, 'record': 'true', 'bag': str(bag)})
+                 if node.name == RECORDER)
     start(processes, recorder, tmp_path)
     wait_until(bag.is_dir)
 

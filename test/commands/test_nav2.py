@@ -7,15 +7,14 @@ Nav2 is not installed here: its names are those of its sources, branch ``jazzy``
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 from checkout import ROOT
+from launch_files import read_launch_file, with_arguments
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.commands.nav2_limits import SMOOTHING_S, axis_limits, main, nav2_limits
@@ -136,42 +135,16 @@ def test_the_command_prints_a_parameter_file(capsys: pytest.CaptureFixture[str])
     assert main(['--ros-args', '-p', 'auto_gait:=true']) == 2
 
 
-class Recorded(SimpleNamespace):
-    """Anything of launch: keeps what it was made with."""
-
-    def __init__(self, *positional: Any, **named: Any) -> None:
-        super().__init__(positional=positional, **named)
-
-    def perform(self, context: dict[str, str]) -> str:
-        return context[self.positional[0]]
-
-
 @pytest.fixture
 def launch_file(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    for module, members in {
-            'launch': ['LaunchContext', 'LaunchDescription'],
-            'launch.actions': [
-                'DeclareLaunchArgument', 'IncludeLaunchDescription', 'OpaqueFunction'],
-            'launch.launch_description_sources': ['PythonLaunchDescriptionSource'],
-            'launch.substitutions': ['LaunchConfiguration'],
-            'launch_ros': [], 'launch_ros.actions': ['Node']}.items():
-        stand_in = ModuleType(module)
-        for member in members:
-            setattr(stand_in, member, type(member, (Recorded,), {}))
-        monkeypatch.setitem(sys.modules, module, stand_in)
-    spec = importlib.util.spec_from_file_location(
-        'nav2_launch', ROOT / 'launch' / 'nav2.launch.py')
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return read_launch_file('nav2', monkeypatch)
 
 
 def test_the_launch_file_starts_what_is_managed_with_the_limits_of_the_suite(
         launch_file: ModuleType, tmp_path: Path) -> None:
     *declared, _ = launch_file.generate_launch_description().positional[0]
     defaults = {entry.positional[0]: entry.default_value for entry in declared}
-    *nodes, suite = launch_file.nodes(defaults)
+    *nodes, suite = launch_file.nodes(with_arguments(defaults))
     assert Path(suite.positional[0].positional[0]) == ROOT / 'launch' / 'suite.launch.py'
     assert dict(suite.launch_arguments).keys() <= {'parameters', 'robot'}
     by_name = {node.executable: node for node in nodes}
@@ -191,7 +164,8 @@ def test_the_launch_file_starts_what_is_managed_with_the_limits_of_the_suite(
 
     own = tmp_path / 'own.yaml'
     own.write_text('/**: {ros__parameters: {max_speed: 0.5}}', encoding='utf-8')
-    alone = launch_file.nodes({**defaults, 'parameters': str(own), 'loopback': 'true'})
+    alone = launch_file.nodes(with_arguments(
+        {**defaults, 'parameters': str(own), 'loopback': 'true'}))
     assert [node.executable for node in alone][-1] == 'loopback_simulator'
     (smoother,) = (node for node in alone if node.executable == 'velocity_smoother')
     assert smoother.parameters[1]['max_velocity'][0] == 0.5
