@@ -8,45 +8,30 @@ from typing import Any
 
 import numpy as np
 import pytest
-from core_examples import GAITS, TICK, TICK_NS, quadruped, suite_parameters
+from core_examples import TICK, quadruped
 
-from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
-from dmp_cpg_ros.core.gait.network import CanonicalParameters
-from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
+from dmp_cpg_ros.studies.adversary_suite import Oscillators
 
 ROBOT = quadruped()
 
 
 class Walk:
-    """The suite on a robot that does what it is told."""
+    """The oscillators of the suite with what drives and stops them, without a body."""
 
-    def __init__(self, gait: str = 'amble', inhibition: dict[str, Any] | None = None,
-                 reference: dict[str, Any] | None = None, **canonical: Any) -> None:
-        parameters = suite_parameters(
-            canonical=CanonicalParameters(**canonical),
-            inhibition=InhibitionParameters(**{'auto_inhibit': False, **(inhibition or {})}),
-            reference=ReferenceParameters(cmd_vel_timeout=0.0, **(reference or {})))
-        self.loop = WalkingLoop(ROBOT, GAITS[gait], parameters, GAITS)
-        self.robot = PerfectTrackingRobot(ROBOT, TICK_NS)
-        self.state = self.robot.reset()
+    def __init__(self, gait: str = 'amble', **parameters: Any) -> None:
+        self.loop = Oscillators(ROBOT, {'gait': gait, 'tick_s': TICK, 'parameters': {
+            'auto_inhibit': False, **parameters}})
         self.left_region = 0
         self.turned = np.zeros(4)
         self.tick()
 
     def tick(self) -> None:
         loop = self.loop
-        before, held = phase(loop.x), self._held()
-        self.state = self.robot.step(loop.tick(self.state).targets)
+        before, held = phase(loop.x), loop.held
+        loop.advance()
         self.turned += (phase(loop.x) - before + np.pi) % (2.0 * np.pi) - np.pi
-        self.left_region += held and loop.inhibition.requested and not self._held()
-
-    def _held(self) -> bool:
-        loop = self.loop
-        return bool(loop.inhibition.requested
-                    and loop.inhibition.acting_gains(loop.x, loop.network.target).any())
+        self.left_region += held and loop.inhibition.requested and not loop.held
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / TICK)):
@@ -76,8 +61,7 @@ def accepted(walk: Walk, **values: Any) -> bool:
 @pytest.mark.parametrize('delay', [0.012, 0.02, 0.04, 0.2])
 @pytest.mark.parametrize('gain', [14.0, 16.0])
 def test_several_inhibited_legs_stop_within_a_start(gain: float, delay: float) -> None:
-    walk = Walk(inhibition={'inhibited_legs': ('fl', 'rr')}, coupling_graph='star',
-                coupling_gain=gain)
+    walk = Walk(inhibited_legs=('fl', 'rr'), coupling_graph='star', coupling_gain=gain)
     certificate = walk.loop.in_force().certificate()
     assert certificate.holds, certificate.explained()
     walk.run(1.0)
@@ -90,7 +74,7 @@ def test_several_inhibited_legs_stop_within_a_start(gain: float, delay: float) -
 @pytest.mark.parametrize('values', [{'inhibition_gain': 110.0}, {'region_radius': 0.09}])
 def test_a_gain_for_the_accepted_cadence_waits_for_the_acting_one(values: dict[str, float]
                                                                   ) -> None:
-    walk = Walk(inhibition={'capture_speed': 2.0}, cadence_scale=2.0)
+    walk = Walk(capture_speed=2.0, cadence_scale=2.0)
     walk.walk(1.2, 2.0)
     assert accepted(walk, cadence_scale=0.5)
     told = walk.loop.change(values)
@@ -172,10 +156,10 @@ def test_stops_within_starts_keep_the_bound_that_is_stated(seed: int) -> None:
     while True:
         graph = rng.choice(['all_to_all', 'ring', 'path', 'star', 'directed_ring'])
         legs = tuple(rng.permutation(['fl', 'fr', 'rl', 'rr'])[:rng.integers(1, 4)].tolist())
-        walk = Walk(str(rng.choice(['amble', 'trot', 'walk', 'bound'])),
-                    {'inhibited_legs': legs, 'region_radius': rng.uniform(0.05, 0.4),
-                     'inhibition_gain': np.exp(rng.uniform(np.log(200.0), np.log(3000.0)))},
-                    {'max_speed': 1.0}, coupling_graph=str(graph), rho=rng.uniform(1.0, 12.0),
+        walk = Walk(str(rng.choice(['amble', 'trot', 'walk', 'bound'])), inhibited_legs=legs,
+                    region_radius=rng.uniform(0.05, 0.4),
+                    inhibition_gain=np.exp(rng.uniform(np.log(200.0), np.log(3000.0))),
+                    max_speed=1.0, coupling_graph=str(graph), rho=rng.uniform(1.0, 12.0),
                     coupling_gain=np.exp(rng.uniform(np.log(10.0), np.log(200.0))))
         if walk.loop.in_force().certificate().holds:
             break
