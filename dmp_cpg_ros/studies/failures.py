@@ -35,6 +35,9 @@ SPEED = 0.5
 STANDS_S, WALKS_S, AFTER_S, STOPS_S = 0.3, 2.7, 2.0, 3.5
 """Times of standing, of walking before the failure, after its begin, and for the stop [s]."""
 
+RESTS = 3
+"""For how many tenths of a second it rests until the stop, which has ``STOPS_S``, is over."""
+
 FAILS_S = 0.5
 """How long a component fails [s]."""
 
@@ -123,10 +126,14 @@ def trial(cell: Cell, seconds: float = FAILS_S) -> Outcome:
         fell = fell or walk.robot.fallen
     walked = walk.loop.stop.state == 'walking'
     walk.loop.request(True)
+    rested = 0
     for _ in range(round(STOPS_S / 0.1)):
         walk.run(0.1)
         fell = fell or walk.robot.fallen
-    rests = walked and walk.loop.stop.state == 'at_rest'
+        rested = rested + 1 if walk.loop.stop.state == 'at_rest' else 0
+        if fell or rested == RESTS:
+            break
+    rests = walked and rested > 0
     return Outcome('falls' if fell else 'rests' if rests else 'stops', tuple(sorted(walk.named)))
 
 
