@@ -50,7 +50,7 @@ def test_a_condition_that_is_left_out_is_noticed(weaken: str) -> None:
 
 @pytest.mark.parametrize('weaken', adversary_networks.WEAKENED)
 def test_an_inequality_that_is_weakened_is_noticed(weaken: str) -> None:
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(6)
     sizes = itertools.islice(itertools.cycle((2, 4, 3, 2, 5)), 40)
     found = (adversary_networks.attack(rng, size, 100, weaken)[1] for size in sizes)
     failure = next(one for one in found if one)[0]
