@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import combinations
 from typing import Any
 
@@ -77,13 +78,12 @@ class Running:
     acting_cadence: float | None = None
 
     def certificate(self) -> Certificate:
-        """Compute the certificate."""
-        p = self.parameters
-        if self.others or self.moving:
-            return certify_changes(p, (self.gait, *self.others), self.scale, self.tick_s,
-                                   self.acting_cadence if self.moving else None)
-        network = GaitNetwork(p.canonical, self.gait, self.scale)
-        return certificate_of(Setting.of(network, p, self.tick_s))
+        """Compute the certificate, or take it from the last that were; the way of the feet has no
+        part in it.
+        """
+        return _certificate(replace(
+            self, parameters=replace(self.parameters, motion=None),
+            acting_cadence=self.acting_cadence if self.moving else None))
 
     @property
     def moving(self) -> bool:
@@ -192,6 +192,15 @@ class Running:
         return replace(self, parameters=replace(self.parameters, **{
             part: replace(getattr(self.parameters, part), **changes)
             for part, changes in parts.items() if changes}))
+
+
+@lru_cache(maxsize=16)
+def _certificate(of: Running) -> Certificate:
+    if of.others or of.moving:
+        return certify_changes(
+            of.parameters, (of.gait, *of.others), of.scale, of.tick_s, of.acting_cadence)
+    network = GaitNetwork(of.parameters.canonical, of.gait, of.scale)
+    return certificate_of(Setting.of(network, of.parameters, of.tick_s))
 
 
 @dataclass(frozen=True)

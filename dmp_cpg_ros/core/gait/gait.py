@@ -185,9 +185,9 @@ class CycleOfLegs(ABC):
         return (phi / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Gait(CycleOfLegs):
-    """One gait.
+    """One gait; equal to itself only.
 
     Attributes
     ----------
