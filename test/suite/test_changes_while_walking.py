@@ -54,18 +54,18 @@ events:
 """
 
 
-@pytest.mark.parametrize('leg', ['rr', 'auto'])
+@pytest.mark.parametrize(('leg', 'shared'), [
+    ('rr', '--composed'), ('auto', '--processes=blocks')])
 def test_the_robot_walks_on_when_a_change_is_refused_and_when_it_is_accepted(
-    processes: Processes, tmp_path: Path, leg: str
+    processes: Processes, tmp_path: Path, leg: str, shared: str
 ) -> None:
     asked, plain = tmp_path / 'asked.yaml', tmp_path / 'plain.yaml'
     asked.write_text(SCENARIO.format(refused=REFUSED, leg=leg), encoding='utf-8')
     plain.write_text(SCENARIO.format(refused='', leg=leg), encoding='utf-8')
     settings = [item for name, value in OVERRIDES.items()
                 for item in ('--set', f'{name}:={value}')]
-    process = processes.executable('walk', str(asked), '--lock-step',
-                                   '--processes', 'blocks', '--no-report', '--out',
-                                   str(tmp_path / 'run'), *settings)
+    process = processes.executable('walk', str(asked), '--lock-step', shared, '--no-report',
+                                   '--out', str(tmp_path / 'run'), *settings)
     assert process.wait(240.0) == 0, str(process)
     said = process.output
     refusals = re.findall(r'refused: (.*)', said)

@@ -36,7 +36,7 @@ processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
 SCENARIO = """\
 name: short
-duration: 6.0
+duration: 5.0
 events:
   - {at: 0.2, inhibit: false}
   - {at: 0.2, command: {v_x: 0.5, gamma: 0.1}}
@@ -71,7 +71,7 @@ events:
 
 LEADING = """\
 name: leading
-duration: 3.0
+duration: 2.0
 parameters: {target_lead: 0.02}
 events:
   - {at: 0.3, inhibit: false}
@@ -164,7 +164,7 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
         assert counts['/inhibition_gains'] == counts['/canonical_state'], run.name
 
     recording, (states, ticks) = load_recording(first / 'bag'), plain_run(scenario)
-    assert len(recording.joints.time) == len(ticks) == 1500
+    assert len(recording.joints.time) == len(ticks) == 1250
     np.testing.assert_array_equal(
         recording.joints.position, [state.joint_position for state in states[:-1]]
     )
@@ -246,6 +246,8 @@ def test_contacts_reach_the_nodes_at_the_tick_at_which_they_are_measured(
         scenario,
         tmp_path / 'run',
         '--lock-step',
+        '--processes',
+        'blocks',
         *(word for option in options for word in ('--set', option)),
     )
     recording, (_, ticks) = load_recording(run / 'bag'), plain_run(scenario, **values)
