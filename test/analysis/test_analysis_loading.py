@@ -233,7 +233,7 @@ def test_a_copy_that_cannot_lie_beside_its_bag_is_temporary(
             raise OSError(errno.EROFS, 'Read-only file system')
         return TemporaryDirectory(prefix=prefix)
 
-    monkeypatch.setattr('dmp_cpg_ros.analysis.bag.TemporaryDirectory', read_only)
+    monkeypatch.setattr('dmp_cpg_ros.analysis.rescue.TemporaryDirectory', read_only)
     file = cut(written_file(walked, tmp_path / 'monday.mcap'))
     assert_same(load_recording(file), walked)
     assert list(tmp_path.iterdir()) == [file]

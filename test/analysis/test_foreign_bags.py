@@ -23,10 +23,11 @@ from synthetic_bag import STORE, write_bag
 from synthetic_walk import SyntheticWalk
 from test_analysis_loading import assert_same, contents
 
-from dmp_cpg_ros.analysis.bag import Unpacker, opened, payload_digests, recorded
+from dmp_cpg_ros.analysis.bag import opened, payload_digests, recorded
 from dmp_cpg_ros.analysis.decoding import alike
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.recording import Recording
+from dmp_cpg_ros.analysis.rescue import Unpacker
 from dmp_cpg_ros.commands.analyze import main
 from dmp_cpg_ros.commands.ros_arguments import BAD_INPUT
 from dmp_cpg_ros.core.errors import DataError

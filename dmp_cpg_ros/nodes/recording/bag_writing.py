@@ -4,7 +4,7 @@
 
 MCAP files consist of chunks; what lies in closed chunks survives. :meth:`BagWriter.flush` closes
 the chunk and hands it to the operating system, so that a killed recorder loses no more than what
-came after the last flush; :mod:`~dmp_cpg_ros.analysis.bag` makes a sound copy of the file.
+came after the last flush; :mod:`~dmp_cpg_ros.analysis.rescue` makes a sound copy of the file.
 SQLite recordings are one transaction, which is committed when the bag is closed: a killed recorder
 leaves an empty one.
 
