@@ -9,7 +9,7 @@ says that the body does not follow its reference: it was pushed, a foot has slip
 changing, or what is asked is more than the gait can do. The steps that bring it back need the room
 that speed takes, so the reference is given only the share
 
-    s = (m/(q l) − DISTURBED) / (EASY − DISTURBED)  in [LEAST, 1]
+    s = (room − DISTURBED) / (EASY − DISTURBED)  in [LEAST, 1] ,    room = m/(q l)
 
 of the command. It falls at once and grows by ``REGAIN`` again. q is 1 where feet of both sides
 carry most of the time, and falls to ``NARROW`` for gaits that stand on one side, whose body sways
@@ -38,31 +38,29 @@ REGAIN = 1.0
 """Rate at which the share grows again [1/s]: a cycle or two to test what has been given back."""
 
 
-def followed_share(share: float, margins: Sequence[float] | None, leg_length: float, dt: float,
-                   two_sided: float = 1.0) -> float:
-    """Share of the command after a tick, in [LEAST, 1].
+def room(margins: Sequence[float] | None, leg_length: float, two_sided: float) -> float | None:
+    """Least margin of the capture point, in q l.
 
     Parameters
     ----------
-    share : float
-        One tick before.
     margins : sequence of four floats, or None
         To the edges of the support polygon [m], where they are known.
     leg_length : float
         l [m].
-    dt : float
-        [s]
     two_sided : float
         Share of stance with feet of both sides on the ground, of the gait.
     """
-    regained = min(1.0, share + REGAIN * dt)
     if margins is None:
-        return regained
-    room = (least(margins, leg_length, two_sided) - DISTURBED) / (EASY - DISTURBED)
-    return min(regained, max(LEAST, room))
-
-
-def least(margins: Sequence[float], leg_length: float, two_sided: float) -> float:
-    """The least of the margins [m] of a gait, in q l."""
+        return None
     q = NARROW + (1.0 - NARROW) * min(1.0, two_sided / WIDE_STANCE)
     return min(margins) / (q * leg_length)
+
+
+def followed_share(share: float, left: float | None, dt: float) -> float:
+    """Share of the command after a tick of dt [s], in [LEAST, 1], from the one before and
+    :func:`room`.
+    """
+    regained = min(1.0, share + REGAIN * dt)
+    if left is None:
+        return regained
+    return min(regained, max(LEAST, (left - DISTURBED) / (EASY - DISTURBED)))

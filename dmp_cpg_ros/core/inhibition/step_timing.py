@@ -10,14 +10,13 @@ end only if, when a step begins,
 
 (Koolen, de Boer, Rebula, Goswami & Pratt 2012): beyond the reach it is the time that decides, and
 a foot that comes earlier need not go as far (Khadiv, Herzog, Moosavian & Righetti 2016). So all
-legs go through their cycles κ times as fast while the least margin m of the capture point in the
-support polygon is small,
+legs go through their cycles κ times as fast while the room of the capture point
+(:func:`~dmp_cpg_ros.core.inhibition.caution.room`) is small,
 
-    κ = 1 + (QUICKEST − 1) (1 − sat(m / (DISTURBED q l))) ,
+    κ = 1 + (QUICKEST − 1) (1 − sat(room / DISTURBED)) :
 
-with q as for :mod:`~dmp_cpg_ros.core.inhibition.caution`: from what standing legs can just bear to
-a capture point on the edge of the support. Steady walking has more room, but at limits of what is
-declared. κ rises within ``RISING`` and falls at ``SLOWING``: later steps are early too.
+from what standing legs can just bear to a capture point on the edge of the support. κ rises within
+``RISING`` and falls at ``SLOWING``: later steps are early too.
 
 ω is common to all oscillators. In the frame that turns with it nothing changes, so that phase
 relations stay, and what is certified of free legs holds for any ω(t). In a stop, and in a start
@@ -28,9 +27,7 @@ it was computed for.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from dmp_cpg_ros.core.inhibition.caution import DISTURBED, least
+from dmp_cpg_ros.core.inhibition.caution import DISTURBED
 
 QUICKEST = 2.5
 """Largest factor on the cadence: legs that swing faster come down no more where they are to."""
@@ -44,28 +41,14 @@ SLOWING = 2.0
 """Rate at which the factor falls again [1/s]: a step or two."""
 
 
-def quickened(quickness: float, margins: Sequence[float] | None, leg_length: float, dt: float,
-              two_sided: float = 1.0) -> float:
-    """Factor κ on the cadence after a tick, in [1, ``QUICKEST``].
-
-    Parameters
-    ----------
-    quickness : float
-        One tick before.
-    margins : sequence of four floats, or None
-        To the edges of the support polygon [m], where they are known and may act.
-    leg_length : float
-        l [m].
-    dt : float
-        [s]
-    two_sided : float
-        Share of stance with feet of both sides on the ground, of the gait.
+def quickened(quickness: float, left: float | None, dt: float) -> float:
+    """Factor κ on the cadence after a tick of dt [s], in [1, ``QUICKEST``], from the one before
+    and the room, where it is known and may act.
     """
     slower = max(1.0, quickness - SLOWING * dt)
-    if margins is None:
+    if left is None:
         return slower
-    left = min(max(least(margins, leg_length, two_sided) / DISTURBED, 0.0), 1.0)
-    wanted = 1.0 + (QUICKEST - 1.0) * (1.0 - left)
+    wanted = 1.0 + (QUICKEST - 1.0) * (1.0 - min(max(left / DISTURBED, 0.0), 1.0))
     return max(slower, min(wanted, quickness + (QUICKEST - 1.0) * dt / RISING))
 
 

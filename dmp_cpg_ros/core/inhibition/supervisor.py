@@ -24,7 +24,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.caution import followed_share
+from dmp_cpg_ros.core.inhibition.caution import followed_share, room
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, PushState, push_step
 from dmp_cpg_ros.core.inhibition.step_timing import quickened
@@ -229,12 +229,12 @@ class GaitSupervisor:
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
                    network: GaitNetwork, dt: float) -> SupervisorState:
         """Follow less of the command, and step faster, while the body is disturbed."""
-        p, of = self.parameters, (network.scale.leg_length, dt, network.gait.two_sided)
+        p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.two_sided)
         predicted = state.requested or state.state == 'releasing'
         cautious = p.caution and not (predicted or state.push.acts)
-        share = followed_share(state.share, margins, *of) if cautious else 1.0
+        share = followed_share(state.share, left, dt) if cautious else 1.0
         free = p.step_timing and (state.push.acts or not predicted)
-        quickness = quickened(state.quickness, margins if free else None, *of)
+        quickness = quickened(state.quickness, left if free else None, dt)
         same = (share, quickness) == (state.share, state.quickness)
         return state if same else replace_unchecked(state, share=share, quickness=quickness)
 

@@ -17,6 +17,7 @@ from dmp_cpg_ros.core.inhibition.caution import (
     LEAST,
     REGAIN,
     followed_share,
+    room,
 )
 
 SPEED = 0.5
@@ -29,11 +30,12 @@ def narrow(run: Run, share: float) -> tuple[float, ...]:
 
 
 def test_the_share_falls_with_the_least_margin_and_comes_back_at_its_rate() -> None:
-    shares = [followed_share(1.0, (1.0, m, 1.0, 1.0), 0.5, TICK) for m in np.linspace(-0.5, 0.5)]
+    shares = [followed_share(1.0, room((1.0, m, 1.0, 1.0), 0.5, 1.0), TICK)
+              for m in np.linspace(-0.5, 0.5)]
     assert np.all(np.diff(shares) >= 0.0) and {min(shares), max(shares)} == {LEAST, 1.0}
-    assert followed_share(1.0, (0.5 * DISTURBED,) * 4, 0.5, TICK) == LEAST
-    assert followed_share(LEAST, None, 0.5, TICK) == LEAST + REGAIN * TICK
-    assert followed_share(LEAST, WIDE, 0.5, 10.0) == 1.0
+    assert followed_share(1.0, room((0.5 * DISTURBED,) * 4, 0.5, 1.0), TICK) == LEAST
+    assert followed_share(LEAST, room(None, 0.5, 1.0), TICK) == LEAST + REGAIN * TICK
+    assert followed_share(LEAST, room(WIDE, 0.5, 1.0), 10.0) == 1.0
 
 
 @pytest.mark.parametrize('share', [0.0, 0.4, 1.0])

@@ -11,7 +11,7 @@ from test_push_recovery import TO_THE_LEFT, resting, told
 
 from dmp_cpg_ros.core.balance.capture_point import WIDE
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.inhibition.caution import DISTURBED
+from dmp_cpg_ros.core.inhibition.caution import DISTURBED, room
 from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST, RISING, SLOWING, quickened
 
 FALLING = (1.0, 1.0, -1.0, 1.0)
@@ -25,18 +25,20 @@ def pushed(**changes: object) -> Run:
 
 
 def test_the_factor_grows_as_the_least_margin_falls_and_is_never_beyond_its_bounds() -> None:
-    factors = [quickened(1.0, (1.0, m, 1.0, 1.0), 0.5, 1.0) for m in np.linspace(-0.5, 0.5)]
+    factors = [quickened(1.0, room((1.0, m, 1.0, 1.0), 0.5, 1.0), 1.0)
+               for m in np.linspace(-0.5, 0.5)]
     assert np.all(np.diff(factors) <= 0.0) and {min(factors), max(factors)} == {1.0, QUICKEST}
-    half = quickened(1.0, (0.25 * DISTURBED,) * 4, 0.5, 1.0)
+    half = quickened(1.0, room((0.25 * DISTURBED,) * 4, 0.5, 1.0), 1.0)
     assert half == pytest.approx(0.5 * (1.0 + QUICKEST))
-    assert quickened(1.0, (0.5 * DISTURBED,) * 4, 0.5, 1.0) == 1.0
+    assert quickened(1.0, room((0.5 * DISTURBED,) * 4, 0.5, 1.0), 1.0) == 1.0
 
 
 def test_it_rises_and_falls_at_its_rates() -> None:
-    assert quickened(1.0, FALLING, 0.3, 0.5 * RISING) == pytest.approx(0.5 * (1.0 + QUICKEST))
-    for margins in (None, WIDE):
-        assert quickened(QUICKEST, margins, 0.3, 0.1) == pytest.approx(QUICKEST - 0.1 * SLOWING)
-        assert quickened(QUICKEST, margins, 0.3, 10.0) == 1.0
+    falling = room(FALLING, 0.3, 1.0)
+    assert quickened(1.0, falling, 0.5 * RISING) == pytest.approx(0.5 * (1.0 + QUICKEST))
+    for left in (None, room(WIDE, 0.3, 1.0)):
+        assert quickened(QUICKEST, left, 0.1) == pytest.approx(QUICKEST - 0.1 * SLOWING)
+        assert quickened(QUICKEST, left, 10.0) == 1.0
 
 
 def test_who_is_not_pushed_does_not_notice() -> None:
