@@ -40,10 +40,12 @@ def voters(**changes: object) -> dict[str, Any]:
     }
 
 
-def vote(run: Run, legs: tuple[str, ...], seconds: float) -> Run:
-    """Let legs vote for a time, as a node does that repeats its message."""
+def vote(run: Run, legs: tuple[str, ...], seconds: float, until: str = '') -> Run:
+    """Let legs vote for a time, or until the stop has a state, as a node does that repeats its
+    message.
+    """
     end_ns = run.time_ns + round(seconds * 1e9)
-    while run.time_ns < end_ns:
+    while run.time_ns < end_ns and run.loop.stop.state != until:
         run.loop.vote(dict.fromkeys(legs, 1.0))
         run.go(0.1)
     return run
@@ -93,7 +95,7 @@ def test_a_certified_majority_whose_legs_relieve_each_other_stops_and_fewer_do_n
         majority = tuple(leg for leg in LEGS if leg != missing)
         vote(run, majority[1:], 2.0)
         assert not run.loop.stop.requested
-        vote(run, majority, 3.5)
+        vote(run, majority, 3.5, until='at_rest')
         bound = vote_bound(Setting.of(run.loop.network, p, TICK), run.loop.inhibition.gains)
         assert run.loop.stop.state == 'at_rest' and run.loop.stop.measured_s <= bound
 
