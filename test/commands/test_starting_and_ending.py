@@ -174,9 +174,9 @@ def test_a_walk_in_a_namespace_is_the_walk_without(processes: Processes, tmp_pat
 # Ending ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize('composed', [(), ('--composed',)], ids=['processes', 'composed'])
-@pytest.mark.parametrize('number', [
-    signal.SIGHUP, signal.SIGQUIT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(('number', 'composed'), [
+    (signal.SIGTERM, ()), (signal.SIGKILL, ()), *((number, ('--composed',)) for number in (
+        signal.SIGHUP, signal.SIGQUIT, signal.SIGTERM, signal.SIGKILL))])
 def test_whatever_ends_walk_ends_its_nodes_and_closes_the_bag(
         processes: Processes, tmp_path: Path, number: int, composed: tuple[str, ...]) -> None:
     process = walk(processes, scenario(tmp_path, 600.0), '--lock-step', '--out',
