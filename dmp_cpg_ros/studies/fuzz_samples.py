@@ -23,9 +23,10 @@ from rosbags.typesys import Stores, get_typestore
 
 from dmp_cpg_ros import layouts
 from dmp_cpg_ros.analysis.bag import payload_digests
-from dmp_cpg_ros.analysis.loading import TOPICS, load_recording
+from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.run import write_results
 from dmp_cpg_ros.analysis.strict_json import write_json
+from dmp_cpg_ros.analysis.topics import TOPICS
 from dmp_cpg_ros.commands import inspect_robot, learn, walk
 from dmp_cpg_ros.commands.analyze import analyze_run
 from dmp_cpg_ros.commands.certify import running_parameters
