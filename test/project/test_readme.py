@@ -16,8 +16,6 @@ from typing import Any
 import pytest
 from checkout import PACKAGE, ROOT, setup_constant
 
-from dmp_cpg_ros.suite_table import instances
-
 DOCUMENTS = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'QUALITY_DECLARATION.md',
              ROOT / 'SECURITY.md',
              *sorted((ROOT / 'doc').rglob('*.md')))
@@ -185,14 +183,11 @@ def test_options_and_parameters_of_commands_exist(document: Path) -> None:
 
 @pytest.mark.parametrize('document', DOCUMENTS, ids=lambda document: document.name)
 def test_names_in_commands_of_ros2_exist(document: Path) -> None:
-    """They are not run: there is no ``ros2`` where the tests are."""
+    """They are not run: ``test_ros2_commands.py`` has those that speak with a suite."""
     pytest.importorskip('rclpy')
-    from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES
-
     executables = setup_constant('EXECUTABLES')
     assert isinstance(executables, tuple)
     tables = tables_of_parameters()
-    nodes = {name: tables[kind.name].fields for kind, name, _ in instances()}
     launch = (ROOT / 'launch' / 'suite.launch.py').read_text(encoding='utf-8')
     lines = [line for block in blocks(document, 'bash') for line in block.splitlines()]
     for line in [*lines, *re.findall(r'`(ros2 [^`]+)`', text(document))]:
@@ -208,14 +203,6 @@ def test_names_in_commands_of_ros2_exist(document: Path) -> None:
                 for argument in arguments:
                     name = argument.partition(':=')[0]
                     assert f"'{name}'" in launch or f'{name.upper()},' in launch, line
-            case ['ros2', 'topic', 'pub', name, kind, *_] | ['ros2', 'service', 'call', name, kind,
-                                                             *_]:
-                entry = INTERFACES.get(name[1:]) or INTERFACES[f'~/{name.rpartition("/")[2]}']
-                assert entry.type_name == kind, line
-            case ['ros2', 'topic', _, name, *_]:
-                assert name in INTERFACES or name[1:] in INTERFACES, line
-            case ['ros2', 'param', _, node, name, *_]:
-                assert name in nodes[node.strip('/')], line
 
 
 def test_the_readme_and_the_usage_have_transcripts() -> None:
