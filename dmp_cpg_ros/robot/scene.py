@@ -25,7 +25,10 @@ SHOWN_GROUPS = 3
 _KINDS = {mujoco.mjtGeom.mjGEOM_PLANE: 'plane', mujoco.mjtGeom.mjGEOM_SPHERE: 'sphere',
           mujoco.mjtGeom.mjGEOM_CAPSULE: 'capsule', mujoco.mjtGeom.mjGEOM_ELLIPSOID: 'ellipsoid',
           mujoco.mjtGeom.mjGEOM_CYLINDER: 'cylinder', mujoco.mjtGeom.mjGEOM_BOX: 'box',
-          mujoco.mjtGeom.mjGEOM_MESH: 'mesh'}
+          mujoco.mjtGeom.mjGEOM_MESH: 'mesh', mujoco.mjtGeom.mjGEOM_HFIELD: 'mesh'}
+
+FIELD_SIDE = 128
+"""Most heights of a height field that are drawn along a side."""
 
 
 class Scene:
@@ -53,14 +56,14 @@ class Scene:
     def shapes(self) -> dict[str, Any]:
         """Mass [kg] and standing height [m] of the robot, its legs and their feet's radii [m], and
         all shapes: body, kind, size [m], place [m] and quaternion (w, x, y, z) in the body,
-        colour; height fields are left out.
+        colour. A height field is a mesh, of every height or of ``FIELD_SIDE`` along a side.
         """
-        model, description = self._model, self._description
+        description = self._description
         return {
             'mass': description.mass, 'height': description.stance_height, 'legs': LEGS,
             'base': self._ids.base, 'feet': [foot.radius for foot in self._ids.feet],
-            'meshes': {str(i): self._mesh(i) for i in sorted(
-                {int(model.geom_dataid[g]) for g in self._shown() if self._kind(g) == 'mesh'})},
+            'meshes': {self._mesh_name(geom): self._mesh(geom) for geom in self._shown()
+                       if self._kind(geom) == 'mesh'},
             'shapes': [self._shape(geom) for geom in self._shown()]}
 
     def poses(self, base_position: ArrayLike, base_quaternion: NDArray[np.float64],
@@ -104,15 +107,39 @@ class Scene:
             'quaternion': model.geom_quat[geom].tolist(),
             'colour': geom_colour(model, geom).tolist(),
             'glow': float(model.mat_emission[material]) if material >= 0 else 0.0,
-            'mesh': int(model.geom_dataid[geom])}
+            'mesh': self._mesh_name(geom)}
 
-    def _mesh(self, mesh: int) -> dict[str, str]:
-        """Corners (n, 3) as float32 and triangles (m, 3) as int32, little-endian in base64."""
+    def _mesh_name(self, geom: int) -> str:
         model = self._model
-        corner, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
-        corners = model.mesh_vert[corner:corner + model.mesh_vertnum[mesh]]
-        faces = model.mesh_face[face:face + model.mesh_facenum[mesh]]
+        return f'{model.geom_type[geom]} {model.geom_dataid[geom]}'
+
+    def _mesh(self, geom: int) -> dict[str, str]:
+        """Corners (n, 3) as float32 and triangles (m, 3) as int32, little-endian in base64."""
+        model, mesh = self._model, self._model.geom_dataid[geom]
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_HFIELD:
+            corners, faces = _field(model, mesh)
+        else:
+            corner, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
+            corners = model.mesh_vert[corner:corner + model.mesh_vertnum[mesh]]
+            faces = model.mesh_face[face:face + model.mesh_facenum[mesh]]
         return {'corners': _text(corners.astype('<f4')), 'faces': _text(faces.astype('<i4'))}
+
+
+def _field(model: mujoco.MjModel, field: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Corners and triangles of the upper side of a height field."""
+    shape = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    first = model.hfield_adr[field]
+    share = model.hfield_data[first:first + shape[0] * shape[1]].reshape(shape)
+    along_y, along_x, height, _ = model.hfield_size[field][[1, 0, 2, 3]]
+    rows, columns = (np.unique(np.linspace(0, n - 1, min(n, FIELD_SIDE)).round().astype(int))
+                     for n in shape)
+    y, x = np.meshgrid(along_y * (2.0 * rows / (shape[0] - 1) - 1.0),
+                       along_x * (2.0 * columns / (shape[1] - 1) - 1.0), indexing='ij')
+    corners = np.stack((x, y, height * share[np.ix_(rows, columns)]), axis=-1).reshape(-1, 3)
+    cell = np.arange(corners.shape[0]).reshape(x.shape)
+    a, b, c, d = (each.ravel() for each in (
+        cell[:-1, :-1], cell[:-1, 1:], cell[1:, :-1], cell[1:, 1:]))
+    return corners, np.concatenate((np.stack((a, b, d), axis=1), np.stack((a, d, c), axis=1)))
 
 
 def geom_colour(model: mujoco.MjModel, geom: int) -> NDArray[np.float64]:
