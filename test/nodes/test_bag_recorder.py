@@ -257,11 +257,12 @@ def test_a_node_outside_the_table_is_refused(processes: Processes, tmp_path: Pat
 def writer(bag: Path) -> tuple[BagWriter, dict[str, object]]:
     bag_writer = BagWriter(bag)
     writers = {}
-    for name in ('joint_states', 'cmd_vel', 'inhibition_state', 'canonical_state'):
+    for name in ('joint_states', 'foot_contacts', 'cmd_vel', 'inhibition_state',
+                 'canonical_state'):
         topic = interface(name)
         writers[name] = bag_writer.add_topic(
             f'/{name}', topic.type_name, topic.publisher_qos, stamped=name != 'cmd_vel',
-            clock=name == 'joint_states')
+            clock=name in ('joint_states', 'foot_contacts'))
     return bag_writer, writers
 
 
@@ -294,6 +295,35 @@ def test_record_times_of_the_suite_do_not_depend_on_arrival(order: list[tuple[st
     for name, first in (('/joint_states', 2), ('/canonical_state', 3)):
         assert sorted(time_ns for time_ns, _ in recorded[name]
                       ) == [(k + 1) * TICK_NS for k in range(first, 9)]
+
+
+@given(st.permutations(5 * ['joint_states', 'foot_contacts', 'canonical_state']))
+def test_topics_that_come_apart_by_seconds_keep_their_times(order: list[str]) -> None:
+    stamps = [seconds * 10**9 for seconds in (1, 2, 4, 7, 8)]
+    left = {name: iter(stamps) for name in order}
+    with TemporaryDirectory() as folder:
+        bag = Path(folder) / 'bag'
+        closing, write = writer(bag)
+        write['joint_states'](serialize_message(joint_state(9)))
+        for name in order:
+            message = JointState()
+            set_stamp(message.header.stamp, next(left[name]))
+            write[name](serialize_message(message))
+        closing.close()
+        recorded = read(bag)
+    for name in left:
+        assert [time_ns for time_ns, _ in recorded[f'/{name}']][-5:] == stamps
+
+
+def test_a_robot_that_begins_anew_takes_the_clock_along(tmp_path: Path) -> None:
+    bag, write = writer(tmp_path / 'bag')
+    for k in (1, 1000, 2, 3):
+        for name in ('joint_states', 'foot_contacts', 'canonical_state'):
+            write[name](serialize_message(joint_state(k)))
+    write['cmd_vel'](serialize_message(Twist()))
+    bag.close()
+    ((time_ns, _),) = read(tmp_path / 'bag')['/cmd_vel']
+    assert time_ns == 4 * TICK_NS
 
 
 @pytest.mark.parametrize('stamp_ns', [10**18, 2 * 10**9, 15 * TICK_NS, 3 * TICK_NS])

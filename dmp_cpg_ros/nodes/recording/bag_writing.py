@@ -14,7 +14,9 @@ is the time, so that a lock-step recording does not depend on when its messages 
 A message that comes before the clock has reached its stamp waits for it. All others get the time
 that the clock shows: those of users, who may stamp with the time of the day; those without a
 stamp (stamp zero comes from a node that knows no time yet); and those whose stamp is before the
-recording or more than ``LAG_NS`` ahead. Nothing lies outside the time of the robot.
+recording or more than ``AHEAD_NS`` ahead. Nothing lies outside the time of the robot. A recorder
+that is starved of processor time hears one topic seconds before another; no time of a record
+depends on that.
 """
 
 from __future__ import annotations
@@ -23,6 +25,9 @@ import fcntl
 import struct
 import time
 from collections.abc import Callable
+from heapq import heappop, heappush
+from itertools import count
+from operator import itemgetter
 from pathlib import Path
 
 from rclpy.qos import QoSProfile
@@ -39,10 +44,11 @@ _STAMP_LITTLE, _STAMP_BIG = struct.Struct('<iI'), struct.Struct('>iI')
 _STAMP_AT = 4
 """A stamp that begins a message lies behind the four bytes that say how it is encoded."""
 
-LAG_NS = 1_000_000_000
-"""How far the robot's topics may come apart on their way to the recorder [ns]; a clock that goes
-back by more has begun anew.
-"""
+AHEAD_NS = 30_000_000_000
+"""How far one topic may be ahead of the clock on its way to the recorder [ns]."""
+
+ANEW_NS = 1_000_000_000
+"""A topic whose stamps go back by more comes from a clock that has begun anew [ns]."""
 
 _UNSET = bags.QosTime(9223372036, 854775807)
 
@@ -85,7 +91,9 @@ class BagWriter:
         self.counts: dict[str, int] = {}
         self.newest_ns: int | None = None
         self._first_ns = 0
-        self._waiting: list[tuple[bags.Connection, int, bytes]] = []
+        # Stamp, number and the rest of what waits for the clock; a heap.
+        self._waiting: list[tuple[int, int, bags.Connection, bytes]] = []
+        self._numbers = count()
         self._store = get_typestore(Stores.ROS2_JAZZY)
         try:
             self._writer = Writer(
@@ -122,14 +130,16 @@ class BagWriter:
         """
         connection = self._writer.add_connection(topic, type_name, typestore=self._store,
                                                  offered_qos_profiles=[offered_qos(qos)])
-        self.counts[topic] = 0
+        self.counts[topic] = last = 0
 
         def write(data: bytes) -> None:
+            nonlocal last
             self.counts[topic] += 1
             stamp = _leading_stamp(data) if stamped else 0
             if clock:
-                self._advance(stamp)
-            self._take(connection, stamp, data)
+                self._advance(stamp, anew=stamp < last - ANEW_NS)
+                last = stamp
+            self._take(stamp, connection, data)
 
         return write
 
@@ -151,8 +161,8 @@ class BagWriter:
         """Write what still waits for a clock with the time of the day, and complete the bag."""
         if self.newest_ns is None:
             self._advance(time.time_ns())
-        for message in self._waiting:
-            self._write(*message)
+        for stamp, _, connection, data in sorted(self._waiting, key=itemgetter(1)):
+            self._write(stamp, connection, data)
         try:
             if not any(self._writer.counts.values()):
                 self._writer.min_timestamp = 0
@@ -160,26 +170,30 @@ class BagWriter:
         except OSError as error:
             raise RecordingError(f"cannot complete '{self.folder}': {error}") from error
 
-    def _advance(self, stamp: int) -> None:
+    def _advance(self, stamp: int, *, anew: bool = False) -> None:
         """Set the clock; write what waited for this time."""
-        if self.newest_ns is None:
-            self._first_ns = self.newest_ns = stamp
-        elif not self.newest_ns - LAG_NS <= stamp <= self.newest_ns:
-            self.newest_ns, self._first_ns = stamp, min(stamp, self._first_ns)
-        waiting, self._waiting = self._waiting, []
-        for message in waiting:
-            self._take(*message)
+        waiting = self._waiting
+        if self.newest_ns is None or anew:
+            self._first_ns = stamp if self.newest_ns is None else min(stamp, self._first_ns)
+            self.newest_ns, self._waiting = stamp, []
+            for entry in sorted(waiting, key=itemgetter(1)):
+                self._take(entry[0], *entry[2:])
+            return
+        self.newest_ns = max(self.newest_ns, stamp)
+        while waiting and waiting[0][0] <= self.newest_ns:
+            due, _, connection, data = heappop(waiting)
+            self._write(due, connection, data)
 
-    def _take(self, connection: bags.Connection, stamp: int, data: bytes) -> None:
+    def _take(self, stamp: int, connection: bags.Connection, data: bytes) -> None:
         """Write a message, or let it wait for a clock that is about to reach its stamp, or that is
         not known yet.
         """
-        if self.newest_ns is None or self.newest_ns < stamp <= self.newest_ns + LAG_NS:
-            self._waiting.append((connection, stamp, data))
+        if self.newest_ns is None or self.newest_ns < stamp <= self.newest_ns + AHEAD_NS:
+            heappush(self._waiting, (stamp, next(self._numbers), connection, data))
         else:
-            self._write(connection, stamp, data)
+            self._write(stamp, connection, data)
 
-    def _write(self, connection: bags.Connection, stamp: int, data: bytes) -> None:
+    def _write(self, stamp: int, connection: bags.Connection, data: bytes) -> None:
         """Write a message with its stamp, or with the time of the clock where that is no time of
         this recording.
         """
