@@ -132,6 +132,8 @@ def parameter(client: SuiteClient, options: argparse.Namespace) -> None:
     given = parameter_value_to_python(get_parameter_value(value))
     if known[0].type == Parameter.Type.DOUBLE.value and type(given) is int:
         given = float(given)
+    if known[0].type == Parameter.Type.STRING.value and not isinstance(given, str):
+        given = value
     client.meet([], setting)
     change = SetParameters.Request(parameters=[Parameter(name, value=given).to_parameter_msg()])
     result = client.answer([setting.call_async(change)], setting.service_name).results[0]

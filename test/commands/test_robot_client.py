@@ -193,6 +193,8 @@ def test_parameters_are_read_set_and_refused_with_the_reason(suite: Processes) -
     assert "has no parameter 'rhoo'" in refused(suite, 'param', 'get', owner, 'rhoo')
     assert owner in told(nobody)
     assert 'param takes' in refused(suite, 'param', 'get', owner, status=2)
+    fault = '{component: encoder, kind: stuck, for_s: 0.5, leg: fl}'
+    assert 'failures_allowed' in refused(suite, 'param', 'set', 'mujoco_robot', 'fail', fault)
 
 
 def test_a_message_is_printed_as_yaml(suite: Processes) -> None:
