@@ -1,0 +1,81 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Two robots in one domain, each in its namespace: neither hears the other."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from ros_processes import SHARED_HZ, Processes, reserved_domain
+
+from dmp_cpg_ros.analysis.bag import payload_digests
+
+RUN_S = 600.0
+"""How long a minute of lock-step may take on a loaded machine [s]."""
+
+MINUTE = {
+    'robot1': """\
+name: one
+duration: 60.0
+events:
+  - {at: 0.5, inhibit: false}
+  - {at: 0.5, command: {v_x: 0.5}}
+  - {at: 14.0, inhibit: true}
+  - {at: 18.1, inhibit: false}
+  - {at: 30.0, command: {v_x: 0.3, gamma: 0.4}}
+  - {at: 40.0, push: {impulse: [0, 3, 0]}}
+  - {at: 52.0, inhibit: true}
+""",
+    'robot2': """\
+name: two
+duration: 60.0
+parameters: {gait: trot}
+events:
+  - {at: 1.0, inhibit: false}
+  - {at: 1.0, command: {v_x: 0.8, v_y: -0.1}}
+  - {at: 20.0, gait: amble}
+  - {at: 35.0, lie_down: true}
+  - {at: 42.0, stand_up: true}
+  - {at: 46.0, inhibit: false}
+  - {at: 46.0, command: {v_x: 0.4}}
+""",
+}
+"""What two robots do, each something else, with requests at other times."""
+
+
+def digests(folder: Path, domains: dict[str, int]) -> dict[str, dict[str, str]]:
+    """Let both walk their minute at the same time; returns what each has published."""
+    started = {name: Processes(domain) for name, domain in domains.items()}
+    try:
+        walks = {name: processes.executable(
+            'walk', str(folder / f'{name}.yaml'), '--composed', '--lock-step', '--no-report',
+            '--rate', str(SHARED_HZ), '--namespace', name,
+            '--out', str(folder / f'{name} in {processes.domain}'))
+            for name, processes in started.items()}
+        for walk in walks.values():
+            walk.wait_for_output('  walking\n', RUN_S)
+        assert all(walk.running for walk in walks.values()), walks
+        for walk in walks.values():
+            assert walk.wait(RUN_S) == 0, walk
+    finally:
+        for processes in started.values():
+            processes.end()
+    return {name: payload_digests(folder / f'{name} in {domain}')
+            for name, domain in domains.items()}
+
+
+def test_two_robots_in_one_domain_walk_a_minute_as_each_does_alone(tmp_path: Path) -> None:
+    for name, text in MINUTE.items():
+        (tmp_path / f'{name}.yaml').write_text(text, encoding='utf-8')
+    with ExitStack() as stack:
+        one, other, both = (stack.enter_context(reserved_domain()) for _ in range(3))
+        alone = digests(tmp_path, {'robot1': one, 'robot2': other})
+        together = digests(tmp_path, {'robot1': both, 'robot2': both})
+    assert alone == together
+    first, second = alone.values()
+    assert len(first) == len(second) == 6 and not set(first.values()) & set(second.values())
