@@ -167,14 +167,14 @@ export class Footfalls {
   draw(scene) {
     const [ink, width, height] = begin(this.canvas);
     if (!this.past.length) return;
-    const end = this.past[this.past.length - 1].time, left = 22, row = height / 4;
+    const end = this.past[this.past.length - 1].time, left = 26, row = height / 4;
     const x = (time) => left + (width - left) * (1 - (end - time) / 4);
     scene.legs.forEach((leg, i) => {
       const y = row * (i + 0.5);
+      ink.fillStyle = 'rgb(17 21 27 / 65%)';
+      ink.fillRect(0, y - row * 0.44, width, row * 0.88);
       ink.font = `600 12px ${FONT}`;
-      write(ink, leg, 0, y, COLOURS[leg]);
-      ink.fillStyle = 'rgb(17 21 27 / 55%)';
-      ink.fillRect(left, y - row * 0.36, width - left, row * 0.72);
+      write(ink, leg, 5, y, COLOURS[leg]);
       ink.fillStyle = COLOURS[leg];
       for (let k = 1; k < this.past.length; k++) {
         if (this.past[k].load[i] > 1) {

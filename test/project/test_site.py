@@ -65,7 +65,7 @@ def test_the_site_is_made_without_a_warning(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, '-m', 'mkdocs', 'build', '--strict', '--site-dir',
                            str(tmp_path)], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert 'inhibition_gain' in (tmp_path / 'reference' / 'index.html').read_text()
+    assert 'inhibition_gain' in (tmp_path / 'reference.html').read_text()
     for page in tmp_path.rglob('*.html'):
         fetched = re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="?(https?://[^">\s]+)',
                              page.read_text(encoding='utf-8'))

