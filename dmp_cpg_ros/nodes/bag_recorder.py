@@ -29,6 +29,9 @@ there may be several.
 
 TICK_TOPIC = 'joint_states'
 
+TAKE_EVERY_S = 0.05
+"""How often messages are taken that bear the robot's time [s]: nobody waits for the recorder."""
+
 
 @dataclass(frozen=True)
 class RecorderParameters(Parameters):
@@ -69,10 +72,13 @@ class BagRecorder(SuiteNode):
                   and (ALL in parameters.topics or topic.name in parameters.topics)]
         stamped = [topic.name for topic in topics if _bears_robot_time(topic)]
         clocks = [name for name in stamped if name in CLOCK_TOPICS] or stamped
+        topics.sort(key=lambda topic: topic.name not in clocks)  # the others wait for a clock
         self._drained_at_end = [
             self._record(STAMPED_CMD_VEL if parameters.stamped_cmd_vel and topic.name == 'cmd_vel'
                          else topic, topic.name in stamped, topic.name in clocks)
             for topic in topics]
+        self._clocks = self._drained_at_end[:len(clocks)]
+        self.look_every(TAKE_EVERY_S)
         self._recorded = self.publisher('~/recorded')
         self._started = time.monotonic()
         # The wall clock drives only how much a kill may cost.
@@ -113,12 +119,15 @@ class BagRecorder(SuiteNode):
         is_tick = topic.name == TICK_TOPIC
 
         def receive(data: bytes) -> None:
+            if not stamped:  # it gets the time that the clock shows
+                for subscription in self._clocks:
+                    drain(subscription)
             write(data)
             if is_tick:
                 self.begin_tick(self._bag.newest_ns or 0)
                 self.end_tick()
 
-        return self.listen(topic, receive, raw=True, qos=topic.recorder_qos)
+        return self.listen(topic, receive, raw=True, wakes=not stamped, qos=topic.recorder_qos)
 
 
 def _bears_robot_time(topic: Interface) -> bool:

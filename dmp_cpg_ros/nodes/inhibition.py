@@ -108,7 +108,7 @@ class InhibitionNode(SuiteNode):
             'reference': conversions.read_reference,
             **sensors,
             **(mode if self.lock_step else {}),
-        }, delayed={} if self.lock_step else mode, optional=sensors)
+        }, delayed={} if self.lock_step else mode, optional=sensors, last='posture_feedback')
         self._gate = self.certified.commands()
         self.serve('inhibit', self._take_request)
 

@@ -59,7 +59,7 @@ class LegTransformation(SuiteNode):
         }
         if parameters.reading == 'torque':
             readers['joint_states'] = JointsReader(description.joint_names).read
-        self.match('canonical_state', readers)
+        self.match('canonical_state', readers, last='posture_feedback')
 
     def on_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         """Advance the leg to the stamp of the canonical state."""

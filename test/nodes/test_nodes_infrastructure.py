@@ -416,6 +416,44 @@ def test_nothing_enters_an_inactive_node_but_what_is_latched(ros: Ros, started: 
     assert robot.tick().twist.linear.x == 0.25
 
 
+class Matching(Relay):
+    """Ticks with foot contacts and joints, of which the latter come last."""
+
+    def configure(self) -> None:
+        self.command, self.stamps = (0.0, 0.0, 0.0), []
+        self.match('joint_states', dict.fromkeys(('foot_contacts', 'joint_states'), header_ns))
+
+    def on_tick(self, stamp_ns: int, values: dict[str, int]) -> None:
+        self.stamps.append(values)
+
+
+def test_only_the_last_message_of_a_tick_wakes_and_the_others_are_taken_without_it(
+        ros: Ros) -> None:
+    node = Matching('matching', context=ros.context)
+    ros.nodes.append(node)
+    node.start()
+    ros.executor.add_node(node)
+    names = ('foot_contacts', 'joint_states')
+    assert [name for name in names if any(
+        entry.topic_name == f'/{name}' for entry in node.subscriptions)] == ['joint_states']
+    senders = [ros.node.create_publisher(JointState, name, interface(name).publisher_qos)
+               for name in names]
+    ros.spin_until(lambda: all(sender.get_subscription_count() for sender in senders))
+    message = JointState()
+    for k in range(1, 20):
+        set_stamp(message.header.stamp, k * TICK)
+        for sender in senders:
+            sender.publish(message)
+            assert sender.wait_for_all_acked()
+    ros.spin_until(lambda: len(node.stamps) == 19)
+    assert node.stamps == [dict.fromkeys(names, k * TICK) for k in range(1, 20)]
+    set_stamp(message.header.stamp, 20 * TICK)
+    senders[0].publish(message)
+    ros.spin_until(lambda: node.inputs.reached('foot_contacts', 20 * TICK))
+    ros.executor.remove_node(node)
+    node.close()
+
+
 # Messages and diagnostics ----------------------------------------------------------------------
 
 

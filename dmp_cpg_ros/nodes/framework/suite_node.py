@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from math import inf
 from typing import Any, ClassVar, TypeVar, cast
@@ -61,6 +61,10 @@ SEVERAL_S = 2.0
 
 STALE_NS = 250_000_000
 """In real time: age from which messages of ticks are not worth being worked through [ns]."""
+
+LOOK_AFTER_S = 0.02
+"""How often a node looks after inputs that do not wake it, in case the one that does is late [s].
+"""
 
 FRESH_NS = 20_000_000
 """Age up to which a memory of the gait is where a restarted node goes on [ns]: within it the robot
@@ -126,6 +130,7 @@ class SuiteNode(GuardedLifecycleNode):
         self._undo: list[Callable[[], object]] = []
         self._said: list[Callable[[], None]] = []
         self._commands: list[Subscription] = []
+        self._not_waking: dict[str, Subscription] = {}
         self._commands_taken: dict[str, int] = {}
         self._inputs: list[tuple[Interface, Subscription]] = []
         self._writers: dict[str, list[WriterWatch]] = {}
@@ -285,7 +290,7 @@ class SuiteNode(GuardedLifecycleNode):
         return SuitePublisher(publisher, topic.name, self.local, said)
 
     def listen(self, topic: str | Interface, callback: Callable[[Any], None], *,
-               command: bool = False, raw: bool = False,
+               command: bool = False, raw: bool = False, wakes: bool = True,
                qos: QoSProfile | None = None) -> Subscription | None:
         """Create a subscription whose callback runs while the node is active.
 
@@ -307,6 +312,8 @@ class SuiteNode(GuardedLifecycleNode):
             ``~/commands_taken``.
         raw : bool
             Whether the callback takes serialized bytes.
+        wakes : bool
+            Whether a message wakes the node; else it waits for :meth:`look_after`.
         qos : QoSProfile, optional
             Default: the profile of the interface for the suite's nodes.
 
@@ -343,7 +350,25 @@ class SuiteNode(GuardedLifecycleNode):
         self._inputs.append((topic, subscription))
         if command:
             self._commands.append(subscription)
+        if not wakes:
+            self._not_waking[topic.name] = subscription
         return subscription
+
+    @property
+    def subscriptions(self) -> Iterator[Subscription]:
+        """Subscriptions whose messages wake the node, for the executor."""
+        quiet = self._not_waking.values()
+        return (entry for entry in super().subscriptions if entry not in quiet)
+
+    def look_after(self) -> None:
+        """Take what waits of the topics that do not wake the node."""
+        for subscription in list(self._not_waking.values()):
+            drain(subscription)
+
+    def look_every(self, period_s: float) -> None:
+        """Call :meth:`look_after` with a period of wall time [s]."""
+        self._undo.append(partial(
+            self.destroy_timer, self.create_steady_timer(period_s, self.look_after)))
 
     def _from_writers(self, topic: Interface, callback: Callable[[Any], None],
                       read: Callable[[bytes], Any]) -> Callable[..., None]:
@@ -463,6 +488,7 @@ class SuiteNode(GuardedLifecycleNode):
         for undo in reversed(self._undo):
             undo()
         self._undo, self._commands, self._inputs, self._writers = [], [], [], {}
+        self._not_waking = {}
         self._outputs = self._outputs[:1]
 
     def missing(self) -> list[str]:
@@ -502,8 +528,11 @@ class SuiteNode(GuardedLifecycleNode):
     # Ticks -------------------------------------------------------------------------------------
 
     def match(self, trigger: str, readers: Readers, *, delayed: Readers | None = None,
-              optional: Collection[str] = ()) -> None:
+              optional: Collection[str] = (), last: str = '') -> None:
         """Run :meth:`on_tick` for every tick with what readers make of the messages of topics.
+
+        A node is woken by the message that comes last of those of a tick, and by delayed ones:
+        every waking costs more than the message that it is for.
 
         Parameters
         ----------
@@ -513,8 +542,10 @@ class SuiteNode(GuardedLifecycleNode):
             Topics of the tick, and those that act one tick later, with what reads their messages.
         optional : collection of str
             As for :class:`~dmp_cpg_ros.nodes.framework.ticks.TickInputs`.
+        last : str
+            The topic whose message comes last; default the trigger.
         """
-        delayed = delayed or {}
+        delayed, last = delayed or {}, last or trigger
         self._clock_of_ticks = TickClock()
         ticks = TickInputs(self._run_tick, tuple(readers), trigger, delayed=tuple(delayed),
                            optional=tuple(optional), lock_step=self.lock_step,
@@ -524,6 +555,9 @@ class SuiteNode(GuardedLifecycleNode):
         def feeding(name: str, read: Callable[[Any], Any]) -> Callable[[Any], None]:
             def feed(message: Any) -> None:
                 stamp_ns = header_ns(message)
+                if name == last:
+                    for other, subscription in self._not_waking.items():
+                        drain(subscription, partial(ticks.reached, other, stamp_ns))
                 if not ticks.add(name, stamp_ns, read(message)):
                     raise DataError(
                         f'stamp {stamp_ns * 1e-9:.3f} s is not of this run of the robot, whose '
@@ -532,7 +566,9 @@ class SuiteNode(GuardedLifecycleNode):
             return feed
 
         for name, read in {**readers, **delayed}.items():
-            self.listen(name, feeding(name, read))
+            self.listen(name, feeding(name, read), wakes=name == last or name in delayed)
+        if self._not_waking:
+            self.look_every(LOOK_AFTER_S)
 
     def remembered(self, gaits: KnownGaits) -> Callable[[int], tuple[float, Any] | None]:
         """Listen for what the node held before it was restarted, as others remember it.

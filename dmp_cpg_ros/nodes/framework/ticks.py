@@ -155,6 +155,11 @@ class TickInputs:
         """Newest stamp of an input [ns]; −1 without any."""
         return self._newest.get(name, (-1, None))[0]
 
+    def reached(self, name: str, stamp_ns: int) -> bool:
+        """Whether an input has come up to a stamp [ns]."""
+        newest = self._newest.get(name)
+        return newest is not None and newest[0] >= stamp_ns
+
     def _ignore(self, name: str, repeated: bool) -> None:
         self.ignored += 1
         if repeated and self._lock_step and name == self._trigger:
@@ -232,17 +237,19 @@ class TickInputs:
         self._on_tick(stamp, tick)
 
 
-def drain(subscription: Any) -> int:
+def drain(subscription: Any, enough: Callable[[], bool] = lambda: False) -> int:
     """Take what waits in a subscription's queue now, in order, as the executor would.
 
     A node calls this for its command topics at the start of its tick, so that commands which
-    arrived before the tick act in it whatever the executor's order. The executor later finds the
-    queue empty and goes on.
+    arrived before the tick act in it whatever the executor's order, and for topics that do not
+    wake it. The executor later finds the queue empty and goes on.
 
     Parameters
     ----------
     subscription : rclpy.subscription.Subscription
         Its callback is called for every message.
+    enough : callable () → bool
+        Asked before every message whether to leave the rest.
 
     Returns
     -------
@@ -252,10 +259,11 @@ def drain(subscription: Any) -> int:
     count, handle, msg_type, raw = 0, subscription.handle, subscription.msg_type, subscription.raw
     kinds = type(subscription).CallbackType
     with_information = subscription._callback_type is kinds.WithMessageInfo
-    while True:
+    while not enough():
         with handle:
             taken = handle.take_message(msg_type, raw)
         if taken is None:
-            return count
+            break
         count += 1
         subscription.callback(*taken[:1 + with_information])
+    return count
