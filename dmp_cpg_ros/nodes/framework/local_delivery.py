@@ -52,7 +52,7 @@ class LocalDelivery:
     def publish(self, topic: str, message: Any) -> None:
         """Deliver a message, after those that are under way."""
         queue = self._queue
-        queue.extend((callback, message) for callback in self._readers.get(topic, ()))
+        queue.extend([(callback, message) for callback in self._readers.get(topic, ())])
         if self._busy:
             return
         self._busy = True

@@ -129,10 +129,10 @@ class TickInputs:
             self._ignore(name, last is not None)
             return True
         tick[name] = value
-        if self._lock_step:
-            self._fire_exact()
-        else:
+        if not self._lock_step:
             self._fire_newest()
+        elif len(tick) == len(self._inputs):
+            self._fire_exact()
         if len(self._pending) > PENDING_TICKS:
             del self._pending[min(self._pending)]
         return True
@@ -206,6 +206,8 @@ class TickInputs:
 
     def _waits(self, stamp: int, tick: dict[str, Any]) -> bool:
         """Whether the tick, which has been triggered, lacks an input that may still come."""
+        if len(tick) == len(self._inputs):
+            return False
         triggered = sum(self._trigger in each for each in self._pending.values())
         return triggered <= 1 + HOLD_TICKS and any(
             name not in tick and self._missed[name] < PATIENCE and not self._is_lost(name, stamp)

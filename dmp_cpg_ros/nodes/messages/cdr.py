@@ -12,7 +12,7 @@ encoded otherwise is left to rclpy.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -77,36 +77,41 @@ class SerializedJointState(Serialized):
         Made when they are asked for.
     """
 
-    __slots__ = ('_places', '_sound', 'effort', 'name', 'position', 'velocity')
+    __slots__ = ('_places', '_sound', '_trusted', 'effort', 'name', 'position', 'velocity')
     KIND = JointState
 
     def _read(self, at: int) -> None:
         self.name, at = _names(self.serialized, at)
-        self._places, self._sound = {}, set[str]()
+        self._places, self._sound, self._trusted = {}, dict[str, Array](), False
         for field in FIELDS:
             self._places[field] = _, at = _doubles(self.serialized, at)
 
-    def refilled(self, data: bytes, stamp_ns: int) -> SerializedJointState:
-        """Return a message of the same layout, without reading that again."""
+    def refilled(self, data: bytes, stamp_ns: int, *, sound: bool) -> SerializedJointState:
+        """Return a message of the same layout, without reading that again; its numbers too where
+        they are known to be sound.
+        """
         message = SerializedJointState.__new__(SerializedJointState)
         message.serialized, message.stamp_ns = data, stamp_ns
-        message.name, message._places, message._sound = self.name, self._places, set()
+        message.name, message._places, message._sound = self.name, self._places, {}
+        message._trusted = sound
         return message
 
     def __getattr__(self, field: str) -> Array:
         if field not in FIELDS:
             raise AttributeError(field)
         begin, end = self._places[field]
-        setattr(self, field, np.frombuffer(self.serialized[begin:end]))
-        return getattr(self, field)
-
-    def checked(self, field: str) -> Array:
-        """An array whose numbers are finite, checked once for all readers; raises DataError."""
-        array: Array = getattr(self, field)
-        if field not in self._sound:
-            checked(array, field)
-            self._sound.add(field)
+        array = np.frombuffer(self.serialized[begin:end])
+        setattr(self, field, array)
         return array
+
+    def checked(self, fields: Sequence[str]) -> list[Array]:
+        """Arrays whose numbers are finite, checked once for all readers; raises DataError."""
+        sound = self._sound
+        for field in fields:
+            if field not in sound:
+                array = getattr(self, field)
+                sound[field] = array if self._trusted else checked(array, field)
+        return [sound[field] for field in fields]
 
 
 class SerializedTwist(Serialized):

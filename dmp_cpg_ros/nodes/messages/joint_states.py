@@ -47,8 +47,8 @@ class JointStateReader:
             self._index, self._seen = self._order_of(names), list(names)
         index = self._index
         if index is None and self._strict and isinstance(message, SerializedJointState):
-            found = [message.checked(field) for field in self._fields]
-            if all(values.shape[0] == size for values in found):
+            found = message.checked(self._fields)
+            if all([len(values) == size for values in found]):
                 return found
         arrays = []
         for field in self._fields:
@@ -113,4 +113,5 @@ class JointStateWriter:
         DataError
             If a number is not finite.
         """
-        return self._like.refilled(self._message.filled(time_ns, *values, sound=sound), time_ns)
+        data = self._message.filled(time_ns, *values, sound=sound)
+        return self._like.refilled(data, time_ns, sound=sound)
