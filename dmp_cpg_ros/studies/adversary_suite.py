@@ -20,6 +20,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
+from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, WINNER_TAKE_ALL
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -240,7 +241,8 @@ def _do(loop: Oscillators, kind: str, value: Any, expected: tuple[int, float, fl
 _GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 _NUMBERS = {'coupling_gain': (8.0, 400.0), 'rho': (0.5, 20.0), 'inhibition_gain': (60.0, 4000.0),
             'region_radius': (0.03, 1.2), 'cadence_scale': (0.25, 4.0), 'alpha_r': (0.7, 20.0),
-            'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0), 'braking': (0.2, 20.0)}
+            'capture_speed': (0.02, 2.0), 'max_speed': (0.05, 4.0), 'braking': (0.2, 20.0),
+            'radius': (0.3, 3.0), 'gait_change_rate': (0.05, 0.5)}
 _DEFAULTS = {'max_lateral_speed': 0.3, 'max_turn_rate': 1.0, 'auto_inhibit': False,
              'push_recovery': False}  # a stop that a push releases has no bound
 
@@ -264,8 +266,15 @@ def setting(rng: np.random.Generator) -> Case:
     parameters: Case = dict(_DEFAULTS)
     for name in (*names, 'coupling_graph', 'inhibited_legs'):
         parameters |= _change(rng, [name])
-    if rng.random() < 0.1:
-        parameters['voting'] = True
+    if rng.random() < 0.2:
+        parameters |= {'voting': True, 'vote_fade': float(rng.uniform(0.05, 3.0)),
+                       'vote_majority': int(rng.integers(1, 5)),
+                       'vote_rule': str(rng.choice((SUM, WINNER_TAKE_ALL), p=(0.8, 0.2))),
+                       'vote_resume': bool(rng.random() < 0.3)}
+        if rng.random() < 0.3:
+            parameters['vote_limit'] = float(rng.uniform(0.05, 1.0))
+        if rng.random() < 0.7:
+            parameters['silence_weight'] = 0.0               # or votes never fade
     return {'gait': str(rng.choice(list(GAITS))), 'parameters': parameters,
             'tick_s': float(rng.choice([0.001, 0.002, 0.004, 0.004, 0.01])), 'events': []}
 
@@ -275,21 +284,19 @@ def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
     events: list[list[Any]] = [[0.1, 'start', None],
                                [0.0, 'command', [float(rng.uniform(0.0, 3.0)), 0.0, 0.0]]]
     if rng.random() < 0.6:
-        return events + _telling(rng)
+        return events + _telling(rng, voting)
     for _ in range(rng.integers(3, 14)):
-        kind = str(rng.choice(['stop', 'start', 'set', 'gait', 'command', 'vote', 'push'],
-                              p=(0.3, 0.22, 0.22, 0.05, 0.08, 0.03, 0.1)))
+        kind = str(rng.choice(['stop', 'start', 'change', 'command', 'vote', 'push'],
+                              p=(0.3, 0.22, 0.27, 0.08, 0.03, 0.1)))
         value: Any = None
-        if kind == 'set':
-            value = _change(rng, [*_NUMBERS, 'inhibited_legs', 'coupling_graph'])
-        elif kind == 'gait':
-            value = str(rng.choice(list(GAITS)))
+        if kind == 'change':
+            kind, value = _changing(rng)
         elif kind == 'command':
             value = [float(rng.uniform(-1.0, 3.0)), 0.0, float(rng.uniform(-0.5, 0.5))]
         elif kind == 'vote':
             if not voting:
                 continue
-            value = {str(leg): 1.0 for leg in rng.permutation(LEGS)[:rng.integers(1, 5)]}
+            value = _votes(rng)
         elif kind == 'push':
             value = _push(rng)
         wait = float(np.exp(rng.uniform(np.log(0.004), np.log(3.0))))
@@ -297,12 +304,25 @@ def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
     return events
 
 
+def _changing(rng: np.random.Generator) -> tuple[str, Any]:
+    """Another gait or another value of a parameter."""
+    if rng.random() < 0.3:
+        return 'gait', str(rng.choice(list(GAITS)))
+    return 'set', _change(rng, [*_NUMBERS, 'inhibited_legs', 'coupling_graph'])
+
+
+def _votes(rng: np.random.Generator) -> Case:
+    """Weights of some legs, mostly whole ones."""
+    legs = rng.permutation(LEGS)[:rng.integers(1, 5)]
+    return {str(leg): float(rng.choice([1.0, 1.0, rng.uniform(0.02, 1.0)])) for leg in legs}
+
+
 def _push(rng: np.random.Generator) -> list[float]:
     """Margin [m], and how long it lasts [s]."""
     return [float(rng.uniform(-0.05, 0.1)), float(np.exp(rng.uniform(np.log(0.004), np.log(1.0))))]
 
 
-def _telling(rng: np.random.Generator) -> list[list[Any]]:
+def _telling(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
     """Sequences that once told that something was missing, at other times and values."""
     def change(*names: str) -> Case:
         return _change(rng, names)
@@ -310,6 +330,10 @@ def _telling(rng: np.random.Generator) -> list[list[Any]]:
     def soon() -> float:
         return float(np.exp(rng.uniform(np.log(0.004), np.log(0.6))))
 
+    if voting and rng.random() < 0.7:                        # changes while votes hold the gait
+        return [entry for _ in range(2) for entry in (
+            [2.0, 'vote', _votes(rng)],
+            *([4.0 * soon(), *_changing(rng)] for _ in range(3)), [3.0, 'start', None])]
     kind = rng.integers(5)
     if kind == 0:                                            # stops within starts
         return [entry for _ in range(3) for entry in (
@@ -322,8 +346,8 @@ def _telling(rng: np.random.Generator) -> list[list[Any]]:
                 [1.0, 'set', change('cadence_scale')], [soon(), 'stop', None]]
     if kind == 2:                                            # changes at rest
         return [[1.0, 'stop', None], *([2.0, 'set', change(
-            'inhibited_legs', 'coupling_gain', 'inhibition_gain', 'region_radius', 'rho')]
-            for _ in range(3)), [2.0, 'start', None]]
+            'inhibited_legs', 'coupling_gain', 'inhibition_gain', 'region_radius', 'rho',
+            'radius')] for _ in range(3)), [2.0, 'start', None]]
     if kind == 3:                                            # stops of a robot that was pushed
         return [entry for _ in range(3) for entry in (
             [soon(), 'push', _push(rng)], [soon(), 'stop', None], [soon(), 'push', _push(rng)],

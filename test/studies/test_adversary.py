@@ -35,9 +35,17 @@ AT_REST = case({'coupling_gain': 25.0}, (1.0, 'set', {'inhibited_legs': ('rr',)}
 BROKEN = {'places': WITHIN_A_START, 'arming': LOWERED_LIMIT, 'acting': CADENCE, 'holding': AT_REST}
 
 
-@pytest.mark.xfail(strict=True, reason='votes alone do not hold a bound that is set at rest')
-def test_a_bound_set_while_votes_hold_the_gait_is_held() -> None:
-    held = case({'voting': True}, (0.1, 'start', None), (1.4, 'gait', 'bound'))
+@pytest.mark.parametrize('change', [
+    ('gait', 'bound'), ('set', {'cadence_scale': 2.0}), ('set', {'radius': 2.0}),
+    ('set', {'region_radius': 0.1})], ids=str)
+@pytest.mark.parametrize('wait_s', [0.3, 0.9, 4.0])
+@pytest.mark.parametrize('held_by', ['votes', 'service'])
+def test_what_is_stopped_stays_so_in_a_change(held_by: str, wait_s: float,
+                                              change: tuple[str, object]) -> None:
+    stop = ('vote', dict.fromkeys(('fl', 'fr', 'rl'), 1.0)) if held_by == 'votes' else (
+        'stop', None)
+    held = case({'voting': True, 'silence_weight': 0.0}, (0.1, 'start', None), (2.0, *stop),
+                (wait_s, *change), (8.0, 'start', None))
     assert play(ROBOT, held)[0] == ''
 
 

@@ -42,7 +42,7 @@ UNCERTIFIED = frozenset(
      *VOTE_SOURCES))
 """Parameters of certified nodes that no inequality depends on."""
 
-_CAPTURING = frozenset(('rho', 'coupling_gain', 'coupling_graph', 'inhibition_gain',
+_CAPTURING = frozenset(('rho', 'radius', 'coupling_gain', 'coupling_graph', 'inhibition_gain',
                         'region_radius', 'inhibited_legs'))
 """Parameters that decide which set inhibition holds the legs in."""
 
@@ -120,7 +120,7 @@ class Running:
 
         While the gait runs every certified change may: inhibition sets in when the legs are in
         their places. In a stop that holds them, the state must be in the invariant set of the new
-        parameters, or the legs would break free and take a stride.
+        parameters, or the legs would break free and take a stride; votes have no such set.
 
         Parameters
         ----------
@@ -133,14 +133,21 @@ class Running:
         x : ndarray (4, 2)
             States.
         """
-        names = sorted(_CAPTURING.intersection(before.differences(self)))
+        acting, service = inhibition.gains, before.parameters.inhibition
+        voted = bool((acting < service.gains_on(int(acting.argmax()))).any())
+        names = sorted((_CAPTURING | {'cadence_scale'} if voted else _CAPTURING)
+                       & before.differences(self).keys())
         if not (names and inhibition.requested
                 and network.acting_gains(inhibition, x).any()):
             return ''
+        if voted:
+            return (f'{", ".join(names)} cannot change while votes alone hold the legs; ask again '
+                    'while the gait runs or is stopped by the service')
         if not inhibition.at_rest:
             return (f'{", ".join(names)} cannot change while the legs are being captured; ask '
                     'again when they are at rest')
-        target = network.target_at(inhibition.rest_phase)
+        target = network.with_parameters(self.parameters.canonical).target_at(
+            inhibition.rest_phase)
         outside = self._outside(x, np.linalg.norm(x - target, axis=1), inhibition.gains)
         return outside and (f'{", ".join(names)} cannot change in this rest: {outside}; ask again '
                             'while the gait runs')

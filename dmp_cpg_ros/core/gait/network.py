@@ -33,6 +33,9 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 LONGEST_STEP = 0.005
 """Longest time step of the oscillators [s]."""
 
+AT_REST = 0.05
+"""Rates |ẋ| up to which oscillators rest and may be turned [1/s]."""
+
 
 @dataclass(frozen=True)
 class CanonicalParameters(Parameters):
@@ -247,8 +250,9 @@ class GaitNetwork:
             x = following
         return x
 
-    def settled(self, x: Array, r: Array, inhibition: Inhibition) -> Array:
-        """Equilibrium (4, 2) near a state under inhibition, by Newton's iteration.
+    def settled(self, x: Array, r: Array, inhibition: Inhibition) -> Array | None:
+        """Equilibrium (4, 2) near a state under inhibition, by Newton's iteration; None where the
+        gains that act do not hold the legs in their regions C_i.
 
         Parameters
         ----------
@@ -257,13 +261,14 @@ class GaitNetwork:
         r : ndarray (3,)
             Reference, about zero.
         inhibition : Inhibition
-            That acts at x.
+            Of which acts what acts at x.
         """
         system, _ = self._frame(inhibition.rest_phase)
         omega, gains = self.omega(r), inhibition.acting_gains(x, system.target)
         for _ in range(6):
             x = system.newton_step(x, omega, gains)
-        return x
+        held = np.array_equal(inhibition.acting_gains(x, system.target), gains)
+        return x if held and np.abs(self.rate(x, r, inhibition)).max() <= AT_REST else None
 
     def phase_errors(self, x: Array) -> Array:
         """Deviation of each leg's phase from its place, relative to the circular mean, ndarray

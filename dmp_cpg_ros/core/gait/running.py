@@ -14,7 +14,8 @@ new parameters at once: they enter ẋ and leave x as it is. The factor on the c
   and bounded for the stop holds for the blend as it stands.
 - At rest all feet are on the ground and no leg swings, so the requested gait takes effect at
   once: the oscillators are turned to their places in it and to its equilibrium, and the legs,
-  whose swing height and speed are zero, stay where they are.
+  whose swing height and speed are zero, stay where they are. Where votes alone hold the gait and
+  could not hold the new one, the change waits until the gait runs or the service stops it.
 
 The gait may be chosen by speed. Animals change gait at similar dimensionless speeds û = u/√(g l)
 (Alexander & Jayes 1983: from walk to trot about û = 0.7, Froude number 0.5), and later when they
@@ -39,7 +40,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait import contact_feedback as contacts
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
-from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
+from dmp_cpg_ros.core.gait.network import AT_REST, CanonicalParameters, GaitNetwork
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
@@ -135,9 +136,6 @@ CADENCE_RATE = 0.5
 A foot in stance stands where its phase and the cadence put it: v Δc/f from its foothold. A jump of
 the cadence would be a jump of the feet.
 """
-
-AT_REST = 0.05
-"""Rates |ẋ| up to which oscillators rest and may be turned [1/s]."""
 
 HASTE = 1.1
 """Share of a gait's highest speed at which a change into it begins. Commands are within the limit
@@ -312,7 +310,8 @@ class RunningGait:
             return network, x
         if inhibition.at_rest:
             new = self.network(wanted.scaled(gait.cadence_scale))
-            return new, new.settled(turned(x, wanted.phases - gait.phases), r, inhibition)
+            rest = new.settled(turned(x, wanted.phases - gait.phases), r, inhibition)
+            return (network, x) if rest is None else (new, rest)
         if inhibition.requested or isinstance(gait, BlendedGait):
             return network, x
         v_x, v_y, gamma = r.tolist()

@@ -29,6 +29,7 @@ from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, PushState, push_step
 from dmp_cpg_ros.core.inhibition.step_timing import quickened
 from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
+from dmp_cpg_ros.core.inhibition.voting import holds_at_rest
 from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -144,9 +145,7 @@ class GaitSupervisor:
         self.parameters, self.voting, self.activity_rate = parameters, voting, activity_rate
 
     def initial_state(self, time_ns: int = 0, leg: int = 0) -> SupervisorState:
-        """At rest, with a leg inhibited where it is chosen, or free when ``start_inhibited`` is
-        false.
-        """
+        """At rest, a leg inhibited, or free when ``start_inhibited`` is false."""
         stopped = self.parameters.start_inhibited
         return SupervisorState(time_ns, 'at_rest' if stopped else 'free', stopped, True, time_ns,
                                stopped, np.full(len(LEGS), 0.0 if stopped else 1.0),
@@ -171,8 +170,7 @@ class GaitSupervisor:
 
     def request(self, state: SupervisorState, stop: bool, automatic: bool = False
                 ) -> SupervisorState:
-        """Ask for a stop or a start; asking for what is already asked changes nothing but its
-        origin.
+        """Ask for a stop or a start; what is already asked changes nothing but its origin.
 
         A service call that asks for a start ends a stop by votes too, once nobody votes any more.
         """
@@ -218,7 +216,7 @@ class GaitSupervisor:
             state = self._barred(state, body_mode)
         elif self.parameters.auto_inhibit:
             state = self._automatic(state, any(command))
-        state = self._voted(state, tally or state.tally)
+        state = self._voted(state, tally or state.tally, network)
         state = self._pushed(state, network, x, margins, body_mode)
         quick, state = state.quickness > 1.0, self._balancing(state, margins, network, dt)
         if state.requested:
@@ -251,19 +249,23 @@ class GaitSupervisor:
             return self.request(state, True, True)
         return state
 
-    def _voted(self, state: SupervisorState, tally: Tally) -> SupervisorState:
+    def _voted(self, state: SupervisorState, tally: Tally, network: GaitNetwork
+               ) -> SupervisorState:
         """Stop when votes overcome the threshold; keep what holds until it is released."""
         if tally is not state.tally:
             state = replace_unchecked(state, tally=tally)
-        if tally.stops and not state.voted:
-            return self._turned(replace_unchecked(state, voted=True, vote_gains=tally.gains))
         if not state.voted:
-            return state
+            return self._turned(replace_unchecked(
+                state, voted=True, vote_gains=tally.gains)) if tally.stops else state
         if not tally.alive and self.voting.vote_resume:
             return self._turned(replace_unchecked(state, voted=False))
-        if self.voting.vote_rule == SUM and np.any(tally.gains > state.vote_gains):
-            return replace_unchecked(state, vote_gains=np.maximum(tally.gains, state.vote_gains))
-        return state
+        gains = state.vote_gains
+        if self.voting.vote_rule == SUM and np.any(tally.gains > gains):
+            gains = np.maximum(tally.gains, gains)
+        if not (state.asked or holds_at_rest(network, gains, self.parameters.region_radius)):
+            # parameters or cadence have changed: what the votes asked for, the service's gain does
+            gains = np.maximum(gains, self.parameters.gains_on(state.leg))
+        return state if gains is state.vote_gains else replace_unchecked(state, vote_gains=gains)
 
     def _pushed(self, state: SupervisorState, network: GaitNetwork, x: Array,
                 margins: Sequence[float] | None, body_mode: str) -> SupervisorState:
@@ -272,9 +274,7 @@ class GaitSupervisor:
         if (self.parameters.push_recovery and (state.asked or state.voted)
                 and body_mode in ('standing', 'stopping')):
             push = push_step(state.push, state.time_ns, state.state, network, x, margins)
-        if push is state.push:
-            return state
-        return self._turned(replace_unchecked(state, push=push))
+        return state if push is state.push else self._turned(replace_unchecked(state, push=push))
 
     @staticmethod
     def _turned(state: SupervisorState) -> SupervisorState:
@@ -345,6 +345,5 @@ class GaitSupervisor:
     @staticmethod
     def _measured(state: SupervisorState) -> float:
         """Time from the request to now, kept once it has been set [s]."""
-        if isfinite(state.measured_s):
-            return state.measured_s
-        return (state.time_ns - state.request_ns) * 1e-9
+        known = isfinite(state.measured_s)
+        return state.measured_s if known else (state.time_ns - state.request_ns) * 1e-9

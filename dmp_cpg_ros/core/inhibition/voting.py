@@ -13,12 +13,13 @@ stiff couplings that is Σ k_inh α_i > N ω r / r0, whoever votes.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
-from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.voting import MajorityClamp, majority_clamp
 from dmp_cpg_ros.core.gait.network import GaitNetwork
@@ -100,16 +101,14 @@ def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: V
     return VoteClamp(gain, gain / k_inh, window)
 
 
-def holds_at_rest(system: CanonicalSystem, omega: float, gains: Array,
-                  region_radius: float) -> bool:
-    """Whether votes overcome the threshold: they can hold the gait at rest.
+def holds_at_rest(network: GaitNetwork, gains: Array, region_radius: float) -> bool:
+    """Whether votes overcome the threshold: they can hold the gait at rest, at the cadence that
+    acts and at the one that it is on its way to.
 
     Parameters
     ----------
-    system : CanonicalSystem
-        Oscillators.
-    omega : float
-        Angular frequency [rad/s].
+    network : GaitNetwork
+        Oscillators that act.
     gains : ndarray (N,)
         Gains k_inh α_i [1/s].
     region_radius : float
@@ -121,7 +120,15 @@ def holds_at_rest(system: CanonicalSystem, omega: float, gains: Array,
         Whether there is a stable equilibrium with every node that acts inside its region; a vote
         whose node would rest outside its own does not act.
     """
-    acting = np.asarray(gains, dtype=float)
+    acting, wanted = network.gait.cadence_scale, network.parameters.cadence_scale
+    omega = network.omega(np.zeros(3)) * max(1.0, wanted / acting)
+    return _holds(network.system, omega, tuple(gains.tolist()), region_radius)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _holds(system: CanonicalSystem, omega: float, gains: tuple[float, ...],
+           region_radius: float) -> bool:
+    acting = np.array(gains)
     while acting.any():
         rest = inhibited_equilibrium(system, omega, acting)
         if rest is None or not rest.slowest_rate > 0.0:
@@ -322,5 +329,5 @@ class Voting:
         if np.array_equal(weights, before.weights):
             return before if causes == before.causes else replace(before, causes=causes)
         gains = acting_gains(weights, p.inhibition_gain, self.voting.vote_rule)
-        stops = holds_at_rest(network.system, network.omega(np.zeros(3)), gains, p.region_radius)
+        stops = holds_at_rest(network, gains, p.region_radius)
         return Tally(weights, gains, stops, causes)
