@@ -93,13 +93,11 @@ def _best_bound(graph: CouplingGraph, L: Array, scalar: Array, growth: float) ->
     if symmetric:
         return _connected(best)
     weights = left_null_weights(scalar)
-    if weights is not None:
-        weighted = Synchronisation(connectivity(L, graph.size, weights), growth, weights,
-                                   'weighted')
-        best = max(best, weighted, key=lambda found: found.connectivity)
-    hierarchical = _hierarchical(graph, L, scalar, growth)
-    if hierarchical is not None and hierarchical.connectivity > best.connectivity:
-        best = hierarchical
+    weighted = None if weights is None else Synchronisation(
+        connectivity(L, graph.size, weights), growth, weights, 'weighted')
+    for other in (weighted, _hierarchical(graph, L, scalar, growth)):
+        if other is not None and other.connectivity > best.connectivity * (1.0 + _TINY):
+            best = other  # of equal ones the first, however they are rounded
     return _connected(best)
 
 

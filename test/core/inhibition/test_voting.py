@@ -274,13 +274,20 @@ def test_the_computed_clamp_takes_a_majority_to_overcome(graph: str, count: int)
     in_force = voting().initial_state(of).clamp
     assert in_force is not None and fits(in_force.clamp)
     gains = np.where(np.arange(4) < count, in_force.clamp.gain, 0.0)
-    assert holds_at_rest(of.system, of.omega(R), gains, 0.3) == (count >= 3)
+    assert holds_at_rest(of, gains, 0.3) == (count >= 3)
 
 
 def test_a_vote_too_weak_to_hold_its_own_node_does_not_hinder_the_others() -> None:
-    system = network(coupling_gain=5.0).system
     gains = np.array([60.0, 60.0, 60.0, 1e-3])
-    assert holds_at_rest(system, 9.0, gains, 0.3)
+    assert holds_at_rest(network(coupling_gain=5.0), gains, 0.3)
+
+
+def test_votes_must_hold_the_cadence_that_the_gait_is_on_its_way_to() -> None:
+    slow = network()
+    gains = np.array([57.0, 57.0, 57.0, 0.0])
+    faster = slow.with_parameters(replace(slow.parameters, cadence_scale=2.0))
+    assert faster.omega(R) == slow.omega(R)
+    assert holds_at_rest(slow, gains, 0.3) and not holds_at_rest(faster, gains, 0.3)
 
 
 @pytest.mark.parametrize('changes', [
