@@ -78,8 +78,8 @@ def typed(block: str) -> list[str]:
 class Reader:
     """A reader in a folder who types one line after the other."""
 
-    def __init__(self, domain: int, folder: Path) -> None:
-        self.processes, self.folder = Processes(domain), folder
+    def __init__(self, domain: int, folder: Path, recorded: Callable[[], Path]) -> None:
+        self.processes, self.folder, self.recorded = Processes(domain), folder, recorded
         self.suites: list[NodeProcess] = []
         self.beside: list[NodeProcess] = []
 
@@ -108,8 +108,7 @@ class Reader:
             if word in AT_HAND and not path.exists() and not path.is_symlink():
                 AT_HAND[word](path)
         if 'runs/latest' in command and not (self.folder / 'runs').exists():
-            process = self.run('walk --lock-step --composed --no-report')
-            assert process.wait() == 0, process
+            shutil.copytree(self.recorded(), self.folder / 'runs', symlinks=True)
 
     def type(self, command: str, following: str) -> None:
         """Type a command and see to it that it does what it is for."""
@@ -158,10 +157,22 @@ class Reader:
         assert process.wait(PATIENCE_S) == 0, process
 
 
-@pytest.fixture
-def reader(tmp_path: Path) -> Iterator[Reader]:
+@pytest.fixture(scope='module')
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Runs that a reader has whose block begins after a walk."""
+    folder = tmp_path_factory.mktemp('recorded')
     with reserved_domain() as domain:
-        started = Reader(domain, tmp_path)
+        walk = Processes(domain).executable(
+            'walk', '--lock-step', '--composed', '--no-report', '--out', str(folder / 'runs/one'))
+        assert walk.wait(PATIENCE_S) == 0, walk
+    (folder / 'runs' / 'latest').symlink_to('one')
+    return folder / 'runs'
+
+
+@pytest.fixture
+def reader(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Reader]:
+    with reserved_domain() as domain:
+        started = Reader(domain, tmp_path, lambda: request.getfixturevalue('recorded'))
         try:
             yield started
         finally:
