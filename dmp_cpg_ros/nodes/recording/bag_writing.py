@@ -13,10 +13,10 @@ among the robot's own topics. Topics of the suite bear stamps of that clock: the
 is the time, so that a lock-step recording does not depend on when its messages happened to arrive.
 A message that comes before the clock has reached its stamp waits for it. All others get the time
 that the clock shows: those of users, who may stamp with the time of the day; those without a
-stamp (stamp zero comes from a node that knows no time yet); and those whose stamp is before the
-recording or more than ``AHEAD_NS`` ahead. Nothing lies outside the time of the robot. A recorder
-that is starved of processor time hears one topic seconds before another; no time of a record
-depends on that.
+stamp (stamp zero comes from a node that knows no time yet, but for the first message of a topic,
+which may be of a robot's first tick); and those whose stamp is before the recording or more than
+``AHEAD_NS`` ahead. Nothing lies outside the time of the robot. A recorder that is starved of
+processor time hears one topic seconds before another; no time of a record depends on that.
 """
 
 from __future__ import annotations
@@ -46,6 +46,9 @@ _STAMP_AT = 4
 
 AHEAD_NS = 30_000_000_000
 """How far one topic may be ahead of the clock on its way to the recorder [ns]."""
+
+NO_STAMP = -1
+"""Of a message that gets the time that the clock shows."""
 
 ANEW_NS = 1_000_000_000
 """A topic whose stamps go back by more comes from a clock that has begun anew [ns]."""
@@ -134,8 +137,10 @@ class BagWriter:
 
         def write(data: bytes) -> None:
             nonlocal last
+            stamp = _leading_stamp(data) if stamped else NO_STAMP
+            if stamp == 0 and self.counts[topic]:
+                stamp = NO_STAMP
             self.counts[topic] += 1
-            stamp = _leading_stamp(data) if stamped else 0
             if clock:
                 self._advance(stamp, anew=stamp < last - ANEW_NS)
                 last = stamp
@@ -198,7 +203,7 @@ class BagWriter:
         this recording.
         """
         assert self.newest_ns is not None
-        in_recording = 0 < stamp and self._first_ns <= stamp <= self.newest_ns
+        in_recording = self._first_ns <= stamp <= self.newest_ns
         time_ns = stamp if in_recording else self.newest_ns
         try:
             self._writer.write(connection, time_ns, data)
