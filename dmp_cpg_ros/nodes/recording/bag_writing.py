@@ -13,9 +13,9 @@ among the robot's own topics. Topics of the suite bear stamps of that clock: the
 is the time, so that a lock-step recording does not depend on when its messages happened to arrive.
 A message that comes before the clock has reached its stamp waits for it. All others get the time
 that the clock shows: those of users, who may stamp with the time of the day; those without a
-stamp (stamp zero comes from a node that knows no time yet, but for the first message of a topic,
-which may be of a robot's first tick); and those whose stamp is before the recording or more than
-``AHEAD_NS`` ahead. Nothing lies outside the time of the robot. A recorder that is starved of
+stamp (stamp zero of a latched topic comes from a node that knows no time yet, of others it is the
+robot's first tick); and those whose stamp is before the recording or more than ``AHEAD_NS`` ahead.
+Nothing lies outside the time of the robot. A recorder that is starved of
 processor time hears one topic seconds before another; no time of a record depends on that.
 """
 
@@ -30,7 +30,7 @@ from itertools import count
 from operator import itemgetter
 from pathlib import Path
 
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosbags import interfaces as bags
 from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_typestore
@@ -134,11 +134,12 @@ class BagWriter:
         connection = self._writer.add_connection(topic, type_name, typestore=self._store,
                                                  offered_qos_profiles=[offered_qos(qos)])
         self.counts[topic] = last = 0
+        latched = qos.durability == DurabilityPolicy.TRANSIENT_LOCAL
 
         def write(data: bytes) -> None:
             nonlocal last
             stamp = _leading_stamp(data) if stamped else NO_STAMP
-            if stamp == 0 and self.counts[topic]:
+            if stamp == 0 and latched:
                 stamp = NO_STAMP
             self.counts[topic] += 1
             if clock:
