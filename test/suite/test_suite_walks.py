@@ -302,7 +302,9 @@ def test_ctrl_c_ends_the_run_with_a_readable_bag(
     process.interrupt()
     # Python itself ends by the signal when it came while it ran generated code.
     assert process.wait(RUN_S) in (130, -signal.SIGINT), process.output
-    assert 'report skipped' in process.output and 'Traceback' not in process.output, process
+    # or the work was done when the second signal came
+    assert 'report skipped' in process.output or 'in all\n' in process.output, process
+    assert 'Traceback' not in process.output, process
     assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
 
 
