@@ -11,9 +11,8 @@ BIN := $(VENV)/bin
 # Python finds the installed package and not the sources.
 WALK_ARGS ?= --lock-step
 PYTEST_ARGS ?=
-# One test more than most have of cores: tests with nodes wait half of their time. Nodes of different
-# tests are in different domains; TEST_WORKERS=0 runs the tests one by one.
-TEST_WORKERS ?= 3
+# Two tests at a time, each node in a domain of its own; TEST_WORKERS=0 runs them one by one.
+TEST_WORKERS ?= 2
 BENCH_ARGS ?=
 
 # The interpreter to make .venv from: the first that fits, and never one that is itself in a venv.
