@@ -172,9 +172,12 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
     turned, resting = np.zeros(4), False
     for wait, kind, value in [*case['events'], [0.0, 'stop', None], [LONGEST, 'end', None]]:
         for _ in range(round(wait / case['tick_s'])):
-            before, held = phase(loop.x), loop.held and loop.stop.armed
+            before, gait = phase(loop.x), loop.canon.gait.name
+            held = loop.held and loop.stop.armed
             loop.advance()
             moved = (phase(loop.x) - before + np.pi) % (2.0 * np.pi) - np.pi
+            if loop.canon.gait.name != gait:                 # states turn at rest, and no leg moves
+                moved = np.zeros(4)
             turned = turned + moved if resting and loop.stop.requested else np.zeros(4)
             resting = loop.stop.requested and (resting or loop.stop.state == 'at_rest')
             if not np.all(np.isfinite(loop.x)):
@@ -273,8 +276,7 @@ def setting(rng: np.random.Generator) -> Case:
                        'vote_resume': bool(rng.random() < 0.3)}
         if rng.random() < 0.3:
             parameters['vote_limit'] = float(rng.uniform(0.05, 1.0))
-        if rng.random() < 0.7:
-            parameters['silence_weight'] = 0.0               # or votes never fade
+        parameters['silence_weight'] = 0.0   # silent sensors vote after what is predicted
     return {'gait': str(rng.choice(list(GAITS))), 'parameters': parameters,
             'tick_s': float(rng.choice([0.001, 0.002, 0.004, 0.004, 0.01])), 'events': []}
 
