@@ -176,7 +176,7 @@ def play(description: RobotDescription, case: Case, weaken: str = '', counts: Co
             held = loop.held and loop.stop.armed
             loop.advance()
             moved = (phase(loop.x) - before + np.pi) % (2.0 * np.pi) - np.pi
-            if loop.canon.gait.name != gait:                 # states turn at rest, and no leg moves
+            if loop.canon.gait.name != gait:  # states turn at rest, and no leg moves
                 moved = np.zeros(4)
             turned = turned + moved if resting and loop.stop.requested else np.zeros(4)
             resting = loop.stop.requested and (resting or loop.stop.state == 'at_rest')
