@@ -49,6 +49,11 @@ def test_what_is_stopped_stays_so_in_a_change(held_by: str, wait_s: float,
     assert play(ROBOT, held)[0] == ''
 
 
+def test_a_gait_that_no_service_can_stop_takes_changes() -> None:
+    free = Oscillators(ROBOT, case({'inhibition_gain': 0.0}))
+    assert free.change({'cadence_scale': 0.9}) == ''
+
+
 @pytest.mark.parametrize('weaken', CONDITIONS)
 def test_a_condition_that_is_left_out_is_noticed(weaken: str) -> None:
     assert Oscillators(ROBOT, BROKEN[weaken]).certified()

@@ -136,7 +136,7 @@ class Running:
         acting = inhibition.gains
         served = before.parameters.inhibition.gains_on(int(acting.argmax())) > 0.0
         # the service's gain is above that of any vote, whatever it was when it was asked for
-        voted = bool(acting[served].min() <= acting[~served].max(initial=0.0))
+        voted = bool(acting[served].min(initial=math.inf) <= acting[~served].max(initial=0.0))
         names = sorted((_CAPTURING | {'cadence_scale'} if voted else _CAPTURING)
                        & before.differences(self).keys())
         if not (names and inhibition.requested
