@@ -9,7 +9,6 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -107,11 +106,16 @@ class Reader:
             path = self.folder / word
             if word in AT_HAND and not path.exists() and not path.is_symlink():
                 AT_HAND[word](path)
-        if 'runs/latest' in command and not (self.folder / 'runs').exists():
+        learned_from = command.startswith('learn runs/latest')
+        if learned_from or ('runs/latest' in command and not (self.folder / 'runs').exists()):
+            shutil.rmtree(self.folder / 'runs', ignore_errors=True)
             shutil.copytree(self.recorded(), self.folder / 'runs', symlinks=True)
 
-    def type(self, command: str, following: str) -> None:
-        """Type a command and see to it that it does what it is for."""
+    def type(self, command: str) -> None:
+        """Type a command and see to it that it does what it is for.
+
+        A walk is ended once it walks; what is learned from one is another that went to its end.
+        """
         name, *words = shlex.split(command)
         if name not in CLIENTS and '--namespace' not in words:
             self.finish()
@@ -134,7 +138,7 @@ class Reader:
                 self.beside[-1].wait_for_output('live view: http://', PATIENCE_S)
             else:
                 self.suites[0].wait_for_output('  walking\n', PATIENCE_S)
-        elif name == 'walk' and 'runs/latest' not in following:
+        elif name == 'walk':
             walk = self.start(command)
             self.suites.append(walk)
             waits = 'stand_by.yaml' in words or ('--view' in words and 'start_stop' not in words)
@@ -142,9 +146,7 @@ class Reader:
             if '--view' in words:
                 assert 'live view: http://' in walk.output, walk
         else:
-            # What is read afterwards has every leg of a machine that is too slow for real time.
-            lock_step = ' --lock-step' if name == 'walk' and '--lock-step' not in words else ''
-            process = self.run(command + lock_step)
+            process = self.run(command)
             assert process.wait() == 0, process
 
     def make(self, words: list[str]) -> None:
@@ -159,7 +161,7 @@ class Reader:
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Runs that a reader has whose block begins after a walk."""
+    """Runs that a reader has who has walked to the end."""
     folder = tmp_path_factory.mktemp('recorded')
     with reserved_domain() as domain:
         walk = Processes(domain).executable(
@@ -179,8 +181,11 @@ def reader(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Reader]:
             started.processes.end()
 
 
-BLOCKS = {f'{document.name}-{number}': block for document in DOCUMENTS
-          for number, block in enumerate(blocks(document, 'sh'))}
+ALL = {f'{document.name}-{number}': block for document in DOCUMENTS
+       for number, block in enumerate(blocks(document, 'sh'))}
+BLOCKS = {name: block for name, block in ALL.items() if not any(
+    block is not other and set(typed(block)) < set(typed(other)) for other in ALL.values())}
+"""Those with a command of their own: a page may begin as the README does."""
 
 
 @pytest.mark.parametrize('block', BLOCKS.values(), ids=BLOCKS)
@@ -189,6 +194,6 @@ def test_every_command_of_a_block_runs(reader: Reader, block: str) -> None:
     if any(line.split()[0] in ('make', '.') for line in lines) and not (
             ROOT / '.venv' / '.installed').exists():
         pytest.skip('make has not installed it here')
-    for line, following in pairwise([*lines, '']):
-        reader.type(line, following)
+    for line in lines:
+        reader.type(line)
     reader.finish()
