@@ -5,7 +5,9 @@
 With --respawn one walk takes many kills, each after all nodes have been ready again; without, one.
 A walk is in phase again when its legs are in their places and the body has half of its speed; the
 cycles until then count from the moment at which the robot follows its legs again, or at which
-all nodes are ready, whichever is earlier. Exit status 1 when a robot fell.
+all nodes are ready, whichever is earlier. A recorder that is killed leaves a bag that nobody has
+closed: what is told is how much of the time before the kill is not in it, and how many ticks are
+missing within. Exit status 1 when a robot fell.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dmp_cpg_ros.analysis.bag import base_name, opened, recorded
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import tilt
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
@@ -35,9 +38,12 @@ from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.walk_process import WalkProcess
 from dmp_cpg_ros.suite import load_gaits
-from dmp_cpg_ros.suite_table import ROBOT, WALKING_NODES
+from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES
 
 WALKS = (('amble', 0.5), ('trot', 1.0))
+
+VICTIMS = tuple(node for node in WALKING_NODES if node != ROBOT)
+"""Nodes without which a robot is left."""
 
 READY, FOLLOWS = 'all nodes are ready again', 'the robot follows its legs again'
 
@@ -45,7 +51,8 @@ FALLEN_TILT, LOW = 0.9, 0.7
 """Tilt of a robot that has fallen [rad]; share of its height at the start below which it lies."""
 
 COLUMNS = ('gait', 'time', 'respawn', 'walks', 'kills', 'fell', 'in phase again', 'cycles, median '
-           '/ worst', 'seconds after the kill, median / worst', 'ended standing / lying / fallen')
+           '/ worst', 'seconds after the kill, median / worst', 'ended standing / lying / fallen',
+           "recorder's bags: s missing, median / worst; gaps")
 
 
 @dataclass
@@ -62,6 +69,10 @@ class Kill:
         When its messages were followed again, and when the walk was in phase again [s].
     period_s : float
         Of the gait before [s].
+    unrecorded_s : float
+        Of the recorder: time before the kill that is not in its bag [s].
+    gaps : int
+        Of the recorder: ticks within its bag that are not there.
     """
 
     node: str
@@ -69,6 +80,8 @@ class Kill:
     back_s: float = inf
     in_phase_s: float = inf
     period_s: float = nan
+    unrecorded_s: float = nan
+    gaps: int = 0
 
     @property
     def cycles(self) -> float:
@@ -130,7 +143,8 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
         ready = walk.said(READY, begin)
         told = [re.search(rf'^ *([\d.]+) s .*{FOLLOWS}', line) for line in walk.lines[begin:]]
         kill.back_s = min([ready, *(float(found[1]) for found in told if found)])
-        if ready == inf or (not lock_step and walk.said('walking', begin) == inf):
+        walks_on = lock_step or node == RECORDER or walk.said('walking', begin) < inf
+        if ready == inf or not walks_on:
             break
     if respawn:
         time.sleep(rng.uniform(4.0, 6.0))
@@ -141,6 +155,18 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
     return outcome
 
 
+def _judge_bags(kills: Sequence[Kill], folder: Path) -> None:
+    """Read what recorders that were killed have left, a bag each."""
+    for number, kill in enumerate(kill for kill in kills if kill.node == RECORDER):
+        with opened(folder / (f'bag_{number}' if number else 'bag')) as reader:
+            ticks = [connection for connection in reader.connections
+                     if base_name(connection.topic) == 'joint_states']
+            times = 1e-9 * np.array([time_ns for _, time_ns, _ in recorded(reader, ticks)])
+        kill.unrecorded_s = max(0.0, kill.time_s - float(times[-1]))
+        steps = np.diff(times)
+        kill.gaps = int(np.rint(steps / steps.min() - 1.0).sum())
+
+
 def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
     """Read from the recording how the walk went."""
     try:
@@ -148,6 +174,7 @@ def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
     except Exception as error:  # noqa: BLE001 - without a recording the outcome is unknown
         print(f'no recording of {outcome}: {error}', file=sys.stderr)
         return
+    _judge_bags(outcome.kills if outcome.respawn else (), folder)
     odometry, canonical = recording.odometry, recording.canonical
     leaning, height = tilt(odometry.quaternion), odometry.position_in_world[:, 2]
     low = LOW * height[0]
@@ -180,12 +207,15 @@ def rows(outcomes: Sequence[Outcome]) -> Iterator[list[str]]:
         again = [kill for kill in kills if kill.in_phase_s < inf]
         cycles = [kill.cycles for kill in again if kill.cycles < inf]
         seconds = [kill.in_phase_s - kill.time_s for kill in again]
+        bags = [kill for kill in kills if kill.unrecorded_s == kill.unrecorded_s]
         yield [way[0], 'lock-step' if way[1] else 'real', 'yes' if way[2] else 'no',
                str(len(own)), str(len(kills)), str(sum(one.fell for one in own)),
                f'{len(again)} of {len(kills)}' if way[2] else '', _spread(cycles),
                _spread(seconds),
                ' / '.join(str(ends.count(end)) for end in ('standing', 'lying', 'fallen')) + (
-                   f', unknown {ends.count("unknown")}' if 'unknown' in ends else '')]
+                   f', unknown {ends.count("unknown")}' if 'unknown' in ends else ''),
+               f'{_spread([bag.unrecorded_s for bag in bags])}; {sum(bag.gaps for bag in bags)}'
+               if bags else '']
 
 
 def _spread(values: Sequence[float]) -> str:
@@ -203,7 +233,7 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
         for respawn in options.respawn:
             for lock_step in options.lock_step:
                 for gait, speed in WALKS:
-                    nodes = [node for node in WALKING_NODES if node != ROBOT]
+                    nodes = list(options.nodes)
                     if respawn:
                         rng.shuffle(nodes)
                         wanted = list(islice(cycle(nodes), options.kills))
@@ -225,6 +255,9 @@ def _parser() -> argparse.ArgumentParser:
     add('--kills', type=int, default=16, help='kills in a walk with --respawn (default: 16)')
     add('--respawn', type=_choices, default=[True, False], metavar='yes|no|both')
     add('--lock-step', type=_choices, default=[True, False], metavar='yes|no|both')
+    add('--nodes', nargs='+', choices=(*VICTIMS, RECORDER), default=VICTIMS,
+        metavar='NODE', help=f'that are killed: {RECORDER}, or (default: all of them) '
+        f'{", ".join(VICTIMS)}')
     add('--seed', type=int, default=0, help='of nodes and times (default: 0)')
     return parser
 
