@@ -72,7 +72,7 @@ def _removed(paths: list[Path]) -> list[Path]:
 
 def _mapped(folder: Path) -> set[Path]:
     """Files of a folder that a process of this user has mapped."""
-    found = set()
+    found = set[Path]()
     for maps in Path('/proc').glob('[0-9]*/maps'):
         try:
             lines = maps.read_text(encoding='utf-8', errors='replace').splitlines()

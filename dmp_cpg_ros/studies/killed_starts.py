@@ -1,0 +1,115 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Starts suites, kills all of their processes at random moments, and looks what they leave behind.
+
+The moments lie between the first process and some seconds of walking. What is left are the files
+of the middleware in shared memory; the next start of ``walk`` removes them, and one that goes to
+its end comes last. Exit status 1 when there are more files in the end than in the beginning, or
+when a suite did not start.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
+from dmp_cpg_ros.nodes.framework.shared_memory import FOLDER, OF_FAST_DDS, remove_left_behind
+from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.walk_process import WalkProcess
+
+LATEST_S = 6.0
+"""Latest moment of a kill, from the first process on [s]."""
+
+PATIENCE_S = 120.0
+"""How long a suite may take to have its first process, and to go to its end [s]."""
+
+
+def files() -> dict[str, int]:
+    """Files of Fast DDS in shared memory, with their sizes [bytes]."""
+    found = {}
+    for path in FOLDER.iterdir():
+        with suppress(FileNotFoundError):
+            if OF_FAST_DDS.fullmatch(path.name):
+                found[path.name] = path.stat().st_size
+    return found
+
+
+def children(pid: int) -> list[int]:
+    """Processes that a process has started, and those that they have."""
+    found = []
+    for task in Path(f'/proc/{pid}/task').glob('*/children'):
+        with suppress(OSError):
+            for child in map(int, task.read_text().split()):
+                found += [child, *children(child)]
+    return found
+
+
+def start(folder: Path, duration_s: float) -> WalkProcess:
+    """Start a walk."""
+    scenario = folder / 'scenario.yaml'
+    scenario.write_text(json.dumps({
+        'name': 'starts', 'duration': duration_s,
+        'events': [{'at': 0.5, 'command': {'v_x': 0.5}}]}))
+    return WalkProcess([str(scenario), '--no-report', '--out', str(folder / 'run')])
+
+
+def killed(rng: random.Random) -> int:
+    """Start a suite and kill it; returns how many processes that were."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        walk, deadline = start(Path(folder), 3600.0), time.monotonic() + PATIENCE_S
+        while not children(walk.process.pid) and time.monotonic() < deadline:
+            if walk.process.poll() is not None:
+                return 0
+            time.sleep(0.02)
+        time.sleep(rng.uniform(0.0, LATEST_S))
+        victims = [walk.process.pid, *children(walk.process.pid)]
+        rng.shuffle(victims)
+        for pid in victims:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        walk.process.wait()
+    return len(victims)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status."""
+    parser = parser_of('killed_starts', __doc__, 'every start', jobs=False)
+    parser.add_argument('--starts', type=at_least_one, default=100, metavar='N',
+                        help='of whole suites (default: 100, of 12 processes)')
+    parser.add_argument('--seed', type=int, default=0, help='of the moments (default: 0)')
+    return run_command(parser, arguments, _main)
+
+
+def _main(options: argparse.Namespace, ros: RosArguments) -> int:
+    rng = random.Random(options.seed)
+    remove_left_behind()
+    before, counts, left = set(files()), list[int](), list[int]()
+    for number in range(options.starts):
+        counts.append(killed(rng))
+        left.append(sum(files().values()))
+        print(f'\r{number + 1}/{options.starts} ', end='', file=sys.stderr, flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        walk = start(Path(folder), 2.0)
+        status = walk.process.wait(PATIENCE_S)
+    after = set(files()) - before
+    print('\n' + markdown_table(
+        ('starts', 'processes killed', 'left by one, MB', 'files left in the end', 'last walk'),
+        [(str(len(counts)), f'{sum(counts):,}', f'{max(left) / 1e6:.1f}', str(len(after)),
+          f'status {status}')]))
+    write_results(options.json, [{'processes': processes, 'left_bytes': size}
+                                 for processes, size in zip(counts, left, strict=True)])
+    return int(bool(after) or status != 0 or not all(counts))
+
+
+if __name__ == '__main__':
+    sys.exit(main())
