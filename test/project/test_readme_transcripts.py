@@ -78,9 +78,6 @@ class Reader:
         return process.output
 
     def end(self) -> None:
-        for process in reversed(self.background):
-            process.interrupt()
-            process.wait(PATIENCE_S)
         self.processes.end()
         self.ros.end()
 
