@@ -35,10 +35,26 @@ from dmp_cpg_ros.nodes.messages.conversions import (
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.suite_table import WALKING_NODES
 
-shared_domain, suite, ros = (
+shared_domain, shared_suite, ros = (
     ros_processes.shared_domain, ros_processes.shared_suite, ros_processes.shared_ros)
 
 CLIENT = ('robot_client', '--wait', '20')
+
+
+@pytest.fixture(scope='module')
+def lookers(shared_suite: Processes) -> dict[str, NodeProcess]:
+    """Clients that look for what is not there, for the twenty seconds in which others are asked:
+    the tests at the end read what they have printed.
+    """
+    return {kind: shared_suite.executable(*CLIENT, *words) for kind, words in {
+        'recorder': ('nodes',), 'node': ('param', 'get', 'oscillators', 'rho'),
+        'topic': ('echo', 'joint_stats', '--once')}.items()}
+
+
+@pytest.fixture(scope='module')
+def suite(shared_suite: Processes, lookers: dict[str, NodeProcess]) -> Processes:
+    """A suite that all tests use."""
+    return shared_suite
 
 
 def said(processes: Processes, *arguments: str, status: int = 0) -> str:
@@ -103,20 +119,14 @@ def test_a_suite_in_a_namespace_is_found_there_and_elsewhere_named(
                         control_rate=ros_processes.SHARED_HZ) as suite:
         await_stop(ros, 'at_rest', 'robot1/inhibition_state')
         await_following(ros, 'robot1/drive_mode')
-        elsewhere = suite.executable(*CLIENT, '--wait', '10', 'inhibit')
+        elsewhere, nodes = (suite.executable(*CLIENT, '--wait', '10', *words) for words in (
+            ('inhibit',), ('--namespace', '/robot1', 'nodes')))
         answer = said(suite, 'resume', '--ros-args', '-r', '__ns:=/robot1')
         assert answer.startswith('walking in')
         suite.executable(*CLIENT, '--namespace', 'robot1', 'cmd_vel', '0.3')
         ros.spin_until(lambda: any(entry.twist.linear.x > 0.2 for entry in references))
-        assert 'ready' in said(suite, '--namespace', '/robot1', 'nodes')
         assert '--namespace /robot1' in told(elsewhere)
-
-
-def test_all_nodes_are_ready(suite: Processes) -> None:
-    lines = dict(line.split(maxsplit=1) for line in said(suite, 'nodes').splitlines())
-    assert {name: lines.get(name) for name in WALKING_NODES} == {
-        name: 'ready' for name in WALKING_NODES}
-    assert lines['bag_recorder'] == 'does not run'
+        assert 'ready' in told(nodes, 0)
 
 
 def test_a_request_is_asked_once_and_its_answer_printed(
@@ -183,7 +193,6 @@ def test_a_push_is_taken_once(suite: Processes, ros: Ros) -> None:
 
 def test_parameters_are_read_set_and_refused_with_the_reason(suite: Processes) -> None:
     owner = 'canonical_oscillators'
-    nobody = suite.executable(*CLIENT, '--wait', '10', 'param', 'get', 'oscillators', 'rho')
     assert 'cadence_scale' in said(suite, 'param', 'list', owner).splitlines()
     assert said(suite, 'param', 'set', owner, 'rho', '9') == 'Set parameter successful'
     assert said(suite, 'param', 'get', f'/{owner}', 'rho') == '9.0'
@@ -191,17 +200,14 @@ def test_parameters_are_read_set_and_refused_with_the_reason(suite: Processes) -
     assert 'cadence_scale = 3.0 would lose the certificate' in answer
     assert said(suite, 'param', 'get', owner, 'cadence_scale') == '1.0'
     assert "has no parameter 'rhoo'" in refused(suite, 'param', 'get', owner, 'rhoo')
-    assert owner in told(nobody)
     assert 'param takes' in refused(suite, 'param', 'get', owner, status=2)
     fault = '{component: encoder, kind: stuck, for_s: 0.5, leg: fl}'
     assert 'failures_allowed' in refused(suite, 'param', 'set', 'mujoco_robot', 'fail', fault)
 
 
 def test_a_message_is_printed_as_yaml(suite: Processes) -> None:
-    nothing = suite.executable(*CLIENT, '--wait', '10', 'echo', 'joint_stats', '--once')
     (message, _) = yaml.safe_load_all(said(suite, 'echo', 'joint_states', '--once'))
     assert len(message['name']) == len(message['position']) == 3 * len(LEGS)
-    assert 'joint_states' in told(nothing)
 
 
 def test_what_is_not_finite_is_bad_input(suite: Processes) -> None:
@@ -285,3 +291,23 @@ def test_keys_need_a_terminal(suite: Processes) -> None:
                              capture_output=True, text=True, timeout=90, check=False)
     assert process.returncode == 1
     assert 'terminal' in process.stderr
+
+
+# What the clients that looked for twenty seconds have found -------------------------------------
+
+
+def test_all_nodes_are_ready(lookers: dict[str, NodeProcess]) -> None:
+    lines = dict(line.split(maxsplit=1) for line in told(lookers['recorder'], 0).splitlines())
+    assert {name: lines.get(name) for name in WALKING_NODES} == {
+        name: 'ready' for name in WALKING_NODES}
+    assert lines['bag_recorder'] == 'does not run'
+
+
+def test_a_node_that_is_not_there_is_answered_with_those_that_are(
+        lookers: dict[str, NodeProcess]) -> None:
+    assert 'canonical_oscillators' in told(lookers['node'])
+
+
+def test_a_topic_that_is_not_there_is_answered_with_those_that_are(
+        lookers: dict[str, NodeProcess]) -> None:
+    assert 'joint_states' in told(lookers['topic'])
