@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import cache
 from typing import Any, NamedTuple
@@ -21,7 +21,15 @@ import numpy as np
 from dmp_cpg_ros.commands.ros_arguments import run_command
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
-from dmp_cpg_ros.core.scenario.fault import COMPONENTS, KINDS, PLACED, Fault, FaultInjector
+from dmp_cpg_ros.core.scenario.fault import (
+    COMPONENTS,
+    KINDS,
+    PLACED,
+    Fault,
+    FaultInjector,
+    Message,
+)
+from dmp_cpg_ros.nodes.framework.ticks import TickInputs
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
@@ -76,6 +84,8 @@ class FailingWalk:
         self.watchdog = CommandWatchdog(
             self.robot.description, round(suite.robot.target_timeout * 1e9))
         self.state, self.named = self.robot.reset(), set[str]()
+        self._ticks = TickInputs(self._on_tick, ('robot',), 'robot')
+        self._sent: list[Message] = []
 
     def run(self, seconds: float) -> None:
         """Tick for a time [s]."""
@@ -83,14 +93,13 @@ class FailingWalk:
             self.tick()
 
     def tick(self) -> None:
-        """One tick."""
+        """One tick of the robot; of the suite if it takes the stamp, by the rule of its nodes."""
         state, injector, guard = self.state, self.injector, self.watchdog
-        tick = self.loop.tick(injector.sensed(state))
-        parts = np.split(np.array(
-            (tick.targets.position, tick.targets.velocity, tick.targets.effort)), 4, axis=1)
-        for leg, stamp, targets in injector.sent([
-                (leg, tick.time_ns, JointTargets(*part))
-                for leg, part in zip(LEGS, parts, strict=True)]):
+        sensed, self._sent = injector.sensed(state), []
+        taken = self._ticks.add('robot', sensed.time_ns, sensed)
+        if injector.acting and not taken:
+            self.named.add('stamps')
+        for leg, stamp, targets in injector.sent(self._sent):
             sound = all(np.isfinite(values).all() for values in vars(targets).values())
             if stamp <= state.time_ns and sound:  # as the robot's reader takes them
                 guard.accept(leg, stamp, targets)
@@ -99,6 +108,13 @@ class FailingWalk:
             self.named.update(f'targets of {leg}' for leg in guard.silent(state.time_ns))
             self.named.update(() if estimator is None else estimator.estimate.problems)
         self.state = self.robot.step(injector.driven(guard.targets(state)))
+
+    def _on_tick(self, stamp_ns: int, inputs: Mapping[str, Any]) -> None:
+        tick = self.loop.tick(inputs['robot'])
+        parts = np.split(np.array(
+            (tick.targets.position, tick.targets.velocity, tick.targets.effort)), 4, axis=1)
+        self._sent = [(leg, stamp_ns, JointTargets(*part))
+                      for leg, part in zip(LEGS, parts, strict=True)]
 
 
 @cache

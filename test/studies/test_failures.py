@@ -65,7 +65,7 @@ def test_a_failing_sensor_is_named_and_walked_through(component: str, kind: str,
 def test_a_leg_that_sends_nothing_is_named_and_the_robot_stays_on_its_feet() -> None:
     assert outcome(('amble', 'link', 'off')) == ('rests', ('targets of fl',))
     assert outcome(('amble', 'clock', 'wrong')) == (
-        'rests', tuple(f'targets of {leg}' for leg in LEGS))
+        'rests', ('stamps', *(f'targets of {leg}' for leg in LEGS)))
 
 
 @pytest.mark.parametrize('value, text', [
