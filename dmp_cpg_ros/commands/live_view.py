@@ -51,6 +51,7 @@ from dmp_cpg_ros.nodes.framework.parameters import (
     plain,
 )
 from dmp_cpg_ros.nodes.messages import conversions
+from dmp_cpg_ros.nodes.messages.cdr import unless_refused
 from dmp_cpg_ros.nodes.messages.interfaces import STAMPED_CMD_VEL, interface
 from dmp_cpg_ros.nodes.messages.robot_state import FootContactsReader, JointsReader, read_odom
 from dmp_cpg_ros.nodes.messages.values import checked_numbers, header_ns
@@ -176,7 +177,8 @@ class LiveView:
             self._polled.append((name, subscription, readers.get(name, read_odom)))
         for name, hear in (('inhibition_state', self._hear_stop), ('body_mode', self._hear_mode)):
             topic = interface(name)
-            self._node.create_subscription(topic.type, name, hear, topic.reader_qos)
+            self._node.create_subscription(topic.type, name, unless_refused(topic.type, hear),
+                                           topic.reader_qos, raw=True)
 
     def _make_ends(self, velocity: Any) -> None:
         """Create the ends of commands; those of services first: see SuiteClient."""
@@ -351,9 +353,8 @@ class LiveView:
         return round((stamp_ns - first_ns) * 1e-9 / (now - begin), 3) if now > begin else 0.0
 
     def _hear_stop(self, message: Any) -> None:
-        (status,) = message.status
-        self._stop = {entry.key: entry.value for entry in status.values} | {
-            'state': conversions.read_state_word(message)}
+        word, values = conversions.read_state_word(message), message.status[0].values
+        self._stop = {entry.key: entry.value for entry in values} | {'state': word}
 
     def _hear_mode(self, message: Any) -> None:
         self._mode = conversions.read_body_mode(message)

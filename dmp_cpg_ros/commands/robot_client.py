@@ -37,6 +37,7 @@ from dmp_cpg_ros.commands.suite_client import (
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.framework.parameters import plain
+from dmp_cpg_ros.nodes.messages.cdr import unless_refused
 from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
@@ -217,7 +218,8 @@ class Teleop:
                          for key, service in services.items()}
         for name, callback in (('inhibition_state', on_state), ('inhibition_gains', on_gains)):
             topic = interface(name)
-            node.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
+            node.create_subscription(topic.type, topic.name, unless_refused(topic.type, callback),
+                                     topic.reader_qos, raw=True)
         kinds = {kind for service in services.values() for kind in service.publishers}
         client.meet(sorted(kinds), *self._clients.values())
 

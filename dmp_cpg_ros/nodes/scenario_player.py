@@ -29,6 +29,7 @@ from dmp_cpg_ros.core.scenario.push import Push
 from dmp_cpg_ros.core.scenario.scenario import Command, Scenario
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
 from dmp_cpg_ros.nodes.framework.parameters import plain
+from dmp_cpg_ros.nodes.messages.cdr import unless_refused
 from dmp_cpg_ros.nodes.messages.conversions import (
     DRIVE_MODES,
     read_body_mode,
@@ -258,7 +259,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             **({} if lock_step else {'/clock': self._on_clock})}
         for name, callback in heard.items():
             topic = interface(name)
-            self.create_subscription(topic.type, topic.name, callback, topic.reader_qos)
+            self.create_subscription(topic.type, topic.name, unless_refused(topic.type, callback),
+                                     topic.reader_qos, raw=True)
 
     def connected(self) -> bool:
         """Whether the gate, the readers of commands and the services are there."""
