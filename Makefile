@@ -70,7 +70,7 @@ BENCHMARK_ARGS ?=
 FIGURE_ARGS ?=
 PAGE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-faults study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures paper-page bench bench-ros doc lint install clean
+.PHONY: help demo test study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures paper-page bench bench-ros doc lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -92,6 +92,9 @@ study-recovery: $(INSTALLED) ## stand up, lie down, recover from 50 falls (STUDY
 
 study-faults: $(INSTALLED) ## kill nodes of walking suites, with and without respawn (STUDY_ARGS=...)
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.study_faults $(STUDY_ARGS)
+
+study-starts: $(INSTALLED) ## kill suites as they start, and look what they leave (STUDY_ARGS=...)
+	$(ACTIVATED) python -m dmp_cpg_ros.studies.killed_starts $(STUDY_ARGS)
 
 study-adversary: $(INSTALLED) ## search for a certificate that is wrong (STUDY_ARGS='--seconds 600')
 	$(BIN)/python -m dmp_cpg_ros.studies.adversary $(STUDY_ARGS)

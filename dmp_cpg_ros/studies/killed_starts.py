@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Starts suites, kills all of their processes at random moments, and looks what they leave behind.
 
-The moments lie between the first process and some seconds of walking. What is left are the files
+The moments lie between the first process and some seconds of walking. What is left are segments
 of the middleware in shared memory; the next start of ``walk`` removes them, and one that goes to
 its end comes last. Exit status 1 when there are more files in the end than in the beginning, or
 when a suite did not start.
@@ -23,7 +23,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.nodes.framework.shared_memory import FOLDER, OF_FAST_DDS, remove_left_behind
+from dmp_cpg_ros.nodes.framework.shared_memory import FOLDER, SEGMENT, remove_left_behind
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
 from dmp_cpg_ros.studies.walk_process import WalkProcess
 
@@ -35,11 +35,11 @@ PATIENCE_S = 120.0
 
 
 def files() -> dict[str, int]:
-    """Files of Fast DDS in shared memory, with their sizes [bytes]."""
+    """Segments of Fast DDS and their locks, with their sizes [bytes]."""
     found = {}
     for path in FOLDER.iterdir():
         with suppress(FileNotFoundError):
-            if OF_FAST_DDS.fullmatch(path.name):
+            if SEGMENT.fullmatch(path.name):
                 found[path.name] = path.stat().st_size
     return found
 
@@ -99,7 +99,7 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
         left.append(sum(files().values()))
         print(f'\r{number + 1}/{options.starts} ', end='', file=sys.stderr, flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        walk = start(Path(folder), 2.0)
+        walk = start(Path(folder), 8.0)
         status = walk.process.wait(PATIENCE_S)
     after = set(files()) - before
     print('\n' + markdown_table(

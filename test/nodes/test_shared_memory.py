@@ -25,7 +25,8 @@ def of(process: NodeProcess) -> set[Path]:
     """Files of the participant of a process: what it holds locked, and what belongs to that."""
     links = [os.readlink(path) for path in Path(f'/proc/{process.pid}/fd').iterdir()]
     stems = [Path(link).name.removesuffix('_el') for link in links if link.endswith('_el')]
-    return {path for path in FOLDER.iterdir() for stem in stems if stem in path.name}
+    return {path for path in FOLDER.iterdir() for stem in stems
+            if stem in path.name and shared_memory.SEGMENT.fullmatch(path.name)}
 
 
 def test_only_files_without_an_owner_are_removed(
@@ -38,8 +39,9 @@ def test_only_files_without_an_owner_are_removed(
     with (tmp_path / f'{LIVING}_el').open('rb') as owner:
         fcntl.flock(owner, fcntl.LOCK_EX)
         removed = remove_left_behind(tmp_path)
-    assert set(removed) == set(names) - {LIVING, f'{LIVING}_el', FOREIGN}
-    assert {path.name for path in tmp_path.iterdir()} == {LIVING, f'{LIVING}_el', FOREIGN}
+    kept = {name for name in names if LIVING in name or PORT in name or name == FOREIGN}
+    assert set(removed) == set(names) - kept
+    assert {path.name for path in tmp_path.iterdir()} == kept
 
 
 def test_what_has_just_been_made_is_left_to_who_made_it(tmp_path: Path) -> None:

@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shared memory that Fast DDS leaves behind where a process is killed.
 
-Each participant has a segment and a port with a mutex in ``/dev/shm``, and removes them when it
-is destroyed. Nobody else does, so that every node that dies leaves half a megabyte for good.
+Each participant has a segment of half a megabyte in ``/dev/shm`` and removes it when it is
+destroyed. Nobody else does, so that it stays for good where a node dies. Its port and the mutex of
+that, a tenth of the size, are not touched: the next participant of the domain takes their names.
 """
 
 from __future__ import annotations
@@ -13,19 +14,14 @@ import os
 import re
 import time
 from collections import defaultdict
-from contextlib import ExitStack
 from pathlib import Path
 
 FOLDER = Path('/dev/shm')
 
-OF_FAST_DDS = re.compile(
-    r'(?:sem\.)?(fast(?:rtps|dds)_(?:port\d+|[0-9a-f]{16}))(?:_el|_sl|_mutex)?')
-"""Files of one participant; the group is what they have in common."""
+SEGMENT = re.compile(r'(fast(?:rtps|dds)_[0-9a-f]{16})(_el)?')
+"""A segment, of a name that nobody has twice, and the file that its owner holds locked."""
 
-LOCKS = ('_el', '_sl')
-"""Ends of the files that its owner holds locked."""
-
-NEW_S = 1.0
+NEW_S = 5.0
 """Age below which a file may be of a participant that has not locked it yet [s]."""
 
 
@@ -45,28 +41,26 @@ def remove_left_behind(folder: Path = FOLDER) -> list[str]:
     groups = defaultdict[str, list[Path]](list)
     if folder.is_dir():
         for path in folder.iterdir():
-            if found := OF_FAST_DDS.fullmatch(path.name):
+            if found := SEGMENT.fullmatch(path.name):
                 groups[found[1]].append(path)
     mapped = _mapped(folder) if groups else set()
     return [path.name for paths in groups.values() if mapped.isdisjoint(paths)
-            for path in _removed(paths)]
+            for path in _removed(sorted(paths))]
 
 
 def _removed(paths: list[Path]) -> list[Path]:
-    """Remove the files of a participant, if it has no owner any more and they are ours."""
-    with ExitStack() as held:
-        try:
-            if any(path.stat().st_ctime > time.time() - NEW_S
-                   for path in paths if path.name.endswith(LOCKS)):
-                return []
-            for path in paths:
-                if path.name.endswith(LOCKS):
-                    lock = held.enter_context(path.open('rb'))
-                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    """Remove a segment and its lock, if both are there, ours, old, and without an owner."""
+    if len(paths) != 2:
+        return []
+    try:
+        if any(path.stat().st_ctime > time.time() - NEW_S for path in paths):
+            return []
+        with paths[1].open('rb') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             for path in paths:
                 path.unlink(missing_ok=True)
-        except OSError:  # locked, of another user, or gone meanwhile
-            return []
+    except OSError:  # locked, of another user, or gone meanwhile
+        return []
     return paths
 
 
