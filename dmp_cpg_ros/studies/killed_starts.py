@@ -103,7 +103,7 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
         status = walk.process.wait(PATIENCE_S)
     after = set(files()) - before
     print('\n' + markdown_table(
-        ('starts', 'processes killed', 'left by one, MB', 'files left in the end', 'last walk'),
+        ('starts', 'processes killed', 'at one time, MB', 'files left in the end', 'last walk'),
         [(str(len(counts)), f'{sum(counts):,}', f'{max(left) / 1e6:.1f}', str(len(after)),
           f'status {status}')]))
     write_results(options.json, [{'processes': processes, 'left_bytes': size}
