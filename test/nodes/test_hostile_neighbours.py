@@ -590,7 +590,9 @@ def test_the_suite_walks_on_among_garbage(processes: Processes, ros: Ros) -> Non
         assert all(node.running for node in nodes), nodes
         return bool(places[-1].pose.pose.position.x > 0.5)
 
-    ros.spin_until(walked, deadline_s=4 * ros_processes.DEADLINE_S)
+    ros.spin_until(walked, deadline_s=4 * ros_processes.DEADLINE_S,
+                   what=lambda: f'half a metre, after {len(places)} ticks at {places[-1].pose} '
+                                f'of {nodes}')
     assert places[-1].pose.pose.position.z > 0.2
     trot = Parameter('gait', value='trot').to_parameter_msg()
     answer = ros.call(SetParameters, 'canonical_oscillators/set_parameters',

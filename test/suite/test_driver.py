@@ -68,9 +68,19 @@ class Session:
         self._wanted_ns = -1
         ros.spin_until(lambda: self.robot.matched
                        and node.count_publishers('joint_targets') == len(LEGS), 90.0)
-        again = node.create_timer(0.5, self.robot.publish)       # until all have met
-        ros.spin_until(lambda: min(self.answered.values()) == 0, 90.0)
-        node.destroy_timer(again)
+        going_on = node.create_timer(0.5, self._go_on)           # until all have met
+        ros.spin_until(lambda: min(self.answered.values()) >= 0, 90.0, what=lambda: str(self))
+        node.destroy_timer(going_on)
+
+    def __repr__(self) -> str:
+        return f'answers {self.answered} to {self.robot.state.time_ns} of\n{self.driver!r}'
+
+    def _go_on(self) -> None:
+        """Let the robot's time go on by a tick: nobody answers the same stamp again."""
+        end = self.robot.state.time_ns + TICK_NS
+        self.robot.publish()
+        while self.robot.state.time_ns < end:
+            self.robot.step()
 
     def _hearing(self, name: str) -> Any:
         return lambda message: self.heard.update({name: message.data})
