@@ -9,11 +9,9 @@ node overrides the hooks that it needs: ``configure``, ``activate``, ``deactivat
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from math import inf
 from typing import Any, ClassVar, TypeVar, cast
 
 from rcl_interfaces.msg import SetParametersResult
@@ -27,7 +25,6 @@ from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.parameters import Parameters
-from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.framework import parameters
 from dmp_cpg_ros.nodes.framework.certified import Certified, Sets
@@ -35,13 +32,12 @@ from dmp_cpg_ros.nodes.framework.health import missing_connections
 from dmp_cpg_ros.nodes.framework.lifecycle import GuardedLifecycleNode
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePublisher
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
-from dmp_cpg_ros.nodes.framework.writers import WriterWatch
-from dmp_cpg_ros.nodes.messages.cdr import serialized_reader, serialized_stamp
+from dmp_cpg_ros.nodes.framework.writers import TopicWriters
+from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.conversions import GaitMemoryReader
 from dmp_cpg_ros.nodes.messages.interfaces import (
     PUBLISHER_DEPTH,
     REPEATED,
-    SHARED,
     Interface,
     expected_count,
     interface,
@@ -50,17 +46,8 @@ from dmp_cpg_ros.nodes.messages.interfaces import (
 from dmp_cpg_ros.nodes.messages.values import counts_message, header_ns
 from dmp_cpg_ros.suite_table import KINDS
 
-LOOK_EVERY_S = 0.2
-"""How often the graph is asked for the publishers of a topic at most [s]."""
-
 WATCH_EVERY_S = 0.5
 """How often strangers are looked for [s]."""
-
-SEVERAL_S = 2.0
-"""Time within which commands of several publishers take turns [s]."""
-
-STALE_NS = 250_000_000
-"""In real time: age from which messages of ticks are not worth being worked through [ns]."""
 
 LOOK_AFTER_S = 0.02
 """How often a node looks after inputs that do not wake it, in case the one that does is late [s].
@@ -104,6 +91,8 @@ class SuiteNode(GuardedLifecycleNode):
         Whether the change that is judged is one that its owner has accepted.
     inputs : TickInputs
         Of :meth:`match`.
+    writers : TopicWriters
+        Who writes its topics.
     elapsed : float
         Time since the tick before, 0 at the first one [s].
     local : LocalDelivery or None
@@ -133,15 +122,13 @@ class SuiteNode(GuardedLifecycleNode):
         self._not_waking: dict[str, Subscription] = {}
         self._commands_taken: dict[str, int] = {}
         self._inputs: list[tuple[Interface, Subscription]] = []
-        self._writers: dict[str, list[WriterWatch]] = {}
-        self._looked: dict[str, tuple[float, bool | None]] = {}
-        self._own_writers: set[str] = set()
-        self._several: dict[str, float] = {}
+        self.writers = TopicWriters(self)
         topic, ready = interface('/diagnostics'), interface('~/ready')
         self._diagnostics = self.create_publisher(topic.type, topic.name, topic.publisher_qos)
         self._outputs: list[tuple[Interface, Publisher]] = [(topic, self._diagnostics)]
         self.create_service(ready.type, ready.name, self._answer_ready)
-        self.create_steady_timer(WATCH_EVERY_S, self._watch_writers)
+        self.create_steady_timer(WATCH_EVERY_S, lambda: self.writers.watch(
+            dict.fromkeys(topic for topic, _ in (*self._inputs, *self._outputs))))
 
     # Hooks -------------------------------------------------------------------------------------
 
@@ -341,7 +328,7 @@ class SuiteNode(GuardedLifecycleNode):
         if command:
             receive = self._counted(topic.name, take)
         elif watched:
-            receive = self._from_writers(topic, callback, read)
+            receive = self.writers.only(topic, callback, read)
         subscription = self.create_subscription(
             topic.type, topic.name, receive, qos or topic.reader_qos, raw=True)
         if informed:
@@ -370,103 +357,6 @@ class SuiteNode(GuardedLifecycleNode):
         self._undo.append(partial(
             self.destroy_timer, self.create_steady_timer(period_s, self.look_after)))
 
-    def _from_writers(self, topic: Interface, callback: Callable[[Any], None],
-                      read: Callable[[bytes], Any]) -> Callable[..., None]:
-        """Return a callback that takes the messages of a topic's own writers only.
-
-        Where each leg has a writer, its messages name the leg.
-        """
-        several = expected_count(topic.publishers) > 1
-        ticked, latched = hasattr(topic.type(), 'header') and not topic.latched, topic.latched
-        lock_step, may_take_over = self.lock_step, partial(self._may_take_over, topic)
-        by_leg = {leg: WriterWatch(may_take_over, ticked=ticked, lock_step=lock_step)
-                  for leg in (LEGS if several else ('',))}
-        only, watches = by_leg.get(''), list(by_leg.values())
-        self._writers[topic.name] = watches
-
-        def receive(data: Any, information: Any = None) -> None:
-            if not (self.active or latched):
-                return
-            if information is None:  # the events executor hands both over as one
-                data, information = data
-            number, now_ns = (information['publication_sequence_number'],
-                              information['received_timestamp'])
-            stamp_ns = serialized_stamp(data) if ticked else 0
-            if not any(watch.may_admit(number, stamp_ns, now_ns) for watch in watches):
-                self._refuse_writer(topic)
-                return
-            if ticked and not lock_step and time.time_ns() > now_ns + STALE_NS:
-                return
-            message = read(data)  # only what can be read makes its sender the writer
-            watch = only or by_leg.get(self.leg_of((message.name or ('',))[0]))
-            if watch is None or watch.admits(number, stamp_ns, now_ns):  # no leg: it is refused
-                callback(message)
-            else:
-                self._refuse_writer(topic)
-
-        return receive
-
-    def _publishers_of(self, topic: Interface) -> tuple[bool, list[str]]:
-        """Whether the suite's own node publishes a topic, and names of those that should not.
-
-        A driver of another name may stand for the suite's node where that has not been there.
-        """
-        ends = self.get_publishers_info_by_topic(self.resolve_topic_name(topic.name))
-        space, names = self.get_namespace(), {
-            name for kind in topic.publishers if kind in KINDS for name in KINDS[kind].instances}
-        own = {end.node_name for end in ends
-               if end.node_name in names and end.node_namespace == space}
-        others = {f'{end.node_namespace.rstrip("/")}/{end.node_name}' for end in ends
-                  if end.node_name not in own or end.node_namespace != space}
-        if own and not others:
-            self._own_writers.add(topic.name)
-        few = len(ends) <= expected_count(topic.publishers)
-        return bool(own), [] if few and topic.name not in self._own_writers else sorted(others)
-
-    def _may_take_over(self, topic: Interface) -> bool | None:
-        """For a :class:`WriterWatch`; the graph is not asked at every message."""
-        now_s, (then_s, known) = time.monotonic(), self._looked.get(topic.name, (-inf, False))
-        if now_s > then_s + LOOK_EVERY_S:
-            own, strangers = self._publishers_of(topic)
-            known = None if own and strangers else not strangers
-            self._looked[topic.name] = now_s, known
-        return known
-
-    def _refuse_writer(self, topic: Interface) -> None:
-        """Count a message of a stranger, and say who it is."""
-        rejected, key = self.health.rejected, f'writer of {topic.name}'
-        rejected[topic.name] = rejected.get(topic.name, 0) + 1
-        if not self.health.has_problem(key):
-            self._name_writers(topic)
-
-    def _name_writers(self, topic: Interface) -> None:
-        who = ', '.join(self._publishers_of(topic)[1]) or 'another node of the same name'
-        self.warn(f'writer of {topic.name}', f'{topic.name} is published by {who} too; only the '
-                  f'messages of {" and ".join(topic.publishers)} are taken')
-
-    def _watch_writers(self) -> None:
-        """Name strangers among the publishers of topics that have their own writers, and tell
-        where several command.
-        """
-        now_ns, now_s = time.time_ns(), time.monotonic()
-        for topic in dict.fromkeys(topic for topic, _ in (*self._inputs, *self._outputs)):
-            count = expected_count(topic.publishers)
-            if not count or topic.name.startswith('~') or topic.name in SHARED:
-                continue
-            too_many = self.count_publishers(self.resolve_topic_name(topic.name)) > count
-            if (too_many and self._publishers_of(topic)[1]) or any(
-                    watch.has_strangers(now_ns) for watch in self._writers.get(topic.name, ())):
-                self._name_writers(topic)
-            else:
-                self.clear(f'writer of {topic.name}')
-        for name, then_s in self._several.items():
-            if now_s < then_s + SEVERAL_S:
-                ends = self.get_publishers_info_by_topic(self.resolve_topic_name(name))
-                who = ', '.join(sorted({end.node_name for end in ends}))
-                self.warn(f'writers of {name}', f'several publish {name} ({who}): the newest acts')
-            else:
-                self.clear(f'writers of {name}')
-
     def serve(self, name: str, take: Callable[[Any], tuple[bool, str]]) -> None:
         """Create a service of the table; while the node is active, what takes its requests tells
         whether they are accepted, and what will happen or why not.
@@ -487,8 +377,8 @@ class SuiteNode(GuardedLifecycleNode):
             self.certified = None
         for undo in reversed(self._undo):
             undo()
-        self._undo, self._commands, self._inputs, self._writers = [], [], [], {}
-        self._not_waking = {}
+        self._undo, self._commands, self._inputs, self._not_waking = [], [], [], {}
+        self.writers.forget()
         self._outputs = self._outputs[:1]
 
     def missing(self) -> list[str]:
@@ -497,33 +387,21 @@ class SuiteNode(GuardedLifecycleNode):
         return missing_connections(self, self.KIND, outputs, self._inputs,
                                    self.parameters_of(parameters.NodeParameters).expected_nodes)
 
-    def _counted(self, topic: str, callback: Callable[[Any], None]) -> Callable[[Any], None]:
+    def _counted(self, topic: str, callback: Callable[[Any], None]) -> Callable[..., None]:
         """Say how many commands have been taken: who has sent them may wait for it."""
         counts = self._commands_taken
         counts.setdefault(topic, 0)
         if not self._commands:
             self._taken = self.publisher('~/commands_taken')
 
-        former, changed_s = 0, -inf
-
-        def receive(message: Any, information: Any = None) -> None:
-            nonlocal former, changed_s
-            if information is None:  # as in _from_writers
-                message, information = message
-            number = information['publication_sequence_number'] or 0
-            if number <= former:  # larger steps are losses
-                now_s, then_s = time.monotonic(), changed_s
-                changed_s = now_s
-                if now_s < then_s + SEVERAL_S:
-                    self._several[topic] = now_s
-            former = number
+        def receive(message: Any) -> None:
             try:
                 callback(message)
             finally:
                 counts[topic] += 1
                 self._taken.publish(counts_message(counts))
 
-        return receive
+        return self.writers.numbered(topic, receive)
 
     # Ticks -------------------------------------------------------------------------------------
 

@@ -16,7 +16,19 @@ protect from mistakes and from what does not know them, DDS Security from the re
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable
+from functools import partial
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.nodes.messages.cdr import serialized_stamp
+from dmp_cpg_ros.nodes.messages.interfaces import SHARED, Interface, expected_count
+from dmp_cpg_ros.suite_table import KINDS
+
+if TYPE_CHECKING:
+    from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 
 SILENT_NS = 500_000_000
 """Time without a message of the writer after which another one may take over [ns]."""
@@ -40,6 +52,15 @@ PROVEN = 5
 
 LOST = 20
 """Messages in a row that may be lost of a writer that sends on change, or is not known yet."""
+
+LOOK_EVERY_S = 0.2
+"""How often the graph is asked for the publishers of a topic at most [s]."""
+
+SEVERAL_S = 2.0
+"""Time within which commands of several publishers take turns [s]."""
+
+STALE_NS = 250_000_000
+"""In real time: age from which messages of ticks are not worth being worked through [ns]."""
 
 
 class WriterWatch:
@@ -151,3 +172,158 @@ class WriterWatch:
         shorter = ahead == 1 and not self.has_strangers(now_ns)
         return (SHORTEST_TICK_NS if shorter else ahead * self._tick_ns) <= passed_ns <= (
             FASTEST * max(0, now_ns - self._heard_ns) + MADE_UP_NS)
+
+
+class TopicWriters:
+    """Who writes the topics of a node: its readers hear the suite's own writers only.
+
+    Strangers are refused, counted and named. Of commands, which several may send, the newest acts.
+
+    Parameters
+    ----------
+    node : SuiteNode
+        The node whose topics these are.
+    """
+
+    def __init__(self, node: SuiteNode) -> None:
+        """Know no topic yet."""
+        self._node = node
+        self._watches: dict[str, list[WriterWatch]] = {}
+        self._looked: dict[str, tuple[float, bool | None]] = {}
+        self._own: set[str] = set()
+        self._several: dict[str, float] = {}
+
+    def forget(self) -> None:
+        """Forget the writers that were read, with the readers."""
+        self._watches = {}
+
+    def only(self, topic: Interface, callback: Callable[[Any], None],
+             read: Callable[[bytes], Any]) -> Callable[..., None]:
+        """Return a callback that takes the messages of a topic's own writers only.
+
+        Where each leg has a writer, its messages name the leg.
+
+        Parameters
+        ----------
+        topic : Interface
+            The topic.
+        callback : callable (message)
+            What takes them.
+        read : callable bytes → message
+            What reads them.
+
+        Returns
+        -------
+        callable (bytes, information)
+        """
+        node, lock_step = self._node, self._node.lock_step
+        several = expected_count(topic.publishers) > 1
+        ticked, latched = hasattr(topic.type(), 'header') and not topic.latched, topic.latched
+        may_take_over = partial(self._may_take_over, topic)
+        by_leg = {leg: WriterWatch(may_take_over, ticked=ticked, lock_step=lock_step)
+                  for leg in (LEGS if several else ('',))}
+        alone, watches = by_leg.get(''), list(by_leg.values())
+        self._watches[topic.name] = watches
+
+        def receive(data: Any, information: Any = None) -> None:
+            if not (node.active or latched):
+                return
+            if information is None:  # the events executor hands both over as one
+                data, information = data
+            number, now_ns = (information['publication_sequence_number'],
+                              information['received_timestamp'])
+            stamp_ns = serialized_stamp(data) if ticked else 0
+            if not any(watch.may_admit(number, stamp_ns, now_ns) for watch in watches):
+                self._refuse(topic)
+                return
+            if ticked and not lock_step and time.time_ns() > now_ns + STALE_NS:
+                return
+            message = read(data)  # only what can be read makes its sender the writer
+            watch = alone or by_leg.get(node.leg_of((message.name or ('',))[0]))
+            if watch is None or watch.admits(number, stamp_ns, now_ns):  # no leg: it is refused
+                callback(message)
+            else:
+                self._refuse(topic)
+
+        return receive
+
+    def numbered(self, topic: str, callback: Callable[[Any], None]) -> Callable[..., None]:
+        """Return a callback that takes everybody's commands, and notices that several send."""
+        former, changed_s = 0, -inf
+
+        def receive(message: Any, information: Any = None) -> None:
+            nonlocal former, changed_s
+            if information is None:  # as in only
+                message, information = message
+            number = information['publication_sequence_number'] or 0
+            if number <= former:  # larger steps are losses
+                now_s, then_s = time.monotonic(), changed_s
+                changed_s = now_s
+                if now_s < then_s + SEVERAL_S:
+                    self._several[topic] = now_s
+            former = number
+            callback(message)
+
+        return receive
+
+    def watch(self, topics: Iterable[Interface]) -> None:
+        """Name strangers among the publishers of topics that have their own writers, and tell
+        where several command; to be called now and then.
+        """
+        node, now_ns, now_s = self._node, time.time_ns(), time.monotonic()
+        for topic in topics:
+            count = expected_count(topic.publishers)
+            if not count or topic.name.startswith('~') or topic.name in SHARED:
+                continue
+            too_many = node.count_publishers(node.resolve_topic_name(topic.name)) > count
+            if (too_many and self._publishers(topic)[1]) or any(
+                    watch.has_strangers(now_ns) for watch in self._watches.get(topic.name, ())):
+                self._name_strangers(topic)
+            else:
+                node.clear(f'writer of {topic.name}')
+        for name, then_s in self._several.items():
+            if now_s < then_s + SEVERAL_S:
+                ends = node.get_publishers_info_by_topic(node.resolve_topic_name(name))
+                who = ', '.join(sorted({end.node_name for end in ends}))
+                node.warn(f'writers of {name}', f'several publish {name} ({who}): the newest acts')
+            else:
+                node.clear(f'writers of {name}')
+
+    def _publishers(self, topic: Interface) -> tuple[bool, list[str]]:
+        """Whether the suite's own node publishes a topic, and names of those that should not.
+
+        A driver of another name may stand for the suite's node where that has not been there.
+        """
+        node = self._node
+        ends = node.get_publishers_info_by_topic(node.resolve_topic_name(topic.name))
+        space, names = node.get_namespace(), {
+            name for kind in topic.publishers if kind in KINDS for name in KINDS[kind].instances}
+        own = {end.node_name for end in ends
+               if end.node_name in names and end.node_namespace == space}
+        others = {f'{end.node_namespace.rstrip("/")}/{end.node_name}' for end in ends
+                  if end.node_name not in own or end.node_namespace != space}
+        if own and not others:
+            self._own.add(topic.name)
+        few = len(ends) <= expected_count(topic.publishers)
+        return bool(own), [] if few and topic.name not in self._own else sorted(others)
+
+    def _may_take_over(self, topic: Interface) -> bool | None:
+        """For a :class:`WriterWatch`; the graph is not asked at every message."""
+        now_s, (then_s, known) = time.monotonic(), self._looked.get(topic.name, (-inf, False))
+        if now_s > then_s + LOOK_EVERY_S:
+            own, strangers = self._publishers(topic)
+            known = None if own and strangers else not strangers
+            self._looked[topic.name] = now_s, known
+        return known
+
+    def _refuse(self, topic: Interface) -> None:
+        """Count a message of a stranger, and say who it is."""
+        health, key = self._node.health, f'writer of {topic.name}'
+        health.rejected[topic.name] = health.rejected.get(topic.name, 0) + 1
+        if not health.has_problem(key):
+            self._name_strangers(topic)
+
+    def _name_strangers(self, topic: Interface) -> None:
+        who = ', '.join(self._publishers(topic)[1]) or 'another node of the same name'
+        self._node.warn(f'writer of {topic.name}', f'{topic.name} is published by {who} too; only '
+                        f'the messages of {" and ".join(topic.publishers)} are taken')
