@@ -15,6 +15,7 @@ from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.parameters import shown
+from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.world import World, WorldParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
@@ -39,6 +40,8 @@ class Suite:
         How the robot is run.
     sensors : SensorParameters
         Noise of its sensors.
+    mismatch : MismatchParameters
+        How it differs from the model that its controllers have.
     world : World
         What it walks on.
     tick_ns : int
@@ -53,6 +56,7 @@ class Suite:
     gait: Gait
     robot: core.RobotParameters
     sensors: SensorParameters
+    mismatch: MismatchParameters
     world: World
     tick_ns: int
     robot_file: Path
@@ -136,7 +140,8 @@ def _suite(path: Path, overrides: Mapping[str, Any], namespace: str) -> Suite:
     gait = canonical[core.GaitParameters]
     world = core.chosen_world(robot[WorldParameters], robot[core.RobotParameters])
     return Suite(parameters, load_gait(gait.gait, gait.gaits_file), robot[core.RobotParameters],
-                 robot[SensorParameters], world, robot[core.TickParameters].tick_ns,
+                 robot[SensorParameters], robot[MismatchParameters], world,
+                 robot[core.TickParameters].tick_ns,
                  find_config(robot[core.RobotFileParameters].robot), path)
 
 

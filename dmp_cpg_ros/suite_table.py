@@ -17,6 +17,7 @@ from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSo
 from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingSwitch
 from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters
+from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
@@ -72,8 +73,9 @@ SUITE_TABLE: tuple[Kind, ...] = (
     Kind(LEG, 'LegTransformation',
          (core.LegChoice, LegParameters, core.GaitParameters, core.RobotFileParameters),
          {f'{LEG}_{leg}': {'leg': leg} for leg in LEGS}),
-    _single(ROBOT, 'MujocoRobotNode', core.RobotParameters, SensorParameters, WorldParameters,
-            StateSourceParameters, core.TickParameters, core.RobotFileParameters, VotingSwitch),
+    _single(ROBOT, 'MujocoRobotNode', core.RobotParameters, SensorParameters, MismatchParameters,
+            WorldParameters, StateSourceParameters, core.TickParameters, core.RobotFileParameters,
+            VotingSwitch),
     _single(RECORDER, 'BagRecorder'),
     _single(VISUALIZATION, 'Visualization',
             LegParameters, core.GaitParameters, core.RobotFileParameters),

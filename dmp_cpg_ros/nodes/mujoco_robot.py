@@ -21,6 +21,7 @@ from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingSwitch
+from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
@@ -340,4 +341,5 @@ class MujocoRobotNode(DrivenRobot):
         if p.reading == 'torque':
             robot_file = robot_file.without_gains()
         return MujocoRobot(robot_file, self._tick_ns, p.seed, p.initial_spread, world=world,
-                           sensors=self.parameters_of(SensorParameters), start_pose=p.start_pose)
+                           sensors=self.parameters_of(SensorParameters), start_pose=p.start_pose,
+                           mismatch=self.parameters_of(MismatchParameters))

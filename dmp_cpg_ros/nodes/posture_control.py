@@ -232,7 +232,10 @@ class PostureControl(SuiteNode):
         condition = self._state.mode.condition
         measured = {} if condition is None else {
             name: getattr(condition, name) for name in ('tilt', 'height', 'support')}
+        (ahead, left), slow = self._state.balance.offset.place, self._state.balance.integral
         return {'body_mode': self._state.mode.mode, 'reason': self._state.mode.reason, **measured,
+                'mass_offset_m': f'{ahead:.4f} {left:.4f}',
+                'speed_correction_m_s': ' '.join(f'{part:.4f}' for part in slow.correction),
                 **self._body.diagnostic_values()}
 
     def _take_request(self, what: str, _: Any) -> tuple[bool, str]:

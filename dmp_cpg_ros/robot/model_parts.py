@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.robot_file import RobotFile
@@ -280,6 +281,19 @@ class JointActuators:
             data.ctrl[self._index] = torque * self._per_torque
         else:
             data.qfrc_applied[self._index] = torque
+
+
+def differ(model: mujoco.MjModel, ids: ModelIds, dof: Places, mismatch: MismatchParameters,
+           mass: float) -> None:
+    """Make a model differ from what its controllers know of it, a robot of some mass [kg]."""
+    base = ids.base
+    more = 1.0 + mismatch.payload * mass / model.body_mass[base]
+    model.body_mass[base] *= more
+    model.body_inertia[base] *= more
+    model.body_ipos[base, :2] += mismatch.mass_offset
+    model.dof_frictionloss[dof] *= mismatch.joint_friction
+    model.dof_damping[dof] *= mismatch.joint_friction
+    mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def standing_torque(model: mujoco.MjModel, data: mujoco.MjData, ids: ModelIds,

@@ -15,6 +15,7 @@ from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import World, height_over_ground
@@ -108,6 +109,8 @@ class MujocoRobot:
         Noise of the sensors, from the same seed; by default they are perfect.
     start_pose : str
         ``standing``, ``lying`` (on the belly) or ``fallen`` (somehow, by the seed).
+    mismatch : MismatchParameters, optional
+        How it differs from ``description``, which is what controllers know; by default nowhere.
 
     Attributes
     ----------
@@ -125,7 +128,8 @@ class MujocoRobot:
     def __init__(self, robot_file: RobotFile | Path | str | None = None, tick_ns: int = 4_000_000,
                  seed: int = 0, initial_spread: float = 0.0,
                  initial_height: float | None = None, world: World | None = None,
-                 sensors: SensorParameters | None = None, start_pose: str = 'standing') -> None:
+                 sensors: SensorParameters | None = None, start_pose: str = 'standing',
+                 mismatch: MismatchParameters | None = None) -> None:
         file = load_robot_file(robot_file)
         self.world = world = world or World()
         self.model = model = load_model(file.model, file.base, world)
@@ -145,6 +149,10 @@ class MujocoRobot:
         self._actuators = model_parts.JointActuators(model, ids.joints)
         self._drive = JointDrive(
             self.description, self._steps, self._step_s, model.dof_damping[self._dof])
+        mismatch = mismatch or MismatchParameters()
+        self._strength = np.array(mismatch.joint_strength)
+        if mismatch != MismatchParameters():
+            model_parts.differ(model, ids, self._dof, mismatch, self.description.mass)
         self._contacts = model_parts.ContactReader(model, ids)
         self._hips_in_base = np.array([leg.hip_in_base for leg in self.description.legs])
         if not (np.isfinite(initial_spread) and initial_spread >= 0.0):
@@ -188,7 +196,7 @@ class MujocoRobot:
             self._work = np.zeros(12)
         else:
             holding = model_parts.standing_torque(model, data, self._ids, self._dof)
-            self._effort = self._drive.limited(holding, np.zeros(12))
+            self._effort = self._strength * self._drive.limited(holding, np.zeros(12))
             self._peak_effort = np.abs(self._effort)
             self._actuators.apply(data, self._effort)
             mujoco.mj_forward(model, data)
@@ -209,7 +217,7 @@ class MujocoRobot:
         """
         self._drive.accept(targets)
         self._begin_push()
-        model, data, drive = self.model, self.data, self._drive
+        model, data, drive, strength = self.model, self.data, self._drive, self._strength
         qpos, qvel, step = data.qpos, data.qvel, mujoco.mj_step
         d, specific_force = self._ids.base_dof, np.zeros(3)
         R_world_base = data.xmat[self.base].reshape(3, 3)  # a view, of the step's begin
@@ -217,7 +225,7 @@ class MujocoRobot:
         torques, rates = self._torques, self._rates
         for i in range(self._steps):
             rates[i] = qvel[self._dof]
-            torques[i] = self._effort = drive.torque(i, qpos[self._qpos], rates[i])
+            torques[i] = self._effort = strength * drive.torque(i, qpos[self._qpos], rates[i])
             self._actuators.apply(data, self._effort)
             self._push_on()
             before = base_velocity.copy()

@@ -7,7 +7,8 @@ eight directions at every phase. timing: falls by drawn pushes in other gaits, o
 on blocks too, with and without quicker steps. manoeuvres: falls by pushes at rest, while stopping,
 starting, changing gait and turning. unpushed: stops that nobody pushes against. rough: share of
 seeds that cross 5 m of rough ground. contacts: the same with and without the feedback of touchdown
-and the stumbling reflex. delays: targets that arrive late. gaits: every ordered pair of gaits
+and the stumbling reflex. delays: targets that arrive late. mismatch: a robot that is not as its
+controllers know it. gaits: every ordered pair of gaits
 changed while moving. robots: other robots, with their files alone; those of the extra `robots` are
 left out where it is not installed.
 
@@ -30,6 +31,7 @@ import numpy as np
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.errors import MissingFileError
+from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies import walking_trials as trials
@@ -121,6 +123,24 @@ LATE_WALKS = (('amble', 0.5), ('amble', 1.2), ('trot', 1.0), ('trot', 2.0))
 DELAYS_MS = ((0.0, 0.0), (16.0, 16.0), (20.0, 20.0), (24.0, 24.0), (40.0, 40.0), (5.0, 30.0),
              (5.0, 50.0))
 """Least and longest delays of their targets [ms]."""
+
+WEAK = 0.4
+"""Share of its torque that a weak drive has."""
+
+MISMATCHED: dict[str, Callable[[int], trials.Values]] = {
+    'nothing': lambda seed: (),
+    "payload of the robot's mass": lambda seed: (('payload', 1.0),),
+    f'one drive at {WEAK:.0%}, each in turn': lambda seed: (('joint_strength', tuple(
+        WEAK if k == seed % len(JOINT_NAMES) else 1.0 for k in range(len(JOINT_NAMES)))),),
+    'friction and damping of the joints times 10': lambda seed: (('joint_friction', 10.0),),
+    'noise and biases of the sensors times 10': lambda seed: (('sensor_noise', 10.0),),
+    "trunk's centre of mass 3 cm aside, to either side": lambda seed: (
+        ('mass_offset', (0.0, 0.03 - 0.06 * (seed % 2))),),
+}
+"""What a robot's controllers do not know of it, by the seed of the walk."""
+
+MISMATCHED_WALKS = (('amble', 0.5), ('trot', 1.0))
+"""Gaits and speeds [m/s] of robots that are not as their controllers know them."""
 
 TOP_SPEEDS = (1.0, 1.5, 2.0, 2.5, 3.0)
 """Speeds that are tried in a trot, one after the other [m/s]."""
@@ -337,6 +357,25 @@ def delays(workers: Workers, seeds: int, phases: int) -> Table:
                                               'reached m/s', 'tilt rms deg'), rows, results)
 
 
+def mismatch(workers: Workers, seeds: int, phases: int) -> Table:
+    """Falls and speeds of a robot that is not as its controllers know it."""
+    cells = list(product(MISMATCHED, MISMATCHED_WALKS))
+    results = _run(workers, trials.steady, [
+        {'gait': gait, 'velocity': (speed, 0.0, 0.0), 'seed': seed + 1,
+         'values': MISMATCHED[what](seed)}
+        for what, (gait, speed) in cells for seed in range(seeds)])
+    rows = []
+    for k, (what, (gait, speed)) in enumerate(cells):
+        of = [outcome for _, outcome in results[k * seeds:(k + 1) * seeds]]
+        errors = [100.0 * trials.relative_error(one, (speed, 0.0, 0.0))
+                  for one in of if not one.fell]
+        rows.append((what, f'{gait} {speed:g}', f'{seeds - len(errors)}/{seeds}', *(
+            (f'{np.median(errors):.1f}', f'{max(errors):.1f}') if errors else ('-', '-'))))
+    return Table('Robots that are not as their controllers know them',
+                 ('not known', 'gait, m/s', 'fell', 'error of speed %, median', 'worst'),
+                 rows, results)
+
+
 def gaits(workers: Workers, seeds: int, phases: int) -> Table:
     """Every ordered pair of gaits changed while moving, at a quarter of the phases."""
     walks = _run(workers, trials.run_changes, [
@@ -432,7 +471,8 @@ def _is_there(file: str) -> bool:
 
 
 TABLES = {make.__name__: make for make in (
-    speeds, pushes, timing, manoeuvres, unpushed, rough, contacts, delays, gaits, robots)}
+    speeds, pushes, timing, manoeuvres, unpushed, rough, contacts, delays, mismatch, gaits,
+    robots)}
 """What can be measured."""
 
 

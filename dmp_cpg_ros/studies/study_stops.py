@@ -46,6 +46,7 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
 from dmp_cpg_ros.core.primitives.spring_damper import SpringState
+from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
@@ -247,8 +248,8 @@ def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     suite = suite_of(file, cases[0].leg, cases[0].braking)
     gait = load_gait(cases[0].gait).scaled(cases[0].cadence)
     robot, p = MujocoRobot(suite.robot_file, suite.tick_ns,
-                           world=World(friction=cases[0].friction)), suite.parameters
-    robot.model.body_mass[robot.base] += cases[0].payload * robot.description.mass
+                           world=World(friction=cases[0].friction),
+                           mismatch=MismatchParameters(payload=cases[0].payload)), suite.parameters
     certificate = certify(
         GaitNetwork(p.canonical, gait, body_scale(robot.description)), p.inhibition, p.reference,
         p.leg, p.posture, suite.tick_ns * 1e-9, voting=p.voting)

@@ -98,7 +98,8 @@ class Walk(LoopRun[WalkingLoop]):
                  seed: int = 0, values: Values = (), start: bool = True) -> None:
         suite = suite_of(robot, gait, values)
         body = MujocoRobot(suite.robot_file, suite.tick_ns, seed, 0.03 if seed else 0.0,
-                           world=world or suite.world, sensors=suite.sensors)
+                           world=world or suite.world, sensors=suite.sensors,
+                           mismatch=suite.mismatch)
         super().__init__(body, WalkingLoop(
             body.description, suite.gait, suite.parameters, load_gaits()))
         self.asked: Velocity = (0.0, 0.0, 0.0)
@@ -188,9 +189,10 @@ class SteadyOutcome:
     cost_of_transport: float = nan
 
 
-def steady(gait: str, velocity: Velocity, robot: str | None = None) -> SteadyOutcome:
+def steady(gait: str, velocity: Velocity, robot: str | None = None, seed: int = 0,
+           values: Values = ()) -> SteadyOutcome:
     """Walk at a velocity until it is steady, then for ``MEASURED`` and ``MEASURED_WAY``."""
-    run = Walk(gait, robot)
+    run = Walk(gait, robot, seed=seed, values=values)
     upright = run.settle(velocity)
     run.states = states = [run.state]
     speed = hypot(*velocity[:2])
@@ -402,8 +404,8 @@ def unpushed(gait: str, speed: float, seed: int, kind: str, numbers: Mapping[str
     """Stop from a speed [m/s] at a drawn time without a push, with a payload as share of the
     robot's mass.
     """
-    run, draw = Walk(gait, None, WORLDS[kind](**numbers), seed), np.random.default_rng(seed)
-    run.robot.model.body_mass[run.robot.base] += payload * run.robot.description.mass
+    run = Walk(gait, None, WORLDS[kind](**numbers), seed, (('payload', payload),))
+    draw = np.random.default_rng(seed)
     upright = run.settle((speed, 0.0, 0.0)) and run.walk(draw.uniform(0.0, 1.0))
     run.loop.request(True)
     releases = 0

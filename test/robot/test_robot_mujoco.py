@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.mujoco_import import mujoco
@@ -262,3 +263,41 @@ def test_a_robot_with_position_servos_is_driven_by_torques_all_the_same(tmp_path
         np.testing.assert_array_equal(one.torque_limit, other.torque_limit)
     for one, other in zip(wriggle(servos, 30), wriggle(motors, 30), strict=True):
         np.testing.assert_allclose(one.joint_position, other.joint_position, atol=1e-6)
+
+
+def test_what_the_controllers_do_not_know_is_in_the_robot_only(robot):
+    """A payload weighs, an offset leans, friction brakes, and the description says nothing of it.
+    """
+    differs = MismatchParameters(payload=0.5, mass_offset=(0.02, -0.03), joint_friction=3.0)
+    other = MujocoRobot(mismatch=differs)
+    assert str(other.description) == str(robot.description)
+    model, known, base = other.model, robot.model, robot.base
+    mass = known.body_mass[base] + 0.5 * robot.description.mass
+    assert model.body_mass[base] == pytest.approx(mass)
+    assert model.body_subtreemass[base] == pytest.approx(1.5 * robot.description.mass)
+    np.testing.assert_allclose(
+        model.body_inertia[base], known.body_inertia[base] * mass / known.body_mass[base])
+    np.testing.assert_allclose(
+        model.body_ipos[base] - known.body_ipos[base], (0.02, -0.03, 0.0), atol=1e-12)
+    np.testing.assert_allclose(model.dof_frictionloss[6:], 3.0 * known.dof_frictionloss[6:])
+    np.testing.assert_allclose(model.dof_damping[6:], 3.0 * known.dof_damping[6:])
+    state = run(other, 500, hold(other.reset().joint_position))
+    assert state.foot_force.sum() == pytest.approx(1.5 * robot.description.mass * 9.81, rel=0.02)
+
+
+def test_a_weak_drive_gives_its_share(robot):
+    strength = (1.0, 1.0, 0.4) + (1.0,) * 9
+    weak = MujocoRobot(mismatch=MismatchParameters(joint_strength=strength))
+    states = [one.step(hold(one.reset().joint_position + 0.01)) for one in (robot, weak)]
+    first = [one.reset().joint_effort for one in (robot, weak)]
+    np.testing.assert_allclose(first[1], first[0] * strength, rtol=1e-12)
+    assert np.abs(states[1].joint_effort[2]) < 0.6 * np.abs(states[0].joint_effort[2])
+
+
+@pytest.mark.parametrize(('name', 'value', 'text'), [
+    ('joint_strength', (1.0, 1.0), 'joint_strength must hold 12 numbers'),
+    ('mass_offset', (0.0, 0.0, 0.0), 'mass_offset must hold 2 numbers'),
+    ('payload', -0.1, 'outside its range'), ('joint_friction', float('nan'), 'outside its range')])
+def test_an_impossible_mismatch_is_refused(name, value, text):
+    with pytest.raises(ParameterError, match=text):
+        MismatchParameters(**{name: value})

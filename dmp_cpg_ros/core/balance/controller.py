@@ -4,15 +4,15 @@
 
 The virtual model (:mod:`~dmp_cpg_ros.core.balance.virtual_model`) says which wrench the body
 needs, the stance feet share it, and the forces become joint torques τ_fb = −Jᵀ f. Swinging feet
-are placed so as to catch the body (:mod:`~dmp_cpg_ros.core.balance.footholds`), and a slow loop
-corrects velocity and heading (:class:`VelocityCorrection`).
+are placed so as to catch the body (:mod:`~dmp_cpg_ros.core.balance.footholds`), and slow loops
+correct what the model does not know (:mod:`~dmp_cpg_ros.core.balance.corrections`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import atan2, exp, hypot, isnan, pi
+from math import pi
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ import numpy as np
 from dmp_cpg_ros.core.balance import virtual_model
 from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.capture_point import WIDE, support_margins
+from dmp_cpg_ros.core.balance.corrections import MassOffset, VelocityCorrection
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, Pair, ground_from_base, lean
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
@@ -38,9 +39,6 @@ from dmp_cpg_ros.core.transformation.foot_path import activities_step
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
-
-SLOWEST = 0.3
-"""Froude speed below which the limit of the correction shrinks no more."""
 
 LARGEST_LOAD = 2.0
 """Largest normal force of a fully loaded foot, in weights of the robot."""
@@ -86,65 +84,6 @@ class PostureFeedback:
             self.correction, float(self.foot_force[i]))
 
 
-class VelocityCorrection(NamedTuple):
-    """Integral velocity and heading correction, slow: added to the velocity of the standing feet.
-
-    Attributes
-    ----------
-    correction : tuple of float
-        Correction of the stance velocity, v_x and v_y [m/s].
-    heading_error : float
-        Commanded minus measured heading [rad].
-    yaw : float
-        Heading at the last tick [rad]; NaN before the first.
-    """
-
-    correction: tuple[float, float]
-    heading_error: float
-    yaw: float
-
-    def integrated(self, p: PostureParameters, leg_length: float, moving: float,
-                   quaternion: Sequence[float], velocity: Triple, r: Triple,
-                   dt: float) -> VelocityCorrection:
-        """Integrate the errors of velocity and heading while the legs move; forget them at rest.
-
-        Parameters
-        ----------
-        p : PostureParameters
-            Gains.
-        leg_length : float
-            Standing height of the hips [m].
-        moving : float
-            Mean activity of the legs.
-        quaternion : sequence of four floats
-            Orientation of the base, x, y, z, w.
-        velocity : tuple of float
-            Of the base in the levelled frame [m/s].
-        r : tuple of float
-            Velocity that the body can have by now, v_x, v_y [m/s], and the reference γ [rad/s].
-        dt : float
-            [s]
-        """
-        R = vec3.rotation(quaternion)
-        yaw = atan2(R[1][0], R[0][0])
-        slowest = SLOWEST * (GRAVITY * leg_length) ** 0.5
-        limit = p.speed_correction_limit * max(hypot(r[0], r[1]), slowest)
-        gain = p.speed_integral * (GRAVITY / leg_length) ** 0.5 * moving * dt
-        kept = exp(-(1.0 - moving) * p.activity_rate * dt)
-        along, across = (
-            min(max(before + gain * (wanted - is_now), -limit), limit) * kept
-            for before, wanted, is_now in zip(self.correction, r[:2], velocity[:2], strict=True))
-        turn = 0.0 if isnan(self.yaw) else (yaw - self.yaw + pi) % (2.0 * pi) - pi
-        error = (self.heading_error + r[2] * dt - turn) * moving
-        return VelocityCorrection(
-            (along, across), min(max(error, -p.heading_limit), p.heading_limit), yaw)
-
-    def acting(self, p: PostureParameters, leg_length: float, moving: float) -> Triple:
-        """Correction of v_x, v_y [m/s], γ [rad/s] that the legs apply."""
-        turn = p.heading_gain * (GRAVITY / leg_length) ** 0.5 * self.heading_error
-        return moving * self.correction[0], moving * self.correction[1], moving * turn
-
-
 class PostureState(NamedTuple):
     """The controller's own state.
 
@@ -153,14 +92,17 @@ class PostureState(NamedTuple):
     activity : ndarray (4,)
         Swing activity of the legs.
     integral : VelocityCorrection
-        State of the slow loop.
+        State of the slow loop of velocity and heading.
     plan : MotionPlan
         What the reference has the body do.
+    offset : MassOffset
+        Where the centre of mass is found to be.
     """
 
     activity: Array
-    integral: VelocityCorrection
+    integral: VelocityCorrection = VelocityCorrection()
     plan: MotionPlan = MotionPlan()
+    offset: MassOffset = MassOffset()
 
 
 class PostureController:
@@ -199,8 +141,7 @@ class PostureController:
 
     def initial_state(self) -> PostureState:
         """State of a robot that stands."""
-        return PostureState(
-            np.zeros(len(self.kinematics)), VelocityCorrection((0.0, 0.0), 0.0, float('nan')))
+        return PostureState(np.zeros(len(self.kinematics)))
 
     def step(self, memory: PostureState, state: RobotState, gait: GaitInForce, x: Array,
              x_dot: Array, r: Array, dt: float,
@@ -244,27 +185,31 @@ class PostureController:
         plan = memory.plan.followed(reference, moving, self.model.push_rate(p),
                                     p.friction * GRAVITY, dt)
         integral = memory.integral.integrated(
-            p, leg_length, moving, state.base_quaternion.tolist(), velocity,
-            (*plan.expected, reference[2]), dt)
+            p, leg_length, moving, state.base_quaternion.tolist(), velocity, plan,
+            reference[2], dt)
+        offset = memory.offset.found(p, leg_length, moving, R_ground_base, dt)
+        aside_x, aside_y = offset.place
+        com_x, com_y, com_z = self._com_in_base
+        com_in_base = com_x + aside_x, com_y + aside_y, com_z
         correction = integral.acting(p, leg_length, moving)
         sway = self._sway(positions, duty, omega, reference, moving)
         measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
         planned = vec3.plus(reference, correction)
         lean_x, lean_y = lean(upward, self.model.height)
         outside = -self.model.height / GRAVITY
-        beside = (p.slope_lean * lean_x + outside * plan.curve[0],
-                  p.slope_lean * lean_y + outside * plan.curve[1])
+        beside = (p.slope_lean * lean_x + outside * plan.curve[0] + aside_x,
+                  p.slope_lean * lean_y + outside * plan.curve[1] + aside_y)
         caught = self.placement.caught(measured, planned, gait.apart)
         shift = [
             (along + beside[0], across + beside[1]) for along, across in self.placement.shift(
                 p, caught, planned, pi * duty / omega)]
         raised = self.placement.raised(p, shift, R_ground_base)
         legs = self.legs.at(state.joint_position.tolist())
-        feet = [vec3.times(R_ground_base, vec3.minus(foot, self._com_in_base)) for foot, _ in legs]
+        feet = [vec3.times(R_ground_base, vec3.minus(foot, com_in_base)) for foot, _ in legs]
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
-        return PostureState(activity, integral, plan), PostureFeedback(
+        return PostureState(activity, integral, plan, offset), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, acceleration),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
             np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),

@@ -46,6 +46,12 @@ class MotionPlan(NamedTuple):
     acceleration: Pair = (0.0, 0.0)
     curve: Pair = (0.0, 0.0)
 
+    @property
+    def behind(self) -> float:
+        """How far the body is behind its reference by plan, |v − v̂| [m/s]."""
+        v_x, v_y = self.velocity or self.expected
+        return hypot(v_x - self.expected[0], v_y - self.expected[1])
+
     def followed(self, reference: Triple, moving: float, rate: float, most: float,
                  dt: float) -> MotionPlan:
         """Plan of the next tick.

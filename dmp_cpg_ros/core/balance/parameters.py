@@ -56,6 +56,15 @@ class PostureParameters(Parameters):
     speed_correction_limit: float = parameter(
         0.2, 'largest correction of the stance velocity, as a fraction of the speed, at least of '
         '0.3 sqrt(g l)', 0.0, 1.0)
+    speed_mismatch_limit: float = parameter(
+        0.5, 'largest correction of the stance velocity while the reference stands still, as a '
+        'fraction of the speed as well', 0.0, 1.0)
+    offset_rate: float = parameter(
+        0.05, 'rate at which a displacement of the centre of mass is found by a tilt that stays, '
+        'in sqrt(g/l)', 0.0, 10.0)
+    offset_limit: float = parameter(
+        0.2, 'largest displacement of the centre of mass that is made up for, as a fraction of '
+        'the standing height of the hips', 0.0, 0.5)
     heading_gain: float = parameter(
         0.25, 'turn rate per error of heading, in sqrt(g/l)', 0.0, 20.0)
     heading_limit: float = parameter(

@@ -11,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
+from dmp_cpg_ros.core.balance.corrections import MassOffset, VelocityCorrection
+from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.virtual_model import REGULARISATION, distribute
 from dmp_cpg_ros.core.estimation.leg_odometry import normal_in_world
 from dmp_cpg_ros.core.maths.rotations import turned
@@ -212,8 +214,61 @@ def test_a_correction_grows_while_walking_and_is_forgotten_at_rest() -> None:
     memory, slow = of.initial_state(), standing_state(ROBOT)
     for _ in range(500):
         memory, feedback = of.step(memory, slow, AMBLE, x, x_dot, r, TICK)
-    assert feedback.correction[0] > 0.05
-    assert feedback.correction[0] <= of.parameters.speed_correction_limit * 0.5 + 1e-9
+    assert 0.05 < feedback.correction[0] <= of.parameters.speed_mismatch_limit * 0.5 + 1e-9
     for _ in range(500):
         memory, feedback = of.step(memory, slow, AMBLE, x, 0.0 * x, np.zeros(3), TICK)
     assert np.abs(feedback.correction).max() < 1e-3
+
+
+def test_more_is_corrected_while_the_reference_stands_still() -> None:
+    """The limit is narrow while the velocity asked for moves, and comes back to that gradually."""
+    p, length = PostureParameters(), 0.28
+    narrow, wide = (limit * 0.5 for limit in (p.speed_correction_limit, p.speed_mismatch_limit))
+
+    def walked(before: VelocityCorrection, seconds: float, change: float
+               ) -> list[VelocityCorrection]:
+        plan, loops = MotionPlan().followed((0.5, 0.0, 0.0), 1.0, 5.0, 4.0, TICK), [before]
+        for k in range(round(seconds / TICK)):
+            v_x = 0.5 + change * np.sin(10.0 * k * TICK)
+            plan = plan.followed((v_x, 0.0, 0.0), 1.0, 5.0, 4.0, TICK)
+            loops.append(loops[-1].integrated(
+                p, length, 1.0, (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0), plan, 0.0, TICK))
+        return loops[1:]
+
+    moving = walked(VelocityCorrection(), 4.0, 0.1)
+    assert narrow * 0.9 < moving[-1].correction[0] < narrow * 1.2
+    still = walked(moving[-1], 6.0, 0.0)
+    assert still[-1].correction[0] == pytest.approx(wide, rel=0.02)
+    back = [loop.correction[0] for loop in walked(still[-1], 3.0, 0.1)]
+    assert narrow * 0.9 < back[-1] < narrow * 1.2
+    assert np.abs(np.diff(back)).max() < 0.03 * wide
+
+
+@pytest.mark.parametrize(('tilt', 'place'), [
+    ((-0.1, 0.0), (0.0, 1.0)), ((0.1, 0.0), (0.0, -1.0)),
+    ((0.0, 0.1), (1.0, 0.0)), ((0.0, -0.1), (-1.0, 0.0))])
+def test_the_mass_is_found_on_the_side_that_sinks(
+        tilt: tuple[float, float], place: tuple[float, float]) -> None:
+    """Roll left up means that mass is to the right; pitch nose down that it is ahead."""
+    p, length = PostureParameters(), 0.28
+    roll, pitch = tilt
+    R = rotation(turned(np.array((0.0, 0.0, 0.0, 1.0)), np.array((roll, pitch, 0.0))).tolist())
+    found = MassOffset()
+    for _ in range(1000):
+        found = found.found(p, length, 1.0, R, TICK)
+    assert np.allclose(found.tilt, tilt, atol=1e-3)
+    assert np.dot(found.place, place) > 0.005
+    assert np.allclose(np.cross((*found.place, 0.0), (*place, 0.0)), 0.0, atol=1e-9)
+    rests = found.found(p, length, 0.0, R, TICK)
+    assert rests.place == found.place
+    for _ in range(20_000):
+        found = found.found(p, length, 1.0, R, TICK)
+    assert np.linalg.norm(found.place) == pytest.approx(p.offset_limit * length)
+
+
+def test_of_a_slight_tilt_nothing_is_concluded() -> None:
+    R = rotation(turned(np.array((0.0, 0.0, 0.0, 1.0)), np.array((0.02, -0.02, 0.0))).tolist())
+    found = MassOffset()
+    for _ in range(5000):
+        found = found.found(PostureParameters(), 0.28, 1.0, R, TICK)
+    assert found.place == (0.0, 0.0)
