@@ -8,13 +8,15 @@ depend neither on how many work nor on where.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -103,7 +105,16 @@ class Workers:
 
 
 def _begin(prepare: Callable[[], object] | None) -> None:
-    """Begin a process, which Ctrl-C ends without a word."""
+    """Begin a process, which Ctrl-C ends without a word, and the end of its study as well."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    threading.Thread(target=_end_with_the_study, daemon=True).start()
     if prepare is not None:
         prepare()
+
+
+def _end_with_the_study() -> None:
+    """End this process when the one that started it has: killed, it could not say so."""
+    study = parent_process()
+    if study is not None:
+        study.join()
+        os._exit(1)

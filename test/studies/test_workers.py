@@ -5,9 +5,11 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from functools import partial
 from math import sqrt
+from select import select
 
 import pytest
 
@@ -32,6 +34,21 @@ def test_what_a_trial_raises_ends_the_study() -> None:
 def test_a_process_that_dies_ends_the_study_and_nobody_waits_for_it() -> None:
     with pytest.raises(DmpCpgError, match='ended before its case'), Workers(2) as workers:
         list(workers.map(os._exit, [1, 1, 1]))
+
+
+def test_a_study_that_is_killed_leaves_nobody_at_work() -> None:
+    code = """if True:
+        import time
+        from dmp_cpg_ros.studies.workers import Workers
+        with Workers(1) as workers:
+            print(*workers.map(eval, ["__import__('os').getpid()"]), flush=True)
+            list(workers.map(time.sleep, [3600.0]))"""
+    with subprocess.Popen([sys.executable, '-c', code], stdout=subprocess.PIPE) as study:
+        worker = os.pidfd_open(int(study.stdout.readline()))  # type: ignore[union-attr]
+        study.kill()
+    ended, _, _ = select([worker], [], [], 60.0)
+    os.close(worker)
+    assert ended
 
 
 def test_every_process_is_prepared() -> None:
