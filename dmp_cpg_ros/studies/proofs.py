@@ -396,6 +396,11 @@ FORGERIES: dict[str, Callable[..., Any]] = {
 _CLEARLY = 1e-7
 """Share by which a claim must fail, so that rounding does not refute it."""
 
+_LESS = 1.0 - _CLEARLY
+
+_ANGLES = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+_CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)  # (a, 2)
+
 
 def refuted(p: Values, w: Values) -> list[str]:
     """Claims of a proof that do not hold, in floating point.
@@ -405,82 +410,124 @@ def refuted(p: Values, w: Values) -> list[str]:
     that nothing is shared with the checker. Time to rest is compared with what the reference's and
     the swings' filters alone need.
     """
-    rho, r, r0, tick, omega, slow, armed_max = (float(p[name]) for name in (
-        'rho', 'radius', 'region_radius', 'tick', 'omega_max', 'omega_at_rest', 'omega_armed_max'))
     K, gains = (np.array(p[name], dtype=float) for name in ('coupling', 'gains'))
-    u, v, xi = (np.array(w[name], dtype=float) for name in ('u', 'v', 'xi'))
-    b, rate = float(w['connectivity']), float(w['rate'])
     numbers = [float(x) for x in p.values() if isinstance(x, Fraction)]
-    if min(*numbers, K.min(), gains.min()) < 0.0 or max(slow, armed_max) > omega * (1 + _CLEARLY):
+    fastest = float(max(p['omega_at_rest'], p['omega_armed_max']))
+    if min(*numbers, K.min(), gains.min()) < 0.0 or fastest > float(p['omega_max']) / _LESS:
         return ['premises']
-    if min(rho, r, gains.max(), K.sum(axis=1).max()) <= 0.0 or min(v.min(), xi.min()) <= 0.0:
+    if min(float(p['rho']), float(p['radius']), gains.max(), K.sum(axis=1).max()) <= 0.0 or min(
+            map(float, (*w['v'], *w['xi']))) <= 0.0:
         return ['positive']
-    size, unit = len(K), np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)  # (a, 2)
-    oscillator = AndronovHopf(rho, r)
-    graph = CouplingGraph(size, tuple((int(i), int(j)) for i, j in np.argwhere(K > 0.0)),
-                          K[K > 0.0][:, None, None] * np.eye(2), np.zeros(size))
-    system, target = CanonicalSystem(graph, oscillator), np.array([r, 0.0])
-    growth, held, scale = rho * r**2, gains > 0.0, _CLEARLY * (omega + K.max()) * r
-    places = r * min(0.02, slow / K.sum(axis=1).max())
-    less, kept = 1.0 - _CLEARLY, gains + K.sum(axis=1)
-
-    def in_disc(x: Array) -> Array:
-        return np.asarray(np.hypot(x[..., 0], x[..., 1]) <= r)
-
-    x = target + u[:, None, None] * unit                                       # (N, a, 2)
-    outwards = np.where(in_disc(x), (oscillator.field(x, omega) * unit).sum(axis=2), -np.inf)
-    on_face = outwards.max(axis=1) + K @ u - kept * u
-    planes = [[np.array(part, dtype=float) for part in plane[:3]] for plane in w['half_planes']]
-    inner = np.max([np.maximum(0.0, r - u), *(h for *_, h in planes)], axis=0) if planes else 0 * u
-    J = oscillator.jacobian(inner[:, None, None] * unit, omega)
-    most = np.linalg.eigvalsh(0.5 * (J + np.swapaxes(J, 2, 3)))[..., 1].max(axis=1)
-    entry = np.concatenate([0.98 * r * unit, r * unit])
-    entry = entry[np.hypot(*(entry - target).T) <= r0]
-    claims = {
-        'synchronisation': growth * less < b and abs(xi.sum() - 1.0) < _CLEARLY and (
-            b * less <= connectivity(graph.block_laplacian(), size, xi)),
-        'entry': bool(np.all(np.abs(u - r0)[held] <= _CLEARLY * r) and np.all(
-            u[~held] >= min(2.0 * r, r0 + places) * less)),
-        'box': bool(np.all((on_face <= scale) | (u >= 2.0 * r * less))),
-        'contraction': rate > 0.0 and bool(np.all(
-            most - kept + (K @ v) / v <= -rate + _CLEARLY * kept.max())),
-        'time_step': tick * less <= step.longest_step(
-            rho, r, omega, min(b - growth, rate, 2.0 * growth)),
-        'mild_root': float(w['mild_root']) >= math.hypot(omega, growth) * less,
-        'cycle_radius': step.cycle_radius_error(rho, r, omega, tick) * less - 1e-10 <= float(
-            w['cycle_error']) <= min(0.02, (r0 / r)**2),
-        'region_per_tick': omega * tick * less <= 4.0 * math.asin(min(1.0, 0.5 * r0 / r)),
-        'rates': min(p['alpha_r'], p['slowest_filter'], p['stiffness'], p['damping']) > 0,
-        'rest_posture': float(p['clearance']) * 0.02 * less <= 0.01,
-        'arming_time': p['foot_speed'] == 0 or float(p['foot_speed']) * less * math.exp(
-            -float(p['alpha_r'] * w['arming_time'])) <= float(p['armed_speed']),
-        'time_to_rest': p['activity_rate'] > 0 and p['alpha_r'] > 0 and max(
-            math.log(50.0) / float(p['activity_rate']),
-            math.log(max(100.0 * float(p['foot_speed']), 1.0)) / float(p['alpha_r'])) < 10.0}
-    for c, s, h in planes:
-        n, along = np.array([c, -s]), np.array([s, c])
-        x = h[:, None, None] * n + np.linspace(-r, r, len(unit))[:, None] * along
-        inside = in_disc(x) & (np.hypot(*np.moveaxis(x - target, 2, 0)) <= u[:, None])
-        inwards = np.where(inside, oscillator.field(x, omega) @ n, np.inf).min(axis=1)
-        claims['half-planes'] = claims.get('half-planes', True) and bool(
-            np.all(inwards + K @ h + gains * r * c - kept * h >= -scale)
-            and np.all(h.max() + places <= entry @ n + scale) and h.min() >= 0.0)
-    for at, (y, _, error) in zip((slow, omega), w['equilibria'][::-1], strict=True):
-        rest, states = inhibited_equilibrium(system, at, gains), np.array(y, dtype=float)
-        if rest is None:
-            return [name for name, holds in claims.items() if not holds] or ['equilibrium']
-        off = np.linalg.norm(rest.state - states, axis=1) / v
-        claims[f'equilibrium at {at:.3g}'] = float(off.max()) * less - 1e-9 * r <= float(error)
-        near = np.linalg.norm(states - target, axis=1)[held].max()
-        claims['rest_in_region'] = bool(rest.distance[held].max() * less < r0
-                                        and near * less <= float(w['rest_distance']))
-        claims.setdefault('rest_radius', bool(
-            rest.radius.min() > 0.5 * r * less
-            and np.hypot(*states.T).min() >= float(w['rest_size']) * less))
+    claimed = _Claimed(p, w)
+    claims = claimed.box() | claimed.sampled() | claimed.times() | claimed.half_planes()
+    claims |= claimed.rest() or {'equilibrium': False}
     return [name for name, holds in claims.items() if not holds]
 
 
-_ANGLES = np.linspace(0.0, 2.0 * np.pi, 180, endpoint=False)
+class _Claimed:
+    """Parameters and witnesses of a proof as floating-point numbers, and whether they fit."""
+
+    def __init__(self, p: Values, w: Values) -> None:
+        self.p, self.w = p, w
+        self.rho, self.r, self.r0, self.tick, self.omega, self.slow = (float(p[name]) for name in (
+            'rho', 'radius', 'region_radius', 'tick', 'omega_max', 'omega_at_rest'))
+        self.K, self.gains = (np.array(p[name], dtype=float) for name in ('coupling', 'gains'))
+        self.u, self.v, self.xi = (np.array(w[name], dtype=float) for name in ('u', 'v', 'xi'))
+        self.connectivity, self.rate = float(w['connectivity']), float(w['rate'])
+        self.planes = [[np.array(part, dtype=float) for part in plane[:3]]
+                       for plane in w['half_planes']]
+        size, K = len(self.K), self.K
+        self.oscillator = AndronovHopf(self.rho, self.r)
+        self.graph = CouplingGraph(size, tuple((int(i), int(j)) for i, j in np.argwhere(K > 0.0)),
+                                   K[K > 0.0][:, None, None] * np.eye(2), np.zeros(size))
+        self.system = CanonicalSystem(self.graph, self.oscillator)
+        self.target, self.held = np.array([self.r, 0.0]), self.gains > 0.0
+        self.growth, self.kept = self.rho * self.r**2, self.gains + K.sum(axis=1)
+        self.scale = _CLEARLY * (self.omega + K.max()) * self.r
+        self.places = self.r * min(0.02, self.slow / K.sum(axis=1).max())
+
+    def box(self) -> dict[str, bool]:
+        """Synchronisation, entry, the faces of the box, and contraction in it."""
+        r, u, v, K, kept = self.r, self.u, self.v, self.K, self.kept
+        x = self.target + u[:, None, None] * _CIRCLE                           # (N, a, 2)
+        field = (self.oscillator.field(x, self.omega) * _CIRCLE).sum(axis=2)
+        on_face = np.where(self._in_disc(x), field, -np.inf).max(axis=1) + K @ u - kept * u
+        inner = np.max([np.maximum(0.0, r - u), *(h for *_, h in self.planes)],
+                       axis=0) if self.planes else 0 * u
+        J = self.oscillator.jacobian(inner[:, None, None] * _CIRCLE, self.omega)
+        most = np.linalg.eigvalsh(0.5 * (J + np.swapaxes(J, 2, 3)))[..., 1].max(axis=1)
+        known = connectivity(self.graph.block_laplacian(), len(K), self.xi)
+        return {
+            'synchronisation': self.growth * _LESS < self.connectivity
+            and abs(self.xi.sum() - 1.0) < _CLEARLY and self.connectivity * _LESS <= known,
+            'entry': bool(np.all(np.abs(u - self.r0)[self.held] <= _CLEARLY * r) and np.all(
+                u[~self.held] >= min(2.0 * r, self.r0 + self.places) * _LESS)),
+            'box': bool(np.all((on_face <= self.scale) | (u >= 2.0 * r * _LESS))),
+            'contraction': self.rate > 0.0 and bool(np.all(
+                most - kept + (K @ v) / v <= -self.rate + _CLEARLY * kept.max()))}
+
+    def sampled(self) -> dict[str, bool]:
+        """The sampled step."""
+        rho, r, r0, omega, tick = self.rho, self.r, self.r0, self.omega, self.tick
+        decay = min(self.connectivity - self.growth, self.rate, 2.0 * self.growth)
+        return {
+            'time_step': tick * _LESS <= step.longest_step(rho, r, omega, decay),
+            'mild_root': float(self.w['mild_root']) >= math.hypot(omega, self.growth) * _LESS,
+            'cycle_radius': step.cycle_radius_error(rho, r, omega, tick) * _LESS - 1e-10 <= float(
+                self.w['cycle_error']) <= min(0.02, (r0 / r)**2),
+            'region_per_tick': omega * tick * _LESS <= 4.0 * math.asin(min(1.0, 0.5 * r0 / r))}
+
+    def times(self) -> dict[str, bool]:
+        """Rates of the filters, and the times that they take at least."""
+        p, fast = self.p, float(self.p['foot_speed'])
+        return {
+            'rates': min(p['alpha_r'], p['slowest_filter'], p['stiffness'], p['damping']) > 0,
+            'rest_posture': float(p['clearance']) * 0.02 * _LESS <= 0.01,
+            'arming_time': fast == 0.0 or fast * _LESS * math.exp(
+                -float(p['alpha_r'] * self.w['arming_time'])) <= float(p['armed_speed']),
+            'time_to_rest': p['activity_rate'] > 0 and p['alpha_r'] > 0 and max(
+                math.log(50.0) / float(p['activity_rate']),
+                math.log(max(100.0 * fast, 1.0)) / float(p['alpha_r'])) < 10.0}
+
+    def half_planes(self) -> dict[str, bool]:
+        """States on the half-planes move inwards, and entries lie behind them."""
+        r, u, held = self.r, self.u, []
+        entry = np.concatenate([0.98 * r * _CIRCLE, r * _CIRCLE])
+        entry = entry[np.hypot(*(entry - self.target).T) <= self.r0]
+        for c, s, h in self.planes:
+            n, along = np.array([c, -s]), np.array([s, c])
+            x = h[:, None, None] * n + np.linspace(-r, r, len(_CIRCLE))[:, None] * along
+            near = np.hypot(*np.moveaxis(x - self.target, 2, 0)) <= u[:, None]
+            inwards = np.where(self._in_disc(x) & near, self.oscillator.field(x, self.omega) @ n,
+                               np.inf).min(axis=1)
+            held.append(bool(np.all(
+                inwards + self.K @ h + self.gains * r * c - self.kept * h >= -self.scale)
+                and np.all(h.max() + self.places <= entry @ n + self.scale) and h.min() >= 0.0))
+        return {'half-planes': all(held)} if held else {}
+
+    def rest(self) -> dict[str, bool]:
+        """Equilibria at the slowest and the fastest cadence; empty where one is not found."""
+        claims, in_region = dict[str, bool](), list[bool]()
+        for at, (y, _, error) in zip((self.slow, self.omega), self.w['equilibria'][::-1],
+                                     strict=True):
+            rest, states = inhibited_equilibrium(self.system, at, self.gains), np.array(
+                y, dtype=float)
+            if rest is None:
+                return {}
+            off = np.linalg.norm(rest.state - states, axis=1) / self.v
+            claims[f'equilibrium at {at:.3g}'] = (
+                float(off.max()) * _LESS - 1e-9 * self.r <= float(error))
+            near = np.linalg.norm(states - self.target, axis=1)[self.held].max()
+            in_region.append(bool(rest.distance[self.held].max() * _LESS < self.r0
+                                  and near * _LESS <= float(self.w['rest_distance'])))
+            claims.setdefault('rest_radius', bool(
+                rest.radius.min() > 0.5 * self.r * _LESS
+                and np.hypot(*states.T).min() >= float(self.w['rest_size']) * _LESS))
+        return claims | {'rest_in_region': all(in_region)}
+
+    def _in_disc(self, x: Array) -> Array:
+        return np.asarray(np.hypot(x[..., 0], x[..., 1]) <= self.r)
+
 
 if __name__ == '__main__':
     sys.exit(main())
