@@ -507,7 +507,7 @@ class _Claimed:
 
     def rest(self) -> dict[str, bool]:
         """Equilibria at the slowest and the fastest cadence; empty where one is not found."""
-        claims, in_region = dict[str, bool](), list[bool]()
+        claims = dict[str, bool]()
         for at, (y, _, error) in zip((self.slow, self.omega), self.w['equilibria'][::-1],
                                      strict=True):
             rest, states = inhibited_equilibrium(self.system, at, self.gains), np.array(
@@ -518,12 +518,13 @@ class _Claimed:
             claims[f'equilibrium at {at:.3g}'] = (
                 float(off.max()) * _LESS - 1e-9 * self.r <= float(error))
             near = np.linalg.norm(states - self.target, axis=1)[self.held].max()
-            in_region.append(bool(rest.distance[self.held].max() * _LESS < self.r0
-                                  and near * _LESS <= float(self.w['rest_distance'])))
+            claims['rest_in_region'] = bool(  # of the fastest, which comes last
+                rest.distance[self.held].max() * _LESS < self.r0
+                and near * _LESS <= float(self.w['rest_distance']))
             claims.setdefault('rest_radius', bool(
                 rest.radius.min() > 0.5 * self.r * _LESS
                 and np.hypot(*states.T).min() >= float(self.w['rest_size']) * _LESS))
-        return claims | {'rest_in_region': all(in_region)}
+        return claims
 
     def _in_disc(self, x: Array) -> Array:
         return np.asarray(np.hypot(x[..., 0], x[..., 1]) <= self.r)
