@@ -1,7 +1,7 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
 """Measures the cost of the core: time steps, networks of growing size, the parts of one tick,
-messages.
+certificates, messages.
 
 Every row is the best of several repetitions and is also given as a ratio within the same run, for
 absolute times drift with the machine.
@@ -15,6 +15,7 @@ import timeit
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -24,10 +25,12 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
+from dmp_cpg_ros.commands.certify import running_parameters
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.coupling import Edges, graph_from_edges, topology
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
+from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead
 from dmp_cpg_ros.core.loop import Array, WalkingLoop
@@ -68,6 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         'One time step of four coupled oscillators (ratio: to the first row)': steps_of_four(),
         'A time step per oscillator (ratio: to 1,000 oscillators)': steps_of_many(options.sizes),
         'The parts of one tick of the plain loop (ratio: to the whole tick)': parts_of_a_tick(),
+        'Certificates (ratio: to a whole tick of the plain loop)': certificates(),
         'Messages of every tick (ratio: to the first row)': messages(),
     }
     for title, rows in tables.items():
@@ -141,6 +145,31 @@ def parts_of_a_tick() -> list[Row]:
             loop.supervisor, loop.reference, loop.canonical, stopping, loop.inhibition, loop.canon,
             r, command, dt).time_s),
     ])
+
+
+def certificates() -> list[Row]:
+    """The certificate of the defaults, and the judging of changes that were not asked before."""
+    suite, run = _walking()
+    loop, new = run.loop, count(1)
+    running, voting = running_parameters(suite), suite.parameters.voting
+
+    def change(name: str, value: Callable[[int], object]) -> Callable[[], object]:
+        def ask() -> None:
+            refused = loop.change({name: value(next(new))})
+            if refused:
+                raise RuntimeError(refused)
+
+        return ask
+
+    rows = _with_ratios([
+        ('', lambda: run.tick(run.tick_s)),
+        (f'certificate of the defaults ({suite.gait.name})', lambda: certify(
+            **running, voting=voting)),
+        ('another inhibition gain', change('inhibition_gain', lambda n: 400.0 - 1e-3 * n)),
+        ('another coupling gain', change('coupling_gain', lambda n: 100.0 + 1e-3 * n)),
+        ('another cadence', change('cadence_scale', lambda n: 1.0 + 1e-5 * n)),
+    ])
+    return rows[1:]
 
 
 def ticks_per_second() -> float:

@@ -19,7 +19,7 @@ def test_it_prints_and_writes_its_tables(
     assert main(['--sizes', '10', '20', '--json', str(file)]) == 0
     tables = json.loads(file.read_text(encoding='utf-8'))
     printed = capsys.readouterr().out
-    assert len(tables) == 4
+    assert len(tables) == 5
     for title, rows in tables.items():
         assert title in printed
         for row in rows:
