@@ -57,7 +57,7 @@ class PostureParameters(Parameters):
         0.2, 'largest correction of the stance velocity, as a fraction of the speed, at least of '
         '0.3 sqrt(g l)', 0.0, 1.0)
     speed_mismatch_limit: float = parameter(
-        0.5, 'largest correction of the stance velocity while the reference stands still, as a '
+        0.6, 'largest correction of the stance velocity while the reference stands still, as a '
         'fraction of the speed as well', 0.0, 1.0)
     offset_rate: float = parameter(
         0.05, 'rate at which a displacement of the centre of mass is found by a tilt that stays, '
