@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Let every component of the walking robot fail in every way, in the plain loop.
 
-The robot walks at 0.5 m/s, one component fails for half a second, and two seconds later it is
-told to stop. As in the nodes its own estimate balances it, and the robot's command watchdog
+The robot walks at 0.5 m/s, one component fails for half a second, and one and a half seconds later
+it is told to stop. As in the nodes its own estimate balances it, and the robot's command watchdog
 guards the targets of the legs.
 """
 
@@ -32,28 +32,69 @@ from dmp_cpg_ros.core.scenario.fault import (
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
-from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.output import (
+    at_least_one,
+    markdown_table,
+    parser_of,
+    write_results,
+)
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 GAITS = ('amble', 'trot')
-SPEED = 0.5
-"""Commanded speed [m/s]."""
+"""Gaits of the tables."""
 
-STANDS_S, WALKS_S, AFTER_S, STOPS_S = 0.3, 2.7, 2.0, 3.5
-"""Times of standing, of walking before the failure, after its begin, and for the stop [s]."""
+STANDS_S, WALKS_S, LAST_S, AFTER_S, STOPS_S = 0.3, 2.5, 0.2, 1.5, 3.5
+"""Times of standing, of walking, of walking until the failure, which begins later in the cycle, of
+walking after its end, and for the stop [s].
+"""
 
 RESTS = 3
 """For how many tenths of a second it rests until the stop, which has ``STOPS_S``, is over."""
-
-FAILS_S = 0.5
-"""How long a component fails [s]."""
 
 Cell = tuple[str, str, str]
 """Gait, component, kind."""
 
 CELLS: tuple[Cell, ...] = tuple((gait, component, kind) for gait in GAITS
                                 for component in COMPONENTS for kind in KINDS)
+
+
+class Case(NamedTuple):
+    """A failure in a walk.
+
+    Attributes
+    ----------
+    gait, component, kind, leg : str
+        As of a fault.
+    fails_s : float
+        How long the component fails [s].
+    later_s : float
+        How much later in the cycle [s].
+    seed : int
+        Of what is garbage or intermittent.
+    speed : float
+        Commanded [m/s].
+    robot : str
+        Its file, in the config folder or by its path.
+    """
+
+    gait: str
+    component: str
+    kind: str
+    leg: str = 'fl'
+    fails_s: float = 0.5
+    later_s: float = 0.0
+    seed: int = 0
+    speed: float = 0.5
+    robot: str = 'robots/mini_quadruped.yaml'
+
+
+def drawn(cell: Cell, seed: int, robots: Sequence[str]) -> Case:
+    """Draw a case of a cell: leg, duration up to 2 s, sixteenth of a second, speed, robot."""
+    random = np.random.default_rng((seed, 78))
+    return Case(*cell, str(random.choice(LEGS)), round(float(0.1 * 20.0 ** random.random()), 2),
+                int(random.integers(16)) / 16.0, seed, float(random.choice((0.5, 1.0))),
+                str(random.choice(list(robots))))
 
 
 class Outcome(NamedTuple):
@@ -75,8 +116,8 @@ class Outcome(NamedTuple):
 class FailingWalk:
     """The robot, its watchdog and the suite in a gait, with an injector between them."""
 
-    def __init__(self, gait: str) -> None:
-        suite = load_suite(overrides={'gait': gait})
+    def __init__(self, gait: str, robot: str) -> None:
+        suite = load_suite(overrides={'gait': gait, 'robot': robot})
         self.robot = MujocoRobot(suite.robot_file, suite.tick_ns, world=suite.world,
                                  sensors=suite.sensors)
         self.loop = WalkingLoop(self.robot.description, suite.gait, suite.parameters, load_gaits())
@@ -91,6 +132,15 @@ class FailingWalk:
         """Tick for a time [s]."""
         for _ in range(round(seconds * 1e9 / self.robot.tick_ns)):
             self.tick()
+
+    def follow(self, speed: float, seconds: float) -> bool:
+        """Walk at a speed [m/s] for a time [s]; tells whether the robot fell."""
+        fell = False
+        for left in np.arange(seconds, 1e-6, -0.1):
+            self.loop.command(speed)
+            self.run(min(0.1, left))
+            fell = fell or self.robot.fallen
+        return fell
 
     def tick(self) -> None:
         """One tick of the robot; of the suite if it takes the stamp, by the rule of its nodes."""
@@ -118,28 +168,23 @@ class FailingWalk:
 
 
 @cache
-def walking(gait: str) -> FailingWalk:
+def walking(gait: str, robot: str, speed: float) -> FailingWalk:
     """A robot that walks; to be copied."""
-    walk = FailingWalk(gait)
+    walk = FailingWalk(gait, robot)
     walk.run(STANDS_S)
     walk.loop.request(False)
-    walk.loop.command(SPEED)
-    for _ in range(round(WALKS_S / 0.1)):
-        walk.loop.command(SPEED)
-        walk.run(0.1)
+    walk.follow(speed, WALKS_S)
     return walk
 
 
-def trial(cell: Cell, seconds: float = FAILS_S) -> Outcome:
-    """Let a component fail for a time [s]; one of a leg fails at the front left one."""
-    gait, component, kind = cell
-    walk = deepcopy(walking(gait))
-    walk.injector.add(Fault(component, kind, seconds, 'fl' if component in PLACED else ''))
-    fell = False
-    for _ in range(round(AFTER_S / 0.1)):
-        walk.loop.command(SPEED)
-        walk.run(0.1)
-        fell = fell or walk.robot.fallen
+def trial(case: Case) -> Outcome:
+    """Let a component fail."""
+    walk = deepcopy(walking(case.gait, case.robot, case.speed))
+    walk.injector = FaultInjector(case.seed)
+    walk.follow(case.speed, LAST_S + case.later_s)
+    walk.injector.add(Fault(case.component, case.kind, case.fails_s,
+                            case.leg if case.component in PLACED else ''), walk.state.time_ns)
+    fell = walk.follow(case.speed, case.fails_s + AFTER_S)
     walked = walk.loop.stop.state == 'walking'
     walk.loop.request(True)
     rested = 0
@@ -153,29 +198,48 @@ def trial(cell: Cell, seconds: float = FAILS_S) -> Outcome:
     return Outcome('falls' if fell else 'rests' if rests else 'stops', tuple(sorted(walk.named)))
 
 
-def study(cells: Sequence[Cell], workers: Workers) -> dict[Cell, Outcome]:
-    """Outcome of every cell."""
+def study(cases: Sequence[Case], workers: Workers) -> dict[Case, Outcome]:
+    """Outcome of every case."""
     with workers:
-        return dict(zip(cells, workers.map(trial, cells), strict=True))
+        return dict(zip(cases, workers.map(trial, cases), strict=True))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     parser = parser_of('failures', __doc__, 'the outcomes')
-    parser.add_argument('--gaits', nargs='+', choices=GAITS, default=GAITS)
+    parser.add_argument('--gaits', nargs='+', default=GAITS)
+    parser.add_argument('--components', nargs='+', choices=COMPONENTS, default=COMPONENTS)
+    parser.add_argument('--kinds', nargs='+', choices=KINDS, default=KINDS)
+    parser.add_argument('--draws', type=at_least_one, metavar='N',
+                        help='draw N cases of each cell, and count those that fall or stop')
+    parser.add_argument('--robots', nargs='+', default=[Case._field_defaults['robot']],
+                        metavar='FILE', help='of which one is drawn')
     return run_command(parser, arguments, _study)
 
 
 def _study(options: argparse.Namespace, _: Any) -> int:
-    outcomes = study([cell for cell in CELLS if cell[0] in options.gaits],
+    cells = [(gait, component, kind) for gait in options.gaits
+             for component in options.components for kind in options.kinds]
+    cases = {cell: [drawn(cell, seed, options.robots) for seed in range(options.draws)]
+             if options.draws else [Case(*cell)] for cell in cells}
+    outcomes = study([case for of in cases.values() for case in of],
                      Workers(options.workers, options.cluster))
     for gait in options.gaits:
-        rows = [[component, *(' '.join((of.end, *(of.named and [f"({', '.join(of.named)})"])))
-                              for kind in KINDS for of in [outcomes[gait, component, kind]])]
-                for component in COMPONENTS]
-        print(f'{gait}:\n\n{markdown_table(("component", *KINDS), rows)}\n')
-    write_results(options.json, [{'cell': cell, **of._asdict()} for cell, of in outcomes.items()])
+        rows = [[component, *(_told([outcomes[case] for case in cases[gait, component, kind]])
+                              for kind in options.kinds)] for component in options.components]
+        print(f'{gait}:\n\n{markdown_table(("component", *options.kinds), rows)}\n')
+    write_results(options.json, [{'case': case, **of._asdict()} for case, of in outcomes.items()])
     return 0
+
+
+def _told(outcomes: Sequence[Outcome]) -> str:
+    """Text of a cell of the table."""
+    if len(outcomes) == 1:
+        end, named = outcomes[0]
+        return f'{end} ({", ".join(named)})' if named else end
+    ends = [of.end for of in outcomes]
+    return (f'{ends.count("falls")} fall, {ends.count("stops")} stop, '
+            f'{sum(bool(of.named) for of in outcomes)} named of {len(ends)}')
 
 
 if __name__ == '__main__':

@@ -14,7 +14,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.scenario.fault import COMPONENTS, KINDS, Fault
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.studies.failures import CELLS, Outcome, trial
+from dmp_cpg_ros.studies.failures import CELLS, Case, Outcome, trial
 
 DOCUMENT = Path(__file__).resolve().parents[2] / 'doc' / 'faults.md'
 
@@ -40,7 +40,7 @@ EXPECTED = {cell: outcome for cell, outcome in table().items() if outcome != 'no
 
 @cache
 def outcome(cell: tuple[str, str, str]) -> Outcome:
-    return trial(cell)
+    return trial(Case(*cell))
 
 
 def test_the_table_has_every_cell() -> None:

@@ -1,11 +1,16 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors that look sound, one reading at a time: frozen ones, and a gyroscope that jumps.
+"""Sensors that look sound, one reading at a time: frozen ones, and those that jump.
 
 What repeats to the last bit while the robot moves is no reading any more. Noise changes the last
 bits of every real one, but those of joints at rest: joints are judged while others move, and so is
 everything else; contacts while the force of another one changes. No body changes its turn rate by
 ``JUMP`` from one tick to the next.
+
+Angles and velocities of a joint tell the same motion twice: over a time t its angle changes by
+the mean velocity times t, but for what accelerations change meanwhile, which goes with t². A leg
+with a joint that breaks this is not believed for a while. Where all legs do at once it is what
+carries the readings that fails, and nothing of it is believed.
 """
 
 from __future__ import annotations
@@ -13,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -24,6 +30,12 @@ FROZEN_NS = 50_000_000
 
 JUMP, JUMPS_NS = 8.0, 100_000_000
 """Change of a turn rate that is none [rad/s], and for how long it is not believed [ns]."""
+
+APART, PULL, JOINTS_NS = 0.06, 2500.0, 600_000_000
+"""Change of a joint's angle apart from what its velocity says [rad], more by that [rad/s²] times
+the squared time between the readings, that is none, and for how long its leg is not believed [ns].
+Accelerations have made 0.007 rad in 4 ms in a walk and 0.018 rad in a fall, 1200 rad/s² at most.
+"""
 
 MOVING = 0.5
 """Velocity of a joint from which the robot moves [rad/s]."""
@@ -45,34 +57,64 @@ class SensorWatch:
         Last usable angles [rad].
     imu_ns : int
         Stamp of the last turn rate that was believed [ns].
+    heard_ns : ndarray (12,)
+        Stamps at which each joint's angle was new [ns].
+    jumped_ns : ndarray (4,)
+        Stamps at which each leg's joints jumped last [ns].
     """
 
     readings: SensorReadings
     since_ns: tuple[int, ...]
     joint_position: Array
     imu_ns: int
+    heard_ns: Array
+    jumped_ns: Array
 
 
 def first_watch(readings: SensorReadings) -> SensorWatch:
     """Memory after the first readings."""
     usable = np.where(np.isfinite(readings.joint_position), readings.joint_position, 0.0)
-    return SensorWatch(readings, (-1,) * (1 + 2 * N), usable, readings.time_ns)
+    now = readings.time_ns
+    return SensorWatch(readings, (-1,) * (1 + 2 * N), usable, now, np.full(3 * N, now),
+                       np.full(N, now - JOINTS_NS))
 
 
 def without_frozen(watch: SensorWatch, readings: SensorReadings
                    ) -> tuple[SensorWatch, SensorReadings]:
     """Readings in which those of sensors that freeze or jump are missing (NaN)."""
+    told, passed = _without_jumps(watch, readings)
+    return replace_unchecked(told, joint_position=_known(watch, passed)), passed
+
+
+def _without_jumps(watch: SensorWatch, readings: SensorReadings
+                   ) -> tuple[SensorWatch, SensorReadings]:
+    """Without those of encoders that jump, and without frozen ones."""
+    last, now, jumped = watch.readings, readings.time_ns, watch.jumped_ns
+    dt = 1e-9 * (now - watch.heard_ns)
+    change = readings.joint_position - last.joint_position
+    new = np.abs(change) > 0.0
+    told = 0.5 * dt * (readings.joint_velocity + last.joint_velocity)
+    jumps = new & (np.abs(change - told) > APART + PULL * dt * dt)
+    if jumps.any():
+        jumped = np.where(jumps.reshape(N, 3).any(axis=1), now, jumped)
+    heard = np.where(new, now, watch.heard_ns)
+    watch, passed = _without_repeated(watch, readings)
+    watch = replace_unchecked(watch, heard_ns=heard, jumped_ns=jumped)
+    if now - jumped.max() < JOINTS_NS:
+        everything = bool((jumped == jumped[0]).all())
+        passed = _without(passed, everything, now - jumped < JOINTS_NS, everything)
+    return watch, passed
+
+
+def _without_repeated(watch: SensorWatch, readings: SensorReadings
+                      ) -> tuple[SensorWatch, SensorReadings]:
+    """Without those of sensors that repeat themselves, and of a gyroscope that jumps."""
     last, now = watch.readings, readings.time_ns
     x, y, z = (readings.rate_in_base - last.rate_in_base).tolist()
     if max(x, y, z) > JUMP or min(x, y, z) < -JUMP:
         if now - watch.imu_ns < JUMPS_NS:
-            nothing = np.full(3, np.nan)
-            readings = SensorReadings(
-                now, readings.joint_position, readings.joint_velocity, readings.joint_effort,
-                nothing, nothing, readings.foot_force)
-            joints = _known(watch, readings)
-            return replace_unchecked(watch, readings=_told(watch, readings, now),
-                                     joint_position=joints), readings
+            passed = _without(readings, True, (False,) * N, False)
+            return replace_unchecked(watch, readings=_told(watch, passed, now)), passed
     watch = replace_unchecked(watch, imu_ns=now)
     rates, q = readings.joint_velocity, readings.joint_position
     repeated = q == last.joint_position
@@ -82,9 +124,8 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
     # A simulated body may ride level, without any noise.
     imu = bool(readings.rate_in_base[0] == last.rate_in_base[0] and readings.rate_in_base.all())
     if not (imu or repeated.any() or force.any()):  # as it always is
-        since = (-1,) * (1 + 2 * N)
-        return SensorWatch(readings, since, q if all(readings.usable_legs) else _known(
-            watch, readings), now), readings
+        return replace_unchecked(
+            watch, readings=readings, since_ns=(-1,) * (1 + 2 * N)), readings
     imu = imu and np.array_equal(readings.rate_in_base, last.rate_in_base) and np.array_equal(
         readings.specific_force_in_base, last.specific_force_in_base)
     legs = (repeated & (rates == last.joint_velocity)).reshape(N, 3).all(axis=1)
@@ -93,14 +134,21 @@ def without_frozen(watch: SensorWatch, readings: SensorReadings
                   for before, same in zip(watch.since_ns, [imu, *legs, *force], strict=True))
     frozen = [begun >= 0 and now - begun >= FROZEN_NS for begun in since]
     if any(frozen):
-        nothing, part = np.full(3, np.nan), np.repeat(frozen[1:1 + N], 3)
-        readings = SensorReadings(
-            now, np.where(part, np.nan, q), np.where(part, np.nan, rates),
-            readings.joint_effort, nothing if frozen[0] else readings.rate_in_base,
-            nothing if frozen[0] else readings.specific_force_in_base,
-            np.where(frozen[1 + N:], np.nan, readings.foot_force))
-    told = replace_unchecked(watch, readings=_told(watch, readings, now), since_ns=since)
-    return replace_unchecked(told, joint_position=_known(watch, readings)), readings
+        readings = _without(readings, frozen[0], frozen[1:1 + N], frozen[1 + N:])
+    return replace_unchecked(
+        watch, readings=_told(watch, readings, now), since_ns=since), readings
+
+
+def _without(readings: SensorReadings, imu: bool, legs: ArrayLike, contacts: ArrayLike
+             ) -> SensorReadings:
+    """Readings in which those of some sensors are missing."""
+    nothing, part = np.full(3, np.nan), np.repeat(legs, 3)
+    return SensorReadings(
+        readings.time_ns, np.where(part, np.nan, readings.joint_position),
+        np.where(part, np.nan, readings.joint_velocity), readings.joint_effort,
+        nothing if imu else readings.rate_in_base,
+        nothing if imu else readings.specific_force_in_base,
+        np.where(contacts, np.nan, readings.foot_force))
 
 
 def _told(watch: SensorWatch, readings: SensorReadings, now: int) -> SensorReadings:
@@ -114,6 +162,8 @@ def _told(watch: SensorWatch, readings: SensorReadings, now: int) -> SensorReadi
 
 def _known(watch: SensorWatch, readings: SensorReadings) -> Array:
     """Angles, and the last usable ones of legs that have none."""
+    if all(readings.usable_legs):
+        return readings.joint_position
     usable = np.repeat(readings.usable_legs, 3)
     return np.where(usable, readings.joint_position, watch.joint_position)
 

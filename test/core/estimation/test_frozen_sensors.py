@@ -4,12 +4,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.estimation.frozen import FROZEN_NS, first_watch, with_joints, without_frozen
+from dmp_cpg_ros.core.estimation.frozen import (
+    FROZEN_NS,
+    JOINTS_NS,
+    first_watch,
+    with_joints,
+    without_frozen,
+)
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 
 TICK_NS, RNG = 4_000_000, np.random.default_rng(0)
@@ -19,7 +26,8 @@ def readings(k: int, *, moving: bool = True) -> SensorReadings:
     noise = np.random.default_rng(k)
     speed = 2.0 if moving else 0.0
     return SensorReadings(
-        k * TICK_NS, noise.normal(size=12), speed * (1.0 + 0.1 * noise.random(12)),
+        k * TICK_NS, 1e-9 * k * TICK_NS * speed + 1e-3 * noise.normal(size=12),
+        speed * (1.0 + 0.1 * noise.random(12)),
         noise.normal(size=12), noise.normal(size=3), noise.normal(size=3),
         10.0 + noise.random(4))
 
@@ -91,3 +99,61 @@ def test_a_turn_rate_that_jumps_is_not_believed_for_a_while() -> None:
         watch, passed = without_frozen(watch, told)
         seen.append(passed.imu_is_usable)
     assert not any(seen[:20]) and all(seen[30:])
+
+
+def judged(spoil: Callable[[int, SensorReadings], None], ticks: int = 500) -> list[SensorReadings]:
+    """Readings of a run as they were passed on, each spoiled before by its tick."""
+    watch, passed = first_watch(readings(0)), []
+    for k in range(1, ticks):
+        told = readings(k)
+        spoil(k, told)
+        told = replace(told)  # judges anew
+        watch, sound = without_frozen(watch, told)
+        passed.append(sound)
+    return passed
+
+
+@pytest.mark.parametrize('joint', [4, slice(3, 6)])
+def test_a_leg_whose_encoders_tell_anything_is_missing_until_a_while_after(joint: int | slice
+                                                                           ) -> None:
+    def spoil(k: int, told: SensorReadings) -> None:
+        if 100 <= k < 200:
+            told.joint_position[joint] += 2.0 * np.random.default_rng(k).normal()
+
+    passed, again = judged(spoil), 200 + JOINTS_NS // TICK_NS
+    legs = np.array([sound.usable_legs for sound in passed])
+    assert legs[:, (0, 2, 3)].all() and legs[:99, 1].all() and legs[again:, 1].all()
+    assert not legs[99:199, 1].any()
+    assert all(sound.imu_is_usable and all(sound.usable_contacts) for sound in passed)
+
+
+def test_an_encoder_that_is_off_from_one_tick_to_the_next_is_not_believed_for_a_while() -> None:
+    def spoil(k: int, told: SensorReadings) -> None:
+        told.joint_position[7] += 0.15 * (k >= 100)
+
+    legs, again = [sound.usable_legs[2] for sound in judged(spoil)], 99 + JOINTS_NS // TICK_NS
+    assert all(legs[:99]) and not any(legs[99:again]) and all(legs[again:])
+
+
+def test_nothing_is_believed_of_what_makes_all_legs_jump_at_once() -> None:
+    def spoil(k: int, told: SensorReadings) -> None:
+        told.joint_position[:] += 0.15 * (k >= 100)
+
+    for sound in judged(spoil, 150)[99:]:
+        assert not (sound.imu_is_usable or any(sound.usable_legs) or any(sound.usable_contacts))
+
+
+@pytest.mark.parametrize('every', [1, 2, 5])
+def test_joints_that_accelerate_as_hard_as_joints_can_are_believed(every: int) -> None:
+    """Also with readings that come seldom, twice, or not at all for a while."""
+    def spoil(k: int, told: SensorReadings) -> None:
+        k -= k % every
+        t, omega = 1e-9 * TICK_NS * k, 30.0  # 30 rad/s, 900 rad/s^2
+        told.joint_position[:] = np.sin(omega * t) + 1e-3 * np.random.default_rng(k).normal(
+            size=12)
+        told.joint_velocity[:] = omega * np.cos(omega * t)
+        if 100 <= k < 150:
+            told.joint_position[3:6] = np.nan
+
+    for k, sound in enumerate(judged(spoil), 1):
+        assert sound.usable_legs == (True, not 100 <= k - k % every < 150, True, True)
