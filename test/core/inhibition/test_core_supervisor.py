@@ -7,7 +7,9 @@ The robot only stands: nothing of the body enters the oscillators, the reference
 
 from __future__ import annotations
 
+from copy import copy, deepcopy
 from dataclasses import replace
+from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
@@ -70,6 +72,12 @@ class Run:
             self.time_ns += TICK_NS
         return self
 
+    def copy(self) -> Run:
+        """A run that goes on as this one does; both have the same past."""
+        other = copy(self)
+        other.loop, other.ticks = deepcopy(self.loop), list(self.ticks)
+        return other
+
     def until(self, *words: str, longest: float = 12.0) -> float:
         """Time until the state is one of the words [s]."""
         for k in range(1, round(longest / TICK) + 1):
@@ -84,9 +92,30 @@ class Run:
 
 def walking(gait: str = 'amble', speed: float = 0.5, seconds: float = 3.0,
             **changes: object) -> Run:
-    run = Run(gait, **changes).go(2 * TICK)
+    """A run that walks: what was walked in the same way before, from there on."""
+    return walked(gait, speed, seconds, tuple(sorted(changes.items()))).copy()
+
+
+@lru_cache(maxsize=32)
+def walked(gait: str, speed: float, seconds: float, changes: tuple[tuple[str, object], ...]
+           ) -> Run:
+    run = Run(gait, **dict(changes)).go(2 * TICK)
     run.loop.command(speed)
     return run.go(seconds)
+
+
+def test_a_copy_of_a_run_goes_on_as_the_run_does_and_leaves_it_alone() -> None:
+    whole, parts = Run().go(2 * TICK), walking(seconds=1.0)
+    whole.loop.command(0.5)
+    whole.go(1.0)
+    parts.copy().loop.request(True)
+    for run in (whole, parts):
+        run.go(0.5).loop.request(True)
+        run.go(1.0)
+    assert whole.words() == parts.words() and len(whole.ticks) == len(parts.ticks)
+    for name in ('x', 'x_dot', 'r'):
+        assert np.array_equal([getattr(tick, name) for tick in whole.ticks],
+                              [getattr(tick, name) for tick in parts.ticks])
 
 
 def test_a_whole_stop_and_start_says_its_words_in_order() -> None:
