@@ -234,6 +234,13 @@ def contraction_row(graph: str, omega: float = OMEGA) -> Row:
 
 def tube_row(graph: str, omega: float = OMEGA) -> Row:
     """The same for tubes from where inhibition sets in, at this cadence."""
+    return Row('contraction along tubes' + _slow(omega), graph, f'k [1/s] at omega = {omega:g}',
+               _coupling_of_tubes(graph, omega), _stopping_coupling(graph, omega))
+
+
+@cache
+def _coupling_of_tubes(graph: str, omega: float) -> float:
+    """Coupling gain with which tubes are certified."""
     gains, works = _strong(omega), _stopping_coupling(graph, omega)
 
     def certified(k: float) -> bool:
@@ -241,8 +248,7 @@ def tube_row(graph: str, omega: float = OMEGA) -> Row:
         return (capture.capture_set(system, omega, gains, REGION).holds
                 and entry_tube(system, omega, gains, REGION).holds)
 
-    return Row('contraction along tubes' + _slow(omega), graph, f'k [1/s] at omega = {omega:g}',
-               threshold(certified, works, 1.25 * works, 0.02), works)
+    return threshold(certified, works, 1.25 * works, 0.02)
 
 
 def _slow(omega: float) -> str:
