@@ -173,7 +173,7 @@ def test_several_demonstrations_of_one_primitive_with_other_speeds_starts_and_go
 def test_several_rhythms_with_other_periods_phases_and_centres():
     recordings = []
     for period, shift, centre in ((0.45, 0.0, 0.0), (0.5, 0.12, 1.0), (0.6, 0.31, -0.5)):
-        long = walking_joints(period, 6.3)
+        long = walking_joints(period, 6.3, dt=0.004)
         keep = long.times >= shift
         recordings.append(Demonstration(long.times[keep], long.positions[keep] + centre))
     learned = learn_rhythmic(recordings, 25)

@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 
-SETTLING, RECORDED = 12.0, 3.0
+SETTLING, RECORDED = 7.0, 3.0
 WHOLE_TICKS = {'amble': 130, 'trot': 120}
 """Ticks of a cycle with which the walk repeats itself: the ticks fall on the same phases in every
 cycle."""
