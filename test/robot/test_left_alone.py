@@ -18,7 +18,9 @@ from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
-PHASES = 16
+PHASES, STOOD = 16, 100
+"""Phases in which it is left alone, and ticks after which it stands."""
+
 TIMEOUT_NS = 200_000_000
 
 
@@ -52,14 +54,20 @@ class Walk:
         return self
 
     def left_alone(self, ticks: int) -> float:
-        """Walk on without any leg; returns the largest tilt [rad]."""
+        """Walk on without any leg until the robot has stood for a while, or so long; returns the
+        largest tilt [rad].
+        """
         robot, guard, state = deepcopy(
             (self.robot, self.guard, self.state), {id(self.robot.model): self.robot.model})
-        tilt = 0.0
+        tilt, stood = 0.0, 0
         for _ in range(ticks):
             state = robot.step(guard.targets(state))
             x, y = state.base_quaternion[:2]
             tilt = max(tilt, float(np.arccos(1.0 - 2.0 * (x * x + y * y))))
+            still = np.linalg.norm(state.base_velocity_in_base) < 0.05
+            stood = stood + 1 if still and guard.fallback == 'stand' else 0
+            if stood == STOOD:
+                break
         assert guard.fallback == 'stand' and not robot.fallen
         assert np.linalg.norm(state.base_velocity_in_base) < 0.05
         return tilt
