@@ -507,6 +507,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                         default=[], help='all nodes in one process')
     parser.add_argument('--lock-step', action='append_const', dest='walk', const='--lock-step',
                         help='not in real time: the outcome does not depend on the machine')
+    parser.add_argument('--rate', type=float, metavar='HZ', help='control rate of the suite')
     parser.add_argument('--out', type=Path, metavar='DIR', help='keep the runs in an old folder')
     parser.add_argument('--attacks', nargs='+', metavar='NAME', default=list(ATTACKS),
                         help=f'those whose names hold these words, of {"; ".join(ATTACKS)}')
@@ -518,7 +519,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rclpy.init()
     node, outcomes = Intruder(options.seed), list[Outcome]()
     with tempfile.TemporaryDirectory(prefix='intruder') as folder:
-        suite = Suite(options.out or Path(folder), options.walk)
+        rate = [] if options.rate is None else ['--rate', str(options.rate)]
+        suite = Suite(options.out or Path(folder), [*options.walk, *rate])
         try:
             suite.start(node)
             end, left = time.monotonic() + options.duration, list[str]()

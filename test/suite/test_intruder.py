@@ -12,7 +12,8 @@ processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
 def test_forged_targets_do_not_keep_the_robot_from_walking(processes: Processes) -> None:
     study = processes.python('-m', 'dmp_cpg_ros.studies.intruder', '--lock-step', '--duration',
-                             '1', '--attacks', 'joint_targets times 3')
+                             '1', '--rate', str(ros_processes.SHARED_HZ), '--attacks',
+                             'joint_targets times 3')
     assert study.wait(4 * ros_processes.DEADLINE_S) == 0, str(study)
     outcome = study.wait_for_output(r"Outcome\(attack='joint_targets times 3', messages=(\d+), "
                                     r'fell=False, speed=0.\d+, named_s=(\d)')
