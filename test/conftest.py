@@ -24,7 +24,7 @@ _shell = subprocess.run(
     env={**os.environ, 'VIRTUAL_ENV': sys.prefix}, capture_output=True, text=True, check=True)
 os.environ.update(line.split('=', 1) for line in _shell.stdout.split('\0') if line)
 
-LONG = ('suite', 'commands', 'studies', 'nodes')
+LONG = ('project', 'suite', 'commands', 'studies', 'nodes')
 """Folders whose tests walk or start processes, those that take longest first."""
 
 

