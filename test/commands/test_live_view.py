@@ -258,7 +258,8 @@ def test_infinity_is_refused(client: Client) -> None:
 def lock_step_messages(folder: Path, *, looked_on: bool) -> list[bytes]:
     """Last messages of the oscillators and of the joints after a second in lock-step."""
     with reserved_domain() as domain, composed_suite(
-            domain, folder, lock_step=True, gated=True, start_inhibited=False) as suite:
+            domain, folder, lock_step=True, gated=True, start_inhibited=False,
+            control_rate=ros_processes.SHARED_HZ) as suite:
         view = Client(suite.executable('live_view')) if looked_on else None
         ros, opener = Ros(domain), interface('mujoco_robot/advance_until')
         try:

@@ -20,7 +20,7 @@ pytest.importorskip('rclpy')
 
 import rclpy
 import ros_processes
-from ros_processes import NodeProcess, Processes, Ros, wait_until
+from ros_processes import SHARED_HZ, NodeProcess, Processes, Ros, wait_until
 
 from dmp_cpg_ros.analysis.bag import payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -80,9 +80,10 @@ def alive(pid: int) -> bool:
 
 def test_a_second_suite_in_the_domain_is_refused_and_the_first_walks_on(
         processes: Processes, tmp_path: Path) -> None:
-    lasting, brief = scenario(tmp_path, 60.0), scenario(tmp_path, 0.5)
-    first = walk(processes, lasting, '--out', str(tmp_path / 'first'), '--composed')
-    second = walk(processes, lasting, '--out', str(tmp_path / 'second'), '--composed')
+    brief = scenario(tmp_path, 0.5)
+    lasting = (scenario(tmp_path, 60.0), '--composed', '--no-report', '--rate', str(SHARED_HZ))
+    first = walk(processes, *lasting, '--out', str(tmp_path / 'first'))
+    second = walk(processes, *lasting, '--out', str(tmp_path / 'second'))
     wait_until(lambda: not (first.running and second.running), RUN_S)
     refused, walking = (second, first) if first.running else (first, second)
     assert refused.wait() == 2

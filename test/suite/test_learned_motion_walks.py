@@ -44,8 +44,8 @@ def speeds_of(walk):
     reached = []
     for speed in SPEEDS:
         walk.loop.command(speed)
-        walk.go(2.5)
-        reached.append(walk.go(1.5))
+        walk.go(1.5)
+        reached.append(walk.go(1.1))
     return reached
 
 
