@@ -68,7 +68,7 @@ class ProcessGroup:
                 found[name] = f'{name} {how}{last and ": " + last}'
         return found
 
-    def stop(self, patience_s: float = 15.0) -> list[str]:
+    def stop(self, patience_s: float) -> list[str]:
         """End all processes: interrupt, and after a time kill.
 
         Returns

@@ -52,6 +52,9 @@ SLICE_S = 0.1
 LAST_WORDS_S = 10.0
 """How long a node may take to finish its work at the end of a run [s]."""
 
+ENDED_WITHIN_S = 15.0
+"""How long a process may take to end before it is killed [s]."""
+
 LYING_WITHIN_S = 60.0
 """How long a machine may take to simulate how the robot lies down [s]."""
 
@@ -234,7 +237,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
                 executor.remove_node(player)
                 player.destroy_node()
         finally:
-            killed = views.stop() + group.stop()
+            killed = views.stop(ENDED_WITHIN_S) + group.stop(ENDED_WITHIN_S)
             rclpy.try_shutdown()
             shared_memory.remove_left_behind()
             if killed:
