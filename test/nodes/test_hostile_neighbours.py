@@ -39,7 +39,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameter_events
 from rclpy.serialization import serialize_message
-from ros_processes import DEADLINE_S, NodeProcess, Processes, Ros
+from ros_processes import DEADLINE_S, SHARED_HZ, NodeProcess, Processes, Ros
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool, Trigger
@@ -553,12 +553,16 @@ def test_a_leg_tells_the_gait_that_it_follows(ros: Ros) -> None:
     node.destroy_node()
 
 
-def test_the_suite_walks_on_among_garbage(processes: Processes, ros: Ros) -> None:
+def test_the_suite_walks_on_among_garbage(
+        processes: Processes, ros: Ros, tmp_path: Path) -> None:
     """All nodes in real time, and garbage on every topic ten times a second."""
     kinds = [name for name in CONTROLLERS if name not in ('leg_transformation', DRIVER)]
-    gated = {'mujoco_robot': {'gated': True}}
-    nodes = [processes.node(kind, **gated.get(kind, {})) for kind in kinds]
-    nodes += [processes.node('leg_transformation', leg=leg) for leg in LEGS]
+    gated, light = {'mujoco_robot': {'gated': True}}, tmp_path / 'light.yaml'
+    light.write_text(  # a rate which a loaded machine can keep
+        f'/**: {{ros__parameters: {{control_rate: {SHARED_HZ}}}}}\n', encoding='utf-8')
+    given = ('--params-file', str(light))
+    nodes = [processes.node(kind, *given, **gated.get(kind, {})) for kind in kinds]
+    nodes += [processes.node('leg_transformation', *given, leg=leg) for leg in LEGS]
     for node in nodes:
         node.wait_for_output('active')
     places: list[Any] = ros.collect(Odometry, 'ground_truth', interface('ground_truth').reader_qos)
@@ -582,8 +586,8 @@ def test_the_suite_walks_on_among_garbage(processes: Processes, ros: Ros) -> Non
 
     def walked() -> bool:
         nonlocal rounds
-        if len(places) // 25 > rounds:
-            rounds = len(places) // 25
+        if len(places) // (SHARED_HZ / 10) > rounds:
+            rounds = int(len(places) // (SHARED_HZ / 10))
             for publisher in publishers.values():
                 publisher.publish(GARBAGE[rounds % 2])
             publishers['cmd_vel'].publish(command)
