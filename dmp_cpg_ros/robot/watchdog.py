@@ -24,6 +24,14 @@ from dmp_cpg_ros.robot.start_pose import home_joint_position
 CARRIED_NS = 24_000_000
 """Age up to which late targets are carried on by their own velocity [ns]."""
 
+IN_TIME_NS = 60_000_000
+"""Time for which targets must have been in time again until they are followed again [ns]: those
+that come now and then only tell what was, and to follow them each time tears at the feet.
+"""
+
+LATE_NS = 1_000_000_000
+"""Time for which targets may be late again and again until the robot looks after itself [ns]."""
+
 STAND_S = 0.15
 """Time in which a stand is taken up from wherever the joints are [s]: a raised foot has to be down
 before the robot tips over to its side.
@@ -88,6 +96,7 @@ class CommandWatchdog:
         self._rhythm: Rhythm | None = None
         self._given, self._off = np.zeros(12), np.zeros(12)
         self._begin_ns = self._late_ns = self._uneasy_ns = self._taken_ns = 0
+        self._lagged_ns = -1
         self._start = self._targets
 
     def accept(self, leg: str, stamp_ns: int, targets: JointTargets) -> None:
@@ -100,9 +109,10 @@ class CommandWatchdog:
         self._memory.accept(i, stamp_ns + self._lead_ns, targets)
 
     def silent(self, now_ns: int) -> list[str]:
-        """Legs whose targets are missing or too old."""
+        """Legs whose targets are missing or too old; all, where they are late all the time."""
+        late = 0 < self._late_ns < now_ns - LATE_NS
         return [leg for leg, stamp in zip(LEGS, self.stamps, strict=True)
-                if stamp is None or now_ns - stamp > self._timeout_ns]
+                if late or stamp is None or now_ns - stamp > self._timeout_ns]
 
     def age_ns(self, now_ns: int) -> int:
         """Age, beyond the lead, of the oldest targets of the legs that are not silent [ns]; 0
@@ -132,9 +142,10 @@ class CommandWatchdog:
             late = np.repeat(ages, len(JOINTS_OF_LEG))
             position += 1e-9 * np.clip(late, 0, CARRIED_NS) * velocity
             if max(ages) > CARRIED_NS:
-                return JointTargets(*self._going_on(
-                    state, np.array((position, velocity, effort))))
-        if self._late_ns and max(ages) <= CARRIED_NS:
+                self._lagged_ns = now
+        if self._lagged_ns >= now - (IN_TIME_NS if self._late_ns else 0):
+            return JointTargets(*self._going_on(state, np.array((position, velocity, effort))))
+        if self._late_ns:
             self._late_ns, self._taken_ns, self._off = 0, now, self._given - position
         if self._taken_ns and now - self._taken_ns < TAKEN_UP_S * 1e9:
             position += (1.0 - _share(now - self._taken_ns, TAKEN_UP_S)) * self._off

@@ -17,7 +17,7 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
-from dmp_cpg_ros.robot.watchdog import CARRIED_NS, CommandWatchdog
+from dmp_cpg_ros.robot.watchdog import CARRIED_NS, IN_TIME_NS, LATE_NS, CommandWatchdog
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 pytest.importorskip('mujoco')
@@ -88,6 +88,38 @@ def test_what_comes_within_the_lead_acts_at_its_end_however_it_came(
         assert all(np.array_equal(*pair) for pair in zip(
             vars(given_out).values(), vars(wanted).values(), strict=True))
         assert guard.age_ns(now * TICK_NS) == 0
+
+
+@given(seed=st.integers(0, 2**32))
+def test_what_comes_now_and_then_is_not_followed_until_it_is_in_time_for_a_while(
+        standing: PerfectTrackingRobot, seed: int) -> None:
+    """What the robot does by itself while targets are late is the same with one in between."""
+    random, state = np.random.default_rng(seed), standing.reset()
+    first, other = (JointTargets(*random.normal(size=(3, 12))) for _ in range(2))
+    never, once, again = (make_guard(standing.description) for _ in range(3))
+    for guard in (never, once, again):
+        accept(guard, 0, first)
+    late, settled = LONGEST + 5, LONGEST + 5 + IN_TIME_NS // TICK_NS
+    for tick in range(40):
+        stamp = tick * TICK_NS
+        for guard in [once] * (tick == late) + [again] * (tick >= late):
+            accept(guard, stamp, other)
+        each = [guard.targets(replace(state, time_ns=stamp)).position
+                for guard in (never, once, again)]
+        assert np.array_equal(each[0], each[1])
+        assert np.array_equal(each[0], each[2]) == (tick < settled)
+
+
+def test_a_robot_whose_targets_come_only_now_and_then_looks_after_itself(
+        standing: PerfectTrackingRobot) -> None:
+    state, guard, alone = standing.reset(), make_guard(standing.description), []
+    for tick in range(400):
+        if tick % 25 == 0:
+            accept(guard, tick * TICK_NS, JointTargets(*np.zeros((3, 12))))
+        guard.targets(replace(state, time_ns=tick * TICK_NS))
+        alone.append(bool(guard.fallback))
+    begun = (LONGEST + 1) + LATE_NS // TICK_NS
+    assert not any(alone[:begun]) and alone[begun + 1]
 
 
 def arrivals(ticks: int, seed: int) -> list[int]:
