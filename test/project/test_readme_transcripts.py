@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +13,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from ros_processes import NodeProcess, Processes, Ros, reserved_domain
+from ros_processes import SHARED_HZ, NodeProcess, Processes, Ros, reserved_domain
 from test_readme import TRANSCRIPTS, as_shown, files, transcript
 
 from dmp_cpg_ros.nodes.framework.execution import prepare_middleware
@@ -27,6 +28,11 @@ pytestmark = pytest.mark.skipif(
 SETTLED_NS = 1_000_000_000
 """Time on the robot's clock without a change after which it has done what it was told [ns]."""
 
+AT_USUAL_RATE = ('README.md', 'usage.md')
+"""Documents that show numbers which depend on the control rate; the walks of all others are
+typed with the option of another one: the machine has less to do.
+"""
+
 PATIENCE_S = 240.0
 """How long a loaded machine may take [s]."""
 
@@ -34,8 +40,9 @@ PATIENCE_S = 240.0
 class Reader:
     """A reader of a document: waits until the robot has done one thing before the next."""
 
-    def __init__(self, domain: int, folder: Path) -> None:
+    def __init__(self, domain: int, folder: Path, options: str = '') -> None:
         self.processes, self.ros, self.folder = Processes(domain), Ros(domain), folder
+        self.options = options
         self.background: list[NodeProcess] = []
         self.states: dict[str, str] = {}
         self.now_ns = self.changed_ns = 0
@@ -61,7 +68,7 @@ class Reader:
 
     def type(self, command: str) -> str:
         """Run a command; returns what it prints, of one in the background nothing."""
-        text = command.partition('#')[0].strip()
+        text = re.sub(r'^walk\b', f'walk{self.options}', command.partition('#')[0].strip())
         begun = self.changes
         process = self.processes.start(
             'bash', '-c', f'cd {self.folder}; PATH={BIN}:$PATH; exec {text.rstrip(" &")}')
@@ -83,11 +90,12 @@ class Reader:
 
 
 @pytest.fixture
-def reader(tmp_path: Path) -> Iterator[Reader]:
+def reader(document: Path, tmp_path: Path) -> Iterator[Reader]:
     with reserved_domain() as domain, pytest.MonkeyPatch.context() as patch:
         patch.setenv('ROS_DOMAIN_ID', str(domain))
         prepare_middleware()
-        started = Reader(domain, tmp_path)
+        started = Reader(domain, tmp_path, '' if document.name in AT_USUAL_RATE else (
+            f' --rate {SHARED_HZ}'))
         try:
             yield started
         finally:
