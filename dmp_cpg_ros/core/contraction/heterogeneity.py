@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -197,8 +198,15 @@ def phase_gain(L: Array) -> Array | None:
     Returns
     -------
     ndarray (N, N) or None
-        Upper bounds [s]; None where it takes too many cells, or nothing reaches all nodes.
+        Upper bounds [s], read-only; None where it takes too many cells, or nothing reaches all
+        nodes. Kept for the last Laplacians: gaits and parameters change, couplings rarely do.
     """
+    return _phase_gain(np.asarray(L, dtype=float).tobytes(), len(L))
+
+
+@lru_cache(maxsize=64)
+def _phase_gain(laplacian: bytes, size: int) -> Array | None:
+    L = np.frombuffer(laplacian).reshape(size, size)
     unit, h = np.eye(len(L)), _CELL / max(float(np.diag(L).max()), 1e-300)
     z, decay, gain = unit[:, None] - unit, phi_functions(-h * L, 0)[0], np.zeros_like(L)
     for _ in range(_MOST_CELLS):
@@ -207,7 +215,9 @@ def phase_gain(L: Array) -> Array | None:
         gain += h**3 / 8.0 * np.abs(z @ L @ L).sum(axis=2)
         z, left = after, 0.5 * float(np.abs(after).sum(axis=2).max())
         if left < 1e-3:
-            return np.asarray(gain / (1.0 - left))
+            gain /= 1.0 - left
+            gain.setflags(write=False)
+            return gain
     return None
 
 
