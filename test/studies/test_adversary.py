@@ -45,7 +45,7 @@ def test_what_is_stopped_stays_so_in_a_change(held_by: str, wait_s: float,
     stop = ('vote', dict.fromkeys(('fl', 'fr', 'rl'), 1.0)) if held_by == 'votes' else (
         'stop', None)
     held = case({'voting': True, 'silence_weight': 0.0}, (0.1, 'start', None), (2.0, *stop),
-                (wait_s, *change), (8.0, 'start', None))
+                (wait_s, *change), (4.0, 'start', None))
     assert play(ROBOT, held)[0] == ''
 
 
