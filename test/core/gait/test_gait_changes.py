@@ -9,7 +9,9 @@ import pytest
 from core_examples import GAITS, TICK, TICK_NS, quadruped, standing_state
 from hypothesis import given
 from hypothesis import strategies as st
+from limbless import LimblessLoop, NoBalance
 
+from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
@@ -29,14 +31,20 @@ SCALE = body_scale(ROBOT)
 
 
 class Walker:
-    """A loop whose robot stands still: oscillators, stop and targets do not notice."""
+    """A loop whose robot stands still: oscillators, stop and targets do not notice. Without limbs
+    it has no targets.
+    """
 
-    def __init__(self, gait: str = 'amble', at_rest: bool = False, **changes: object) -> None:
+    def __init__(self, gait: str = 'amble', at_rest: bool = False, limbs: bool = True,
+                 **changes: object) -> None:
         parameters = SuiteParameters(
             ReferenceParameters(cmd_vel_timeout=0.0),
             inhibition=InhibitionParameters(start_inhibited=at_rest, auto_inhibit=False),
             **changes)  # type: ignore[arg-type]
-        self.loop = WalkingLoop(ROBOT, GAITS[gait], parameters, GAITS)
+        loop = WalkingLoop if limbs else LimblessLoop
+        self.loop = loop(ROBOT, GAITS[gait], parameters, GAITS)
+        if not limbs:
+            self.loop.body.posture = NoBalance(ROBOT, PostureParameters())
         self.loop.command(0.5)
         self.ticks: list[Tick] = []
 
@@ -109,7 +117,7 @@ def test_at_rest_a_gait_changes_at_once_and_moves_no_foot(after: str) -> None:
 
 
 def test_a_gait_asked_for_while_stopping_waits_for_the_rest() -> None:
-    walker = Walker()
+    walker = Walker(limbs=False)
     walker.walk(1.0)
     walker.loop.request(True)
     walker.walk(0.2)
@@ -121,7 +129,7 @@ def test_a_gait_asked_for_while_stopping_waits_for_the_rest() -> None:
 
 
 def test_a_resumed_stop_goes_on_with_the_transition() -> None:
-    walker = Walker()
+    walker = Walker(limbs=False)
     walker.walk(1.0)
     walker.loop.change_gait('bound')
     walker.walk(0.3)
@@ -136,7 +144,7 @@ def test_a_resumed_stop_goes_on_with_the_transition() -> None:
 
 
 def test_of_the_gaits_asked_for_in_a_transition_the_last_follows_it() -> None:
-    walker = Walker()
+    walker = Walker(limbs=False)
     walker.walk(0.5)
     for name in ('bound', 'pronk', 'trot'):
         walker.loop.change_gait(name)
@@ -155,7 +163,7 @@ def test_targets_do_not_jump_in_a_transition() -> None:
 
 
 def test_a_cadence_that_changes_with_the_gait_reaches_its_factor() -> None:
-    walker = Walker()
+    walker = Walker(limbs=False)
     walker.walk(0.5)
     assert walker.loop.change({'gait': 'trot', 'cadence_scale': 1.2}) == ''
     walker.walk(3.0)
@@ -228,7 +236,7 @@ def test_impossible_choices_are_refused(values: dict[str, object], text: str) ->
 
 
 def test_the_gait_follows_the_speed() -> None:
-    walker = Walker('walk', gait_choice=GaitChoiceParameters(auto_gait=True))
+    walker = Walker('walk', limbs=False, gait_choice=GaitChoiceParameters(auto_gait=True))
     for speed in (0.3, 0.8, 0.3):
         walker.loop.command(speed)
         walker.walk(4.0)

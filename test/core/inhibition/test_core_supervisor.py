@@ -17,13 +17,9 @@ import pytest
 from core_examples import GAITS, TICK_NS, quadruped, standing_state, suite_parameters
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from limbless import LimblessLoop, NoBalance
 
-from dmp_cpg_ros.core.balance.controller import (
-    PostureController,
-    PostureFeedback,
-    PostureParameters,
-    PostureState,
-)
+from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import (
     Inhibition,
     InhibitionParameters,
@@ -33,28 +29,14 @@ from dmp_cpg_ros.core.canonical.phase import phase, wrapped
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.inhibition.prediction import DOWN
 from dmp_cpg_ros.core.inhibition.supervisor import STATES
-from dmp_cpg_ros.core.loop import Tick, WalkingLoop
+from dmp_cpg_ros.core.loop import Tick
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import swing_height
 
 ROBOT = quadruped()
 STANDING = standing_state(ROBOT)
-NO_TARGETS = JointTargets(np.zeros(3), np.zeros(3), np.zeros(3))
-NO_FEEDBACK = PostureFeedback(np.zeros(12), np.zeros((4, 3)), np.zeros((4, 2)), np.zeros(3))
 TICK = TICK_NS * 1e-9
-
-
-class LimblessLoop(WalkingLoop):
-    """A walking loop without legs and balance, of which the rest knows nothing."""
-
-    def _leg(self, *_: object) -> JointTargets:
-        return NO_TARGETS
-
-
-class NoBalance(PostureController):
-    def step(self, memory: PostureState, *_: object) -> tuple[PostureState, PostureFeedback]:
-        return memory, NO_FEEDBACK
 
 
 class Run:
