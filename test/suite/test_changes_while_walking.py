@@ -17,7 +17,7 @@ import ros_processes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter, parameter_value_to_python
-from ros_processes import Processes, Ros
+from ros_processes import SHARED_HZ, Processes, Ros
 
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario
@@ -30,7 +30,7 @@ from dmp_cpg_ros.suite import load_suite
 processes, ros, ros_domain = (
     ros_processes.processes, ros_processes.ros, ros_processes.ros_domain)
 
-OVERRIDES = {'physics': 'perfect_tracking', 'coupling_gain': 30.0}
+OVERRIDES = {'physics': 'perfect_tracking', 'coupling_gain': 30.0, 'control_rate': SHARED_HZ}
 """Couplings that are strong enough all-to-all, and would not be on a path."""
 
 REFUSED = """\
