@@ -382,7 +382,8 @@ def test_one_command_gives_an_address_at_which_the_robot_is_driven_pushed_and_st
     with reserved_domain() as domain, joined(domain) as ros:
         processes = Processes(domain)
         try:
-            walk = processes.executable('walk', '--view', '--no-report', '--out', str(tmp_path))
+            walk = processes.executable('walk', '--view', '--no-report', '--out', str(tmp_path),
+                                        '--rate', str(ros_processes.SHARED_HZ))
             page.open(walk.wait_for_output(ADDRESS, PATIENCE_S)[1], 900, 640)
             drive(page, ros)
             page.open('about:blank')  # which asks nobody who has ended
