@@ -362,7 +362,9 @@ def drive(page: Page, ros: Ros) -> None:
     assert all(force.z == 0.0 for force in forces)
     assert max(np.hypot(force.x, force.y) for force in forces) > 5.0
     page.click('#inhibit')
-    page.until("document.querySelector('#answers').textContent.includes('rest')")
+    # A slow machine has begun to stop by itself before, since the stick is released.
+    page.until("['at rest in', 'already'].some("
+               "words => document.querySelector('#answers').textContent.includes(words))")
     page.until(state('at rest'))
     page.until("document.querySelector('#certificate').classList.contains('holds')")
     assert not page.problems
