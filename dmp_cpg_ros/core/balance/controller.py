@@ -195,6 +195,7 @@ class PostureController:
         sway = self._sway(positions, duty, omega, reference, moving)
         measured = (velocity[0], velocity[1] - sway.velocity, rate[2])
         planned = vec3.plus(reference, correction)
+        lasting = integral.lasting(p, leg_length, plan)
         lean_x, lean_y = lean(upward, self.model.height)
         outside = -self.model.height / GRAVITY
         beside = (p.slope_lean * lean_x + outside * plan.curve[0] + aside_x,
@@ -214,19 +215,21 @@ class PostureController:
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
             np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
             np.array(correction), command, state.joint_position, believed(state.foot_force),
-            self._margins(R_ground_base, feet, swings, (lean_x, lean_y), measured, planned))
+            self._margins(R_ground_base, feet, swings, (lean_x, lean_y), (
+                measured[0] - (planned[0] - lasting[0]),
+                measured[1] - (planned[1] - lasting[1]))))
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
-                 under: tuple[float, float], measured: Triple, planned: Triple
-                 ) -> tuple[float, ...]:
-        """Margins of the capture point; legs that swing count at their footholds."""
+                 under: Pair, error: Pair) -> tuple[float, ...]:
+        """Margins of the capture point with an error of the velocity [m/s]; legs that swing count
+        at their footholds.
+        """
         p, places = self.parameters, []
         for foot, foothold, swing in zip(feet, self._footholds, swings, strict=True):
             place = vec3.times(R_ground_base, foothold)
             places.append(vec3.moved(foot, vec3.minus(place, foot), swing))
         return support_margins(
-            places, under, (measured[0] - planned[0], measured[1] - planned[1]),
-            self.model.height, p.friction, self.placement.room(p.reach))
+            places, under, error, self.model.height, p.friction, self.placement.room(p.reach))
 
     def _height(self, feet: list[Triple], load: list[float]) -> float:
         """Height of the centre of mass over the ground under the feet that carry [m]."""

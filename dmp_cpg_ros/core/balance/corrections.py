@@ -100,6 +100,15 @@ class VelocityCorrection(NamedTuple):
         return VelocityCorrection(
             (along, across), min(max(error, -p.heading_limit), p.heading_limit), yaw, wide)
 
+    def lasting(self, p: PostureParameters, leg_length: float, plan: MotionPlan) -> Pair:
+        """Part of the correction beyond the limit where the reference moves [m/s]: it makes up for
+        what the model does not know, and says nothing of a disturbance.
+        """
+        limit = p.speed_correction_limit * max(
+            hypot(*plan.expected), SLOWEST * (GRAVITY * leg_length) ** 0.5)
+        x, y = self.correction
+        return x - min(max(x, -limit), limit), y - min(max(y, -limit), limit)
+
     def acting(self, p: PostureParameters, leg_length: float, moving: float) -> Triple:
         """Correction of v_x, v_y [m/s], γ [rad/s] that the legs apply."""
         turn = p.heading_gain * (GRAVITY / leg_length) ** 0.5 * self.heading_error
