@@ -241,7 +241,7 @@ def test_more_is_corrected_while_the_reference_stands_still() -> None:
     assert still[-1].correction[0] == pytest.approx(wide, rel=0.02)
     plan = MotionPlan(expected=(0.5, 0.0))
     assert still[-1].lasting(p, length, plan) == pytest.approx((wide - narrow, 0.0), abs=0.01)
-    assert moving[100].lasting(p, length, plan) == (0.0, 0.0)
+    assert moving[20].lasting(p, length, plan) == (0.0, 0.0)
     back = [loop.correction[0] for loop in walked(still[-1], 3.0, 0.1)]
     assert narrow * 0.9 < back[-1] < narrow * 1.2
     assert np.abs(np.diff(back)).max() < 0.03 * wide
