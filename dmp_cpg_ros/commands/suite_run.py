@@ -29,7 +29,7 @@ from dmp_cpg_ros.commands.fork_server import ForkServer
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
-from dmp_cpg_ros.nodes.framework import claims, execution, health, shared_memory
+from dmp_cpg_ros.nodes.framework import claims, execution, health
 from dmp_cpg_ros.nodes.messages.conversions import DRIVE_MODES
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.scenario_player import ScenarioPlayer
@@ -129,7 +129,6 @@ def alone_in_domain(namespace: str, meanwhile: Callable[[], Any] = lambda: None
         names = [f'{namespace}/{name}' for name in (*WALKING_NODES, RECORDER)]
         lookout, deadline = Node('lookout', context=context, namespace=namespace), (
             time.monotonic() + LOOK_S)
-        shared_memory.remove_left_behind()
         made = meanwhile()
         # Claims tell at once of nodes on this machine; the graph, after a while, of all others.
         others = claims.claimed(names, domain) or _in_graph(lookout, names, deadline)
@@ -239,7 +238,6 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
         finally:
             killed = views.stop(ENDED_WITHIN_S) + group.stop(ENDED_WITHIN_S)
             rclpy.try_shutdown()
-            shared_memory.remove_left_behind()
             if killed:
                 say(math.nan, f'had to kill {", ".join(killed)}')
         if killed:
@@ -314,7 +312,6 @@ class _Watch:
             raise SuiteError('; '.join(lost))
         if self._returning is not None and not self._returning.missing():
             self._returning = None
-            shared_memory.remove_left_behind()
             self._say(self._player.progress_ns * 1e-9, 'all nodes are ready again')
             self._player.renew([node for name in self._restarts for node in self._shared[name]])
             self._restarts.clear()

@@ -39,7 +39,7 @@ from ros_processes import NodeProcess, Processes, Ros
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from dmp_cpg_ros.configuration import load_yaml, node_parameters
+from dmp_cpg_ros.configuration import find_config, load_yaml, node_parameters
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -734,22 +734,49 @@ def test_bad_arguments_end_a_process_with_status_two(processes: Processes) -> No
 def test_the_middleware_profile_is_named_unless_the_user_has_one(
         monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
-    for name in execution.VARIABLES:
-        monkeypatch.setenv(name, '')
-    execution.prepare_middleware()
-    paths = {os.environ[name] for name in execution.VARIABLES}
-    root = ElementTree.parse(paths.pop()).getroot()
-    period = next(part for part in root.iter() if part.tag.endswith('heartbeatPeriod'))
+    names = (*execution.VARIABLES, execution.RANGE, execution.LOCALHOST_ONLY)
+
+    def prepared(**given: str) -> list[str | None]:
+        for name in names:
+            monkeypatch.setenv(name, given.get(name, ''))
+        execution.prepare_middleware()
+        first = [os.environ.get(name) for name in names]
+        execution.prepare_middleware()  # as a process that was started by this one
+        assert [os.environ.get(name) for name in names] == first
+        return first
+
+    subnet, local = (str(find_config(name)) for name in execution.PROFILES)
+    assert prepared() == [subnet, subnet, '', '']
+    assert prepared(**{execution.RANGE: 'OFF'}) == [subnet, subnet, 'OFF', '']
+    assert prepared(**{execution.RANGE: 'LOCALHOST'}) == [local, local, 'SUBNET', None]
+    assert prepared(**{execution.LOCALHOST_ONLY: '1'}) == [local, local, 'SUBNET', None]
+    assert prepared(**{execution.VARIABLES[0]: 'mine.xml', execution.RANGE: 'LOCALHOST'}) == [
+        'mine.xml', '', 'LOCALHOST', '']
+    (tmp_path / 'DEFAULT_FASTRTPS_PROFILES.xml').touch()
+    assert prepared(**{execution.RANGE: 'LOCALHOST'}) == ['', '', 'LOCALHOST', '']
+
+
+def test_the_profiles_differ_in_the_interface_only() -> None:
+    subnet, local = (ElementTree.parse(find_config(name)).getroot()
+                     for name in execution.PROFILES)
+    descriptor = local.find('.//{*}transport_descriptor')
+    assert descriptor is not None
+    interfaces = descriptor.find('{*}interfaceWhiteList')
+    assert interfaces is not None and [part.text for part in interfaces] == ['127.0.0.1']
+    descriptor.remove(interfaces)
+    assert ([(part.tag, (part.text or '').strip()) for part in subnet.iter()]
+            == [(part.tag, (part.text or '').strip()) for part in local.iter()])
+    period = subnet.find('.//{*}heartbeatPeriod')
+    assert period is not None
     assert int(period[0].text or '') == 0 and 0 < int(period[1].text or '') < 100_000_000
-    assert not paths
-    for name in execution.VARIABLES:
-        monkeypatch.setenv(name, '')
-    monkeypatch.setenv(execution.VARIABLES[0], 'mine.xml')
-    execution.prepare_middleware()
-    assert os.environ[execution.VARIABLES[0]] == 'mine.xml'
-    assert not os.environ[execution.VARIABLES[1]]
 
 
+def test_nodes_have_no_shared_memory(processes: Processes) -> None:
+    node = processes.executable('reference_filter')
+    node.wait_for_output('active')
+    links = [os.readlink(path) for path in Path(f'/proc/{node.pid}/fd').iterdir()]
+    maps = Path(f'/proc/{node.pid}/maps').read_text(encoding='utf-8')
+    assert not [link for link in (*links, *maps.split()) if link.startswith('/dev/shm/fast')]
 
 
 def test_every_thread_of_a_process_is_scheduled_in_batches() -> None:

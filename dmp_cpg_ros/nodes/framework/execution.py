@@ -32,7 +32,11 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
-from rclpy.utilities import get_default_context, remove_ros_args
+from rclpy.utilities import (
+    get_default_context,
+    get_rmw_implementation_identifier,
+    remove_ros_args,
+)
 
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
@@ -43,8 +47,15 @@ from dmp_cpg_ros.suite_table import KINDS
 if TYPE_CHECKING:
     from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 
-PROFILE = 'fastdds.xml'
-"""Profile of Fast DDS in the config folder; it says why it is there."""
+PROFILES = ('fastdds.xml', 'fastdds_localhost.xml')
+"""Profiles of Fast DDS in the config folder, for all interfaces and for this machine alone; they
+say why they are there.
+"""
+
+RANGE, LOCALHOST_ONLY = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY'
+"""Environment variables of ROS 2 for where nodes look for others; 1 for the second, older one
+means ``LOCALHOST`` for the first.
+"""
 
 VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
 """Environment variables that name a profile: of Fast DDS 2 (Jazzy has it) and of 3."""
@@ -55,12 +66,20 @@ _IN_WORKING_FOLDER = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES
 def prepare_middleware() -> None:
     """Name our profile to Fast DDS unless the user has one; call before ``rclpy.init``.
 
-    Other middlewares do not look at these variables. Processes that are started later inherit
-    them.
+    Where nodes of this machine alone are asked for, that is what the profile does, and the range
+    of rmw_fastrtps is another. Processes that are started later inherit the variables.
     """
-    chosen = any(os.environ.get(name) for name in VARIABLES)
-    if not chosen and not any(Path(name).is_file() for name in _IN_WORKING_FOLDER):
-        os.environ.update(dict.fromkeys(VARIABLES, str(find_config(PROFILE))))
+    subnet, local = (str(find_config(name)) for name in PROFILES)
+    chosen = {os.environ.get(name, '') for name in VARIABLES} - {'', subnet, local}
+    if chosen or any(Path(name).is_file() for name in _IN_WORKING_FOLDER):
+        return
+    if not get_rmw_implementation_identifier().startswith('rmw_fastrtps'):
+        return
+    if os.environ.get(LOCALHOST_ONLY) == '1' or os.environ.get(RANGE) == 'LOCALHOST':
+        os.environ.pop(LOCALHOST_ONLY, None)
+        os.environ.update({RANGE: 'SUBNET', **dict.fromkeys(VARIABLES, local)})
+    elif os.environ.get(VARIABLES[0]) != local:  # which this has named before
+        os.environ.update(dict.fromkeys(VARIABLES, subnet))
 
 
 _THREADS = '/proc/self/task'
