@@ -249,6 +249,8 @@ def test_ctrl_c_while_modules_are_imported_ends_quietly(processes: Processes) ->
         "        if name == 'numpy':\n"
         '            os.kill(os.getpid(), signal.SIGINT)\n'
         'sys.meta_path.insert(0, Interrupt())\n'
+        # Whoever starts tests in the background of a shell may have them ignore Ctrl-C.
+        'signal.signal(signal.SIGINT, signal.default_int_handler)\n'
         "sys.argv = ['walk']\n"
         'from dmp_cpg_ros.__main__ import walk\n'
         'sys.exit(walk())\n')
