@@ -106,11 +106,13 @@ COMPOSED = 'composed_suite'
 
 PROCESSES: dict[str, dict[str, tuple[str, ...]]] = {
     'each': {name: (name,) for name in WALKING_NODES},
-    'blocks': {'gait': (core.REFERENCE, core.CANONICAL, core.INHIBITION), POSTURE: (POSTURE,),
+    'blocks': {'gait': (core.REFERENCE, core.CANONICAL), 'supervision': (core.INHIBITION, POSTURE),
                'legs': tuple(KINDS[LEG].instances), ROBOT: (ROBOT,)},
     'composed': {COMPOSED: WALKING_NODES},
 }
-"""How the nodes that walk share processes: names of the nodes by process, in starting order."""
+"""How the nodes that walk share processes: names of the nodes by process, in starting order. What
+stops the gait is not where the oscillators are: either tells the other what acts when it is back.
+"""
 
 
 def instances() -> Iterator[tuple[Kind, str, Mapping[str, str]]]:

@@ -46,13 +46,13 @@ def walk(processes: Processes, folder: Path, duration_s: float, *arguments: str)
 
 
 def send(process: NodeProcess, node: str, number: int) -> None:
-    """Send a signal to a node of a walk."""
+    """Send a signal to a node of a walk, or to the process that it shares."""
     for path in Path('/proc').glob('[0-9]*/cmdline'):
         try:
             words = path.read_text(encoding='utf-8').split('\0')
         except OSError:
             continue
-        if str(process.pid) in words and f'__node:={node}' in words:
+        if str(process.pid) in words and {node, f'__node:={node}'} & set(words):
             os.kill(int(path.parent.name), number)
             return
     pytest.fail(f'{node} does not run:\n{process.output}')
@@ -74,6 +74,28 @@ def test_in_lock_step_the_walk_goes_on_as_if_nobody_had_died(
     assert tilt(recording.odometry.quaternion).max() < 0.2
     assert json.loads((tmp_path / 'run' / 'metrics.json').read_text(encoding='utf-8'))[
         'gait']['phase_error_rad_max'] < 0.05
+
+
+@pytest.mark.parametrize('node', ['canonical_oscillators', 'inhibition'])
+def test_a_stop_outlives_any_process_of_blocks(
+        processes: Processes, tmp_path: Path, node: str) -> None:
+    """Under a command that would start a gait that nobody has stopped."""
+    file = tmp_path / 'stopped.yaml'
+    file.write_text(json.dumps({'name': 'stopped', 'duration': 9.0, 'events': [
+        {'at': 0.3, 'command': {'v_x': 0.4}}, {'at': 1.5, 'inhibit': True},
+        {'at': 7.0, 'inhibit': False}]}), encoding='utf-8')
+    out = tmp_path / 'run'
+    process = processes.executable(
+        'walk', str(file), '--no-report', '--out', str(out), '--lock-step', '--respawn',
+        '--processes', 'blocks', '--rate', str(SHARED_HZ))
+    process.wait_for_output(r's +at rest\n(.*\n)*.*s +at rest', RUN_S)
+    send(process, node, signal.SIGKILL)
+    process.wait_for_output(AGAIN, RUN_S)
+    assert process.wait(RUN_S) == 0, str(process)
+    odometry = load_recording(out).odometry
+    speed = np.linalg.norm(odometry.velocity_in_base[:, :2], axis=1)
+    stopped = (odometry.time > 3.5) & (odometry.time < 7.0)
+    assert speed[stopped].max() < 0.05 and speed[odometry.time > 8.5].mean() > 0.3
 
 
 @pytest.mark.parametrize('node', ['canonical_oscillators', 'inhibition'])
