@@ -2,10 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Search for a certificate that is wrong, as long as one lets it.
 
-Two attacks: on the theory, many barely certified networks at once
-(:mod:`~dmp_cpg_ros.studies.adversary_networks`), and on the suite, its loop without legs in random
-settings under random sequences of requests, commands, accepted changes and votes, of which those
-that came closest to a bound are varied. What is found is made smaller and written down.
+Three attacks: on the theory, many barely certified networks at once
+(:mod:`~dmp_cpg_ros.studies.adversary_networks`); on single rows of the certificate, what each of
+them says by itself (:mod:`~dmp_cpg_ros.studies.adversary_rows`); and on the suite, its loop
+without legs in random settings under random sequences of requests, commands, accepted changes and
+votes, of which those that came closest to a bound are varied. What is found is made smaller and
+written down.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ import yaml
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
-from dmp_cpg_ros.studies import adversary_networks
+from dmp_cpg_ros.studies import adversary_networks, adversary_rows
 from dmp_cpg_ros.studies.adversary_suite import (
     CONDITIONS,
     Case,
@@ -38,8 +40,11 @@ from dmp_cpg_ros.studies.adversary_suite import (
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_suite
 
-WEAKENED = tuple(dict.fromkeys((*adversary_networks.WEAKENED, *CONDITIONS)))
+WEAKENED = tuple(dict.fromkeys((*adversary_networks.WEAKENED, *CONDITIONS, *adversary_rows.ROWS)))
 """Inequalities and conditions that can be left out, to see whether the search notices."""
+
+FOLLOWING = ('rest_in_region',)
+"""Rows that follow from others, as doc/certificate.md proves, so that nothing can be left out."""
 
 
 def search(seed: int, seconds: float, weaken: str = '', most: int = 3, auto: bool = False
@@ -78,16 +83,22 @@ def search(seed: int, seconds: float, weaken: str = '', most: int = 3, auto: boo
             size = int(rng.choice(sizes, p=1.0 / sizes / np.sum(1.0 / sizes)))
             _, met = adversary_networks.attack(rng, size, 250, weaken, close, counts)
             failures += [_smallest(one, weaken) for one in met[:1]] + met[1:]
+        rows = [weaken] if weaken in adversary_rows.ROWS else (
+            [] if weaken or auto else [str(rng.choice(list(adversary_rows.ROWS)))])
+        for row in rows:
+            ran, met = adversary_rows.attack(rng, description, row, bool(weaken))
+            counts['rows'] += ran
+            failures += [adversary_rows.smaller(description, one, bool(weaken)) for one in met]
         if weaken in ('', *CONDITIONS) and time.monotonic() < end:
             case = varied(rng, guided[rng.integers(len(guided))][1]) if (
-                guided and rng.random() < 0.5) else setting(rng)
+                guided and rng.random() < 0.5) else setting(rng, weaken)
             if not case['events']:
                 if auto:
                     case['parameters']['inhibited_legs'] = (AUTO,)
                 if not _is_certified(description, case):
                     continue
                 counts['suites'] += 1
-                case['events'] = random_events(rng, 'voting' in case['parameters'])
+                case['events'] = random_events(rng, 'voting' in case['parameters'], weaken)
             what, closest = play(description, case, weaken, counts)
             guided = sorted([*guided, (closest, case)], key=lambda one: -one[0])[:16]
             if what:

@@ -263,12 +263,27 @@ def _change(rng: np.random.Generator, names: Sequence[str]) -> Case:
     return {name: float(np.exp(rng.uniform(*np.log(_NUMBERS[name]))))}
 
 
-def setting(rng: np.random.Generator) -> Case:
-    """Random parameters, certified or not."""
-    names = rng.permutation(list(_NUMBERS))[:rng.integers(0, 7)]
+_LIMITS = {'max_lateral_speed': 0.0, 'max_turn_rate': 0.0}
+_TELLING = {'places': 0, 'acting': 1, 'holding': 2, 'arming': 4}
+"""Which of the sequences that once told something is about a condition."""
+_GUIDED = {'arming': {'alpha_r': (0.7, 4.0), 'max_speed': (1.0, 4.0)},
+           'acting': {'alpha_r': (3.0, 20.0), 'max_speed': (0.3, 2.0),
+                      'cadence_scale': (0.25, 0.5), 'gait_change_rate': (0.05, 0.25)}}
+"""Parameters with which a condition that is left out shows."""
+
+
+def setting(rng: np.random.Generator, weaken: str = '') -> Case:
+    """Random parameters, certified or not; where a condition is left out near those it is for."""
+    guided = _GUIDED.get(weaken, {})
+    names = rng.permutation(list(_NUMBERS))[:rng.integers(0, 4 if guided else 7)]
     parameters: Case = dict(_DEFAULTS)
     for name in (*names, 'coupling_graph', 'inhibited_legs'):
         parameters |= _change(rng, [name])
+    if guided:
+        parameters |= {name: float(np.exp(rng.uniform(*np.log(span))))
+                       for name, span in guided.items()}
+        return {'gait': str(rng.choice(list(GAITS))), 'tick_s': 0.004, 'events': [],
+                'parameters': parameters}
     if rng.random() < 0.2:
         parameters |= {'voting': True, 'vote_fade': float(rng.uniform(0.05, 3.0)),
                        'vote_majority': int(rng.integers(1, 5)),
@@ -281,10 +296,14 @@ def setting(rng: np.random.Generator) -> Case:
             'tick_s': float(rng.choice([0.001, 0.002, 0.004, 0.004, 0.01])), 'events': []}
 
 
-def random_events(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
-    """Random events; the first two start the gait."""
+def random_events(rng: np.random.Generator, voting: bool, weaken: str = '') -> list[list[Any]]:
+    """Random events; the first two start the gait. Where a condition is left out they are mostly
+    about that one.
+    """
     events: list[list[Any]] = [[0.1, 'start', None],
                                [0.0, 'command', [float(rng.uniform(0.0, 3.0)), 0.0, 0.0]]]
+    if weaken and rng.random() < 0.9:
+        return events + _telling(rng, False, _TELLING.get(weaken))
     if rng.random() < 0.6:
         return events + _telling(rng, voting)
     for _ in range(rng.integers(3, 14)):
@@ -324,7 +343,8 @@ def _push(rng: np.random.Generator) -> list[float]:
     return [float(rng.uniform(-0.05, 0.1)), float(np.exp(rng.uniform(np.log(0.004), np.log(1.0))))]
 
 
-def _telling(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
+def _telling(rng: np.random.Generator, voting: bool, about: int | None = None
+             ) -> list[list[Any]]:
     """Sequences that once told that something was missing, at other times and values."""
     def change(*names: str) -> Case:
         return _change(rng, names)
@@ -336,7 +356,7 @@ def _telling(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
         return [entry for _ in range(2) for entry in (
             [2.0, 'vote', _votes(rng)],
             *([4.0 * soon(), *_changing(rng)] for _ in range(3)), [3.0, 'start', None])]
-    kind = rng.integers(5)
+    kind = rng.integers(5) if about is None else about
     if kind == 0:                                            # stops within starts
         return [entry for _ in range(3) for entry in (
             [2.0, 'stop', None], [2.0, 'start', None], [soon(), 'stop', None],
@@ -354,8 +374,9 @@ def _telling(rng: np.random.Generator, voting: bool) -> list[list[Any]]:
         return [entry for _ in range(3) for entry in (
             [soon(), 'push', _push(rng)], [soon(), 'stop', None], [soon(), 'push', _push(rng)],
             [2.0, 'start', None])]
-    return [[0.0, 'command', [3.0, 0.0, 0.0]], [1.5, 'set', change('max_speed', 'alpha_r')],
-            [soon(), 'stop', None]]
+    lower = _LIMITS if rng.random() < 0.5 else {}
+    return [[0.0, 'command', [3.0, 0.0, 0.0]],
+            [1.5, 'set', change('max_speed', 'alpha_r') | lower], [soon(), 'stop', None]]
 
 
 def varied(rng: np.random.Generator, case: Case) -> Case:

@@ -38,7 +38,7 @@ MARGINS: dict[str, Callable[[Capture], float]] = {
     'late': delays.late_margin, 'held': delays.held_margin, 'carried': delays.carried_margin}
 """Kinds of delay, and what is certified."""
 
-PATTERNS = ('one age', 'edges', 'kept', 'kept from inhibited')
+PATTERNS = ('one age', 'edges', 'kept', 'kept from inhibited', 'chosen')
 """How ages are distributed and vary."""
 
 AGES = 0.999 * 1.2 ** np.arange(-1, 15)
@@ -46,6 +46,8 @@ AGES = 0.999 * 1.2 ** np.arange(-1, 15)
 
 COLUMNS = ('delay', 'networks', 'none certified', 'nothing fails', 'share of what fails: least',
            'median', 'most')
+
+_CHOICES = 12  # ages of which one is chosen
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 
@@ -115,11 +117,12 @@ def gait_captures() -> Iterator[tuple[str, Capture]]:
             yield f'gait {graph} {omega:g} rad/s, k {k:g} 1/s, {room:g} k_inh', found
 
 
-def random_captures(rng: np.random.Generator, count: int) -> Iterator[tuple[str, Capture]]:
-    """Certified captures of random weighted networks of 2 to 8 oscillators."""
+def random_captures(rng: np.random.Generator, count: int, most: int = 8
+                    ) -> Iterator[tuple[str, Capture]]:
+    """Certified captures of random weighted networks of 2 to 8 oscillators, or fewer."""
     made = 0
     while made < count:
-        size = int(rng.integers(2, 9))
+        size = int(rng.integers(2, most + 1))
         pairs = {(i, int(rng.integers(i))) for i in range(1, size)}
         pairs |= {(int(i), int(j)) for i, j in rng.integers(size, size=(size, 2)) if i != j}
         edges = tuple(sorted(pairs | {(j, i) for i, j in pairs}))
@@ -189,14 +192,16 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
     age = (shares * most[:, None, None]).astype(int)
     acted, bad, aside = np.zeros((3, count), dtype=bool)
     row, column = np.arange(count)[:, None, None], np.arange(size)[None, None, :]
-    late, kept, seen_age = kind == 'late', pattern.startswith('kept'), most
+    late, kept, seen_age = kind == 'late', pattern[:4] in ('kept', 'chos'), most
 
     def field(z: Complex) -> Complex:
         """ż without any pull."""
         return np.asarray((rho * (r * r - np.abs(z) ** 2) + 1j * omega) * z)
 
     for tick in range(steps):
-        if kept:
+        if pattern == 'chosen' and acted.any():
+            age = chosen_ages(z - r, past, rates * (kind == 'carried'), now, most, step, age)
+        elif kept:
             age = np.where(age >= most[:, None, None], 0, age + 1)
             seen_age = np.where(seen_age >= most, 0, seen_age + 1)
             if pattern == 'kept from inhibited':
@@ -227,6 +232,45 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
         np.maximum(quarter, np.abs(rates[now]).max(axis=1), out=quarter)
     moves = (fastest[3] > 0.9 * fastest[1]) & (fastest[3] > 1e-3 * omega * r)
     return (bad | ~acted | moves) & ~aside
+
+
+def chosen_ages(away: Complex, past: Complex, rates: Complex, now: int, most: NDArray[np.int_],
+                step: float, age: NDArray[np.int_]) -> NDArray[np.int_]:
+    """Ages of the samples that pull each node farthest away from the target now, of those that do
+    not come before the last that it had, (count, N, N).
+
+    Parameters
+    ----------
+    away : ndarray (count, N)
+        From the target to the nodes.
+    past, rates : ndarray (length, count, N)
+        States by tick, a ring, and what carries them on [1/s].
+    now : int
+        Where the present is in it.
+    most : ndarray (count,)
+        Largest ages in ticks.
+    step : float
+        Length of a tick [s].
+    age : ndarray (count, N, N)
+        Ages at the last tick.
+    """
+    length, count, row = len(past), len(away), np.arange(len(away))[:, None]
+    age = age + 1
+    shares = np.minimum(np.linspace(0.0, 1.0, _CHOICES), 1.0)
+    ages = np.round(shares * most[:, None]).astype(int)                    # (count, choices)
+    at = (now - ages) % length
+    seen = past[at, row] + rates[at, row] * (ages * step)[:, :, None]       # (count, choices, N)
+    out = away / np.maximum(np.abs(away), 1e-12)
+    worth = np.einsum('bi,bcj->bcij', out.real, seen.real) + np.einsum(
+        'bi,bcj->bcij', out.imag, seen.imag)
+    worth[ages[:, :, None, None] > age[:, None]] = -np.inf
+    cell = row[:, :, None], np.arange(age.shape[2])
+    old = past[(now - age) % length, cell[0], cell[1]] + rates[
+        (now - age) % length, cell[0], cell[1]] * (age * step)
+    kept = np.where(age > most[:, None, None], -np.inf, (np.conj(out)[:, :, None] * old).real)
+    best = worth.argmax(axis=1)
+    better = np.take_along_axis(worth, best[:, None], axis=1)[:, 0] > kept
+    return np.where(better, ages[np.arange(count)[:, None, None], best], age)
 
 
 if __name__ == '__main__':

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from core_examples import quadruped
 
-from dmp_cpg_ros.studies import adversary_networks
-from dmp_cpg_ros.studies.adversary import main
+from dmp_cpg_ros.studies import adversary_networks, adversary_rows
+from dmp_cpg_ros.studies.adversary import FOLLOWING, WEAKENED, main, search
 from dmp_cpg_ros.studies.adversary_suite import CONDITIONS, Case, Oscillators, play, smaller
 
 ROBOT = quadruped()
@@ -69,6 +69,42 @@ def test_an_inequality_that_is_weakened_is_noticed(weaken: str) -> None:
     failure = next(one for one in found if one)[0]
     case = {key: value for key, value in failure.items() if key not in ('attack', 'happened')}
     assert adversary_networks.happened(case, weaken) == failure['happened']
+
+
+def test_every_row_can_be_left_out_or_follows_from_others() -> None:
+    suite = Oscillators(ROBOT, case({'voting': True, 'contact_feedback': True}))
+    rows = {row.name for row in suite.in_force().certificate().inequalities}
+    assert rows - set(WEAKENED) == set(FOLLOWING)
+    assert set(WEAKENED) - rows == set(CONDITIONS)
+
+
+@pytest.mark.parametrize('row', adversary_rows.ROWS)
+def test_a_row_that_is_left_out_is_noticed(row: str) -> None:
+    rng = np.random.default_rng(1)
+    met = (adversary_rows.attack(rng, ROBOT, row, True)[1] for _ in range(90))
+    failure = next(one for one in met if one)[0]
+    drawn = {name: value for name, value in failure.items() if name not in ('attack', 'happened')}
+    assert adversary_rows.judged(ROBOT, row, drawn, True)[0] == failure['happened']
+    honest = adversary_rows.judged(ROBOT, row, drawn, False)
+    assert honest is None or not honest[0] or row in TAKEN_FOR_MORE
+
+
+TAKEN_FOR_MORE = ('capture_anywhere', 'late_inhibition', 'held_coupling', 'carried_coupling')
+"""Rows of which the case itself says by how much they are exceeded."""
+
+
+@pytest.mark.parametrize('row', adversary_rows.ROWS)
+def test_no_row_that_holds_is_refuted(row: str) -> None:
+    rng = np.random.default_rng(2)
+    results = [adversary_rows.attack(rng, ROBOT, row, False) for _ in range(5)]
+    assert sum(ran for ran, _ in results) > 0
+    assert [failure for _, failures in results for failure in failures] == []
+
+
+def test_a_refuted_row_is_told_with_round_numbers() -> None:
+    _, (failure,) = search(1, 60.0, 'transformation', 1)
+    assert failure['attack'] == 'transformation' and 'times the bound' in failure['happened']
+    assert all(failure[name] == float(f'{failure[name]:.1e}') for name in ('stiffness', 'damping'))
 
 
 @pytest.mark.parametrize('size', [2, 3, 4, 7, 12])
