@@ -4,10 +4,10 @@
 
 ``python -m dmp_cpg_ros.studies.delays`` prints the table of doc/certificate.md: the gaits of the
 suite at slow and fast cadences with weak and strong gains, and random networks. Samples are of one
-age, of other ages on each edge, or kept until they are that old, on all edges or those from the
-inhibited nodes; the states before the capture turn as fast as such samples let them. Where a leg
-turned backwards within that age before the entry nothing is certified. Where nothing is known to
-fail, ages of up to 0.2 s are tried.
+age, of other ages on each edge, kept until they are that old, on all edges or those from the
+inhibited nodes, or chosen at each moment on each edge as those that pull farthest away; the states
+before the capture turn as fast as such samples let them. Where a leg turned backwards within that
+age before the entry nothing is certified. Ages of states that are held reach to a turn.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -34,9 +34,16 @@ from dmp_cpg_ros.studies.output import markdown_table
 
 Complex = NDArray[np.complex128]
 
+def steady_margin(capture: Capture) -> float:
+    """What is certified for states that are carried on while ω stands still [s]."""
+    return delays.carried_margin(replace(capture, omega_rate=0.0))
+
+
 MARGINS: dict[str, Callable[[Capture], float]] = {
-    'late': delays.late_margin, 'held': delays.held_margin, 'carried': delays.carried_margin}
-"""Kinds of delay, and what is certified."""
+    'late': delays.late_margin, 'held': delays.held_margin, 'carried': delays.carried_margin,
+    'steady': steady_margin}
+"""Kinds of delay, and what is certified: ``carried`` for an ω that may jump, ``steady`` for one
+that stands still."""
 
 PATTERNS = ('one age', 'edges', 'kept', 'kept from inhibited', 'chosen')
 """How ages are distributed and vary."""
@@ -82,10 +89,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument('--networks', type=int, default=100, metavar='N',
                         help='random networks beside the gaits (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=1, help='of the random networks')
+    parser.add_argument('--kinds', nargs='+', choices=MARGINS, default=list(MARGINS))
     options = parser.parse_args(arguments)
-    rows = list(measured(options.networks, options.seed))
+    rows = list(measured(options.networks, options.seed, options.kinds))
     table = []
-    for kind, group in product(MARGINS, ('gait', 'random')):
+    for kind, group in product(options.kinds, ('gait', 'random')):
         of = [row for row in rows if row.kind == kind and row.network.startswith(group)]
         shares = [row.share for row in of if row.certified > 0.0 and np.isfinite(row.fails)]
         told = [f'{share:.2f}' for share in np.quantile(shares, (0.0, 0.5, 1.0))
@@ -96,15 +104,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return int(any(row.share > 1.0 for row in rows))
 
 
-def measured(networks: int, seed: int) -> Iterator[Row]:
-    """All rows: gaits first, then random networks."""
+def measured(networks: int, seed: int, kinds: Sequence[str] = tuple(MARGINS)) -> Iterator[Row]:
+    """All rows of some kinds: gaits first, then random networks."""
     rng = np.random.default_rng(seed)
     cases = [*gait_captures(), *random_captures(rng, networks)]
     for name, capture in cases:
-        for kind, margin in MARGINS.items():
-            certified = margin(capture)
-            yield Row(kind, name, certified, failing_age(capture, kind, certified, rng)
-                      if certified > 0.0 else np.inf)
+        certified = {kind: margin(capture) for kind, margin in MARGINS.items()}
+        found = {kind: failing_age(capture, kind, certified[kind], rng)
+                 if certified[kind] > 0.0 else np.inf
+                 for kind in {'steady' if kind == 'carried' else kind for kind in kinds}}
+        for kind in kinds:
+            yield Row(kind, name, certified[kind], found['steady' if kind == 'carried' else kind])
 
 
 def gait_captures() -> Iterator[tuple[str, Capture]]:
@@ -154,9 +164,13 @@ def capture_of(graph: CouplingGraph, rho: float, radius: float, omega: float, re
 
 def failing_age(capture: Capture, kind: str, certified: float, rng: np.random.Generator
                 ) -> float:
-    """Smallest of ``AGES`` times the certified one at which a pattern fails [s]."""
-    ages = np.asarray(certified * AGES if np.isfinite(certified) else np.geomspace(
-        2e-3, 0.2, len(AGES)), dtype=float)
+    """Smallest age at which a pattern fails, of ``AGES`` times the certified one; of states that
+    are held up to a turn, and from 2 ms on where every age is certified [s].
+    """
+    ages = np.asarray(certified * AGES, dtype=float)
+    if kind == 'held':
+        first = 0.999 * certified if np.isfinite(certified) else 2e-3
+        ages = np.geomspace(first, max(2.0 * first, 2.0 * np.pi / capture.omega), len(AGES))
     patterns = ('one age', 'kept') if kind == 'late' else PATTERNS
     failed = np.any([fails(capture, kind, ages, pattern, rng) for pattern in patterns], axis=0)
     return float(ages[failed][0]) if failed.any() else np.inf
@@ -192,6 +206,7 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
     age = (shares * most[:, None, None]).astype(int)
     acted, bad, aside = np.zeros((3, count), dtype=bool)
     row, column = np.arange(count)[:, None, None], np.arange(size)[None, None, :]
+    carried = kind in ('carried', 'steady')
     late, kept, seen_age = kind == 'late', pattern[:4] in ('kept', 'chos'), most
 
     def field(z: Complex) -> Complex:
@@ -200,7 +215,7 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
 
     for tick in range(steps):
         if pattern == 'chosen' and acted.any():
-            age = chosen_ages(z - r, past, rates * (kind == 'carried'), now, most, step, age)
+            age = chosen_ages(z - r, past, rates * carried, now, most, step, age)
         elif kept:
             age = np.where(age >= most[:, None, None], 0, age + 1)
             seen_age = np.where(seen_age >= most, 0, seen_age + 1)
@@ -208,7 +223,7 @@ def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random
                 age[:, :, ~held] = 0
         index = (now - (0 if late else 1) * age) % length
         samples = past[index, row, column]
-        if kind == 'carried':
+        if carried:
             samples = samples + rates[index, row, column] * (age * step)
         judged = past[(now - seen_age) % length, np.arange(count)] if late else z
         acts = np.all(np.abs(judged[:, held] - r) <= r0, axis=1)

@@ -14,6 +14,11 @@ Systems*, chapter 5), and differences of solutions vanish whenever those of the 
 do. What limits d are the samples from before the capture and, where states are carried on by
 ẋ times their age, ŷ_j = (1 − d (Σ_l k_jl + α_j)) y_j + d (F(y_j) + Σ_l k_jl ŷ_l + α_j y_d), which
 leads out of the box; without damping from 1/λ_max(k) on, where the equation is not stable at all.
+
+Where ω changes slowly a sharper bound compares with the solution ȳ without delay from the same
+entry. Samples of it miss it by ∫(t − τ)|ȳ''(τ)|dτ over their age, and those of y depart from those
+of ȳ by |(1 − dκ)I + dF'| |y − ȳ| + d Σ_l k_jl (what their own samples do): that is small where
+the second derivative along ȳ is, and y stays in C and comes to rest as ȳ does.
 """
 
 from __future__ import annotations
@@ -36,11 +41,15 @@ from dmp_cpg_ros.core.contraction.capture import (
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian, slowest_rate
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.exponential import phi_functions
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 
 _ROUNDS = 7  # of a bisection
 _PRESENT, _ENTRY, _CARRIED = range(3)  # what the largest sample is of
 _ROOM = 1.02  # factor on distances for which what grows with them is taken
+_PARTS = 4  # steps in an age
+_STEPS = 160  # at most, until solutions with and without delay are told to stay together
+_PASSES = 80  # at most, for what samples of a step may be
 
 
 @dataclass(frozen=True)
@@ -59,6 +68,8 @@ class Capture:
         r0 of C.
     places, radii : float
         How far legs may be from each other's places, and radii from r, when C is entered.
+    omega_rate : float
+        Largest |ω̇| from then on [rad/s²]; infinite where ω may jump.
     """
 
     system: CanonicalSystem
@@ -67,6 +78,7 @@ class Capture:
     region_radius: float
     places: float
     radii: float
+    omega_rate: float = inf
 
     @cached_property
     def undelayed(self) -> CaptureSet:
@@ -228,7 +240,10 @@ def carried_margin(capture: Capture) -> float:
     if not capture.undelayed.holds:
         return 0.0
     most = min(longest_carried(capture.system), 0.5 * pi / max(abs(capture.omega), 1e-3))
-    return _longest(lambda age: _carries(capture, age), most)
+    boxed = _longest(lambda age: _carries(capture, age), most)
+    if not np.isfinite(capture.omega_rate):
+        return boxed
+    return last_that_holds(lambda age: _follows(capture, age), boxed, most, _ROUNDS)
 
 
 def longest_carried(system: CanonicalSystem) -> float:
@@ -317,6 +332,173 @@ def _carries(capture: Capture, age: float) -> bool:
     none = np.zeros(size)
     return _bound(k, age, degree + capture.gains - grows, none + 1.0, norm, none, none,
                   np.zeros(size, dtype=bool), np.full(size, _PRESENT)) is not None
+
+
+class Undelayed:
+    """Bounds on the solution ȳ without delay, from the entry on: its distances from the target,
+    |ȳ'| and |ȳ''|, step by step.
+
+    They obey u̇ ≤ g − Mu, v̇ ≤ −Jv + |ω̇|R and ṗ ≤ −Jp + 6ρRv² + |ω̇|(v + (κ + ‖F'‖ + Σk)R) for p
+    = |F'ȳ' − κȳ' + Σ k ȳ_j'|, with R = r + radii and J = M − diag(growth).
+
+    Parameters
+    ----------
+    capture : Capture
+        What is captured.
+    step : float
+        Length of a step [s].
+    """
+
+    u: Array
+    v: Array
+    p: Array
+
+    def __init__(self, capture: Capture, step: float) -> None:
+        """Bound what is known at the entry."""
+        system, k, found = capture.system, capture.coupling, capture.undelayed
+        rho, r, omega, r0 = (float(system.rho.max()), capture.radius, capture.omega,
+                             capture.region_radius)
+        self.k, self.box, self._step = k, found.distance, step
+        degree, R = k.sum(axis=1), r + capture.radii
+        kappa = degree + capture.gains
+        fall = kappa - growth(system.rho, system.radius, found.smallest_radius)
+        M, J = np.diag(kappa) - k, np.diag(fall) - k
+        self._out = capture.growth_out(found.distance)
+        self.borne = np.linalg.solve(M, self._out)
+        self._shape = np.linalg.solve(J, np.ones(len(k)))
+        self._J, (self._to, by) = J, phi_functions(-J * step, 1)
+        self._by, self._to_u = step * by, phi_functions(-M * step, 0)[0]
+        self._most = phi_functions((k + np.diag(kappa - fall)) * step, 0)[0]
+        self._u_rate, self._rate = kappa, fall
+        steep = omega + rho * (3.0 * R * R - r * r)                          # ‖F'‖
+        self.drive = np.full(len(k), capture.omega_rate * R)
+        self._sharp, self._turn = 6.0 * rho * R, (kappa + steep + degree) * self.drive
+        self._omega_rate = capture.omega_rate
+        near = 3.0 * rho * R * R * capture.radii + degree * capture.places
+        jump = capture.gains * r0                                            # of ȳ', at the entry
+        self.u = np.where(capture.held, r0, r0 + capture.places)
+        self.v = omega * R + near + jump
+        self.p = (omega * omega * R + (2.0 * omega + steep + degree) * near + k @ near
+                  + capture.gains * (omega * R + near) + (steep + kappa) * jump + k @ jump)
+
+    def _largest(self, at: Array, fed: Array, rate: Array, others: Array) -> Array:
+        """Largest x_i in a step, of ẋ = fed − rate x + k x from ``at``, where others are known."""
+        kept = np.exp(-rate * self._step)
+        return np.maximum(at, kept * at + (1.0 - kept) / rate * (fed + self.k @ others))
+
+    def _feed(self, v: Array) -> Array:
+        return np.asarray(self._sharp * v * v + self._omega_rate * v + self._turn)
+
+    def advance(self) -> tuple[Array, Array]:
+        """Make a step; the largest distances and second derivatives in it."""
+        u = np.minimum(self.box, self._largest(self.u, self._out, self._u_rate, self.box))
+        u = np.minimum(u, self._largest(self.u, self._out, self._u_rate, u))
+        v = self._largest(self.v, self.drive, self._rate,
+                          self._most @ (self.v + self._step * self.drive))
+        feed = self._feed(v)
+        p = self._largest(self.p, feed, self._rate, self._most @ (self.p + self._step * feed))
+        self.u = self.borne + self._to_u @ (self.u - self.borne)
+        self.v = self._to @ self.v + self._by @ self.drive
+        self.p = self._to @ self.p + self._by @ feed
+        return u, p + self.drive
+
+    def ever(self) -> tuple[Array, Array]:
+        """The largest from now on."""
+        v = self._later(self.v, self.drive)
+        u = self.borne + max(0.0, float((self.u - self.borne).max()))
+        return np.minimum(u, self.box), self._later(self.p, self._feed(v)) + self.drive
+
+    def _later(self, now: Array, fed: Array) -> Array:
+        last = np.linalg.solve(self._J, fed)
+        return np.asarray(last + max(0.0, float(((now - last) / self._shape).max())) * self._shape)
+
+
+def _follows(capture: Capture, age: float) -> bool:
+    """Whether solutions with carried samples of at most an age stay in C and come to rest with
+    those without delay, from which they depart by at most D: Ḋ ≤ (e − κ) D + k σ, where samples
+    received are σ = X + ∫(t − τ)|ȳ''|dτ off, with X = max(D, |(1 − dκ)I + dF'| D + d k σ) when
+    they were taken.
+    """
+    found, system, k = capture.undelayed, capture.system, capture.coupling
+    if not found.rate > 0.0 or found.tolerance < capture.places * (1.0 - 1e-12):
+        return False
+    r, r0, rho, omega = capture.radius, capture.region_radius, float(system.rho.max()), (
+        capture.omega)
+    degree, h, R = k.sum(axis=1), age / _PARTS, r + capture.radii
+    kappa, turned, nothing = degree + capture.gains, age * omega, np.zeros(len(k))
+    kept = 1.0 - age * kappa
+    bent = 0.5 * r * turned**2
+    off = float(degree.max()) * (capture.places + bent) + 3.0 * rho * r**2 * capture.radii
+    entry = r0 + capture.places + bent + 2.0 * age * off
+    path, bends, taken = Undelayed(capture, h), [nothing] * (_PARTS + 1), [nothing] * _PARTS
+    weights = h * h * (np.arange(_PARTS, 0.0, -1.0) - 0.5)                   # the oldest first
+    D, X, room = nothing, nothing, 0.02 * r0
+
+    def bounds(departed: Array) -> tuple[Array, Array]:
+        """Decay κ − e, and |(1 − dκ)I + dF'|, within a distance of ȳ."""
+        reach = 2.0 * rho * (R + departed) ** 2
+        grows = growth(system.rho, system.radius, np.maximum(
+            0.0, found.smallest_radius - departed))
+        norm = np.sqrt(np.maximum(np.abs(kept + age * grows), np.abs(kept - 1.5 * age * reach))**2
+                       + turned**2 + turned * age * reach)
+        return kappa - grows, norm
+
+    for n in range(_STEPS):
+        u, bend = path.advance()
+        bends = [*bends[1:], bend]
+        missed = np.maximum(weights @ bends[1:], weights[1:] @ bends[1:-1] + age * h * bends[0])
+        old = np.max(taken, axis=0)
+        before = np.minimum(2.0 * bent + 3.0 * age * off + age * age * path.drive
+                            + (n + 1) * h * capture.gains * r0 + missed,
+                            entry + u) if n <= _PARTS else nothing
+        within = 1.5 * D + room
+        for _ in range(_PASSES):
+            sigma = np.maximum(np.maximum(old, X) + missed, before)
+            decay, norm = bounds(within)
+            if not decay.min() > 0.0:
+                return False
+            faded = np.exp(-decay * h)
+            end = faded * D + (1.0 - faded) / decay * (k @ sigma)
+            most = np.maximum(D, end)
+            new = np.maximum(most, norm * most + age * (k @ sigma))
+            if np.all(new <= X) and np.all(most <= within):
+                break
+            X, within = 1.0005 * np.maximum(X, new) + 1e-12, np.maximum(within, 1.05 * most)
+            if X.max() > 5.0 * r:
+                return False
+        else:
+            return False
+        seen = np.maximum(u + np.maximum(old, X) + missed, entry if n <= _PARTS else 0.0)
+        if not np.all(capture.room(k @ seen - degree * r0) > 0.0):
+            return False
+        D, taken = end, [*taken[1:], X]
+        if n > _PARTS and n % 2 and _stay_together(
+                capture, age, path, np.max(bends, axis=0), D, taken, bounds):
+            return True
+    return False
+
+
+def _stay_together(capture: Capture, age: float, path: Undelayed, bend: Array, D: Array,
+                   taken: list[Array], bounds: Callable[[Array], tuple[Array, Array]]) -> bool:
+    """Whether what solutions with and without delay have departed by now is within a multiple of
+    what they can for ever, and C is not left then.
+    """
+    k, old = capture.coupling, np.max(taken, axis=0)
+    u, later = path.ever()
+    missed, none = 0.5 * age * age * np.maximum(bend, later), np.zeros(len(k))
+    within = 1.5 * np.maximum(D, old) + 0.02 * capture.region_radius
+    decay, norm = bounds(within)
+    if not decay.min() > 0.0:
+        return False
+    last = _bound(k, age, decay, k @ missed, norm, age * (k @ missed), none, none > 0.0,
+                  np.full(len(k), _PRESENT))
+    if last is None:
+        return False
+    departed, samples, _ = last
+    times = 1.000001 * max(1.0, float((D / departed).max()), float((old / samples).max()))
+    seen = u + times * (samples + missed)
+    return bool(np.all(times * departed <= within) and np.all(capture.room(
+        k @ seen - k.sum(axis=1) * capture.region_radius) > 0.0))
 
 
 def _bound(k: Array, age: float, decay: Array, fed: Array, kept: Array, more: Array,

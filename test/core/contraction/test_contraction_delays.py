@@ -10,7 +10,12 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
-from dmp_cpg_ros.core.contraction.delays import Capture, longest_carried
+from dmp_cpg_ros.core.contraction.delays import (
+    Capture,
+    Undelayed,
+    carried_margin,
+    longest_carried,
+)
 from dmp_cpg_ros.studies.delays import (
     MARGINS,
     PATTERNS,
@@ -80,7 +85,7 @@ def test_states_that_are_carried_on_are_unstable_from_one_over_the_coupling_on()
 def test_nothing_is_borne_where_capture_does_not_hold() -> None:
     capture = captured()
     weak = replace(capture, gains=0.5 * capture.gains)
-    assert [margin(weak) for margin in MARGINS.values()] == [0.0, 0.0, 0.0]
+    assert [margin(weak) for margin in MARGINS.values()] == [0.0] * len(MARGINS)
 
 
 def test_a_faster_gait_bears_less_and_a_stronger_inhibition_not_less() -> None:
@@ -88,3 +93,54 @@ def test_a_faster_gait_bears_less_and_a_stronger_inhibition_not_less() -> None:
     assert MARGINS['late'](fast) == pytest.approx(0.5 * MARGINS['late'](slow), rel=0.05)
     strong = replace(captured(room=1.05), gains=1.5 * captured(room=1.05).gains)
     assert MARGINS['carried'](strong) > MARGINS['carried'](captured(room=1.05))
+
+
+def entered(capture: Capture, rng: np.random.Generator, count: int) -> np.ndarray:
+    """States (count, N) in which C is entered, with legs as far out of place as they may be."""
+    r, shape = capture.radius, (count, len(capture.gains))
+    ahead = 2.0 * np.arcsin(0.49 * capture.region_radius / r) * rng.choice((-1.0, 1.0), (count, 1))
+    aside = 0.25 * capture.places * np.exp(2j * np.pi * rng.random(shape))
+    off = 0.25 * capture.radii * rng.choice((-1.0, 1.0), (count, 1))
+    return (r + off) * np.exp(1j * ahead) + np.where(capture.held, 0.0, aside)
+
+
+@pytest.mark.parametrize('graph', ['all_to_all', 'path', 'directed_ring'])
+@pytest.mark.parametrize('rate', [0.0, 30.0])
+def test_distance_and_second_derivative_without_delay_are_within_their_bounds(
+        graph: str, rate: float) -> None:
+    capture = replace(captured(graph, omega=15.0, room=1.2), omega_rate=rate)
+    k, r, rho = capture.coupling, capture.radius, float(capture.system.rho.max())
+    step, parts = 1e-3, 50
+    path, y = Undelayed(capture, step), entered(capture, np.random.default_rng(3), 40)
+    h = step / parts
+
+    def field(y: np.ndarray, omega: float) -> np.ndarray:
+        return np.asarray((rho * (r * r - np.abs(y) ** 2) + 1j * omega) * y + y @ k.T
+                          - (k.sum(axis=1) + capture.gains) * y + capture.gains * r)
+
+    time, closest = 0.0, np.zeros(2)
+    for _ in range(60):
+        far, bend = path.advance()
+        for _ in range(parts):
+            omega = capture.omega - rate * min(time, 0.2)
+            before, time = field(y, omega), time + h
+            y = y + h * field(y + 0.5 * h * before, omega - 0.5 * h * rate)
+            change = (field(y, capture.omega - rate * min(time, 0.2)) - before) / h
+            needed = (np.abs(y - r).max(axis=0) / far, np.abs(change).max(axis=0) / bend)
+            closest = np.maximum(closest, [share.max() for share in needed])
+    assert closest[0] <= 1.0 and closest[1] <= 1.01
+    assert closest.min() > 0.3
+    far, bend = path.ever()
+    assert np.all(np.abs(y - r).max(axis=0) <= far)
+
+
+def test_a_cadence_that_stands_still_bears_more_than_one_that_jumps() -> None:
+    steady = {}
+    for graph in ('path', 'directed_ring', 'all_to_all'):
+        jumping = captured(graph, k=100.0, omega=20.0, room=2.0)
+        margins = [carried_margin(replace(jumping, omega_rate=rate))
+                   for rate in (np.inf, 50.0, 0.0)]
+        assert margins == sorted(margins) and margins[0] == carried_margin(jumping)
+        assert margins[-1] < longest_carried(jumping.system)
+        steady[graph] = margins[-1] / margins[0]
+    assert max(steady.values()) > 1.3
