@@ -55,6 +55,7 @@ COLUMNS = ('delay', 'networks', 'none certified', 'nothing fails', 'share of wha
            'median', 'most')
 
 _CHOICES = 12  # ages of which one is chosen
+_BETWEEN = 8  # ages from the last that works to the first that fails
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 
@@ -164,16 +165,22 @@ def capture_of(graph: CouplingGraph, rho: float, radius: float, omega: float, re
 
 def failing_age(capture: Capture, kind: str, certified: float, rng: np.random.Generator
                 ) -> float:
-    """Smallest age at which a pattern fails, of ``AGES`` times the certified one; of states that
-    are held up to a turn, and from 2 ms on where every age is certified [s].
+    """Smallest age at which a pattern fails, of ``AGES`` times the certified one and then of some
+    between; of states that are held up to a turn, from 2 ms on where every age is certified [s].
     """
     ages = np.asarray(certified * AGES, dtype=float)
     if kind == 'held':
         first = 0.999 * certified if np.isfinite(certified) else 2e-3
         ages = np.geomspace(first, max(2.0 * first, 2.0 * np.pi / capture.omega), len(AGES))
     patterns = ('one age', 'kept') if kind == 'late' else PATTERNS
-    failed = np.any([fails(capture, kind, ages, pattern, rng) for pattern in patterns], axis=0)
-    return float(ages[failed][0]) if failed.any() else np.inf
+    failed = {pattern: fails(capture, kind, ages, pattern, rng) for pattern in patterns}
+    first = int(np.argmax(np.any(list(failed.values()), axis=0)))
+    worst = [pattern for pattern, at in failed.items() if at[first]]
+    if not worst or first == 0:
+        return float(ages[0]) if worst else np.inf
+    between = np.geomspace(ages[first - 1], ages[first], _BETWEEN)[1:-1]
+    also = np.any([fails(capture, kind, between, pattern, rng) for pattern in worst], axis=0)
+    return float(between[also.argmax()] if also.any() else ages[first])
 
 
 def fails(capture: Capture, kind: str, ages: Array, pattern: str, rng: np.random.Generator

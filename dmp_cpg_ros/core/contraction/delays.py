@@ -47,8 +47,8 @@ from dmp_cpg_ros.core.maths.roots import last_that_holds
 _ROUNDS = 7  # of a bisection
 _PRESENT, _ENTRY, _CARRIED = range(3)  # what the largest sample is of
 _ROOM = 1.02  # factor on distances for which what grows with them is taken
-_PARTS = 4  # steps in an age
-_STEPS = 160  # at most, until solutions with and without delay are told to stay together
+_PARTS = 8  # steps in an age
+_STEPS = 320  # at most, until solutions with and without delay are told to stay together
 _PASSES = 80  # at most, for what samples of a step may be
 
 
@@ -335,11 +335,14 @@ def _carries(capture: Capture, age: float) -> bool:
 
 
 class Undelayed:
-    """Bounds on the solution ȳ without delay, from the entry on: its distances from the target,
+    """Bounds on the solution ȳ without delay, from the entry on: its distances u from the target,
     |ȳ'| and |ȳ''|, step by step.
 
-    They obey u̇ ≤ g − Mu, v̇ ≤ −Jv + |ω̇|R and ṗ ≤ −Jp + 6ρRv² + |ω̇|(v + (κ + ‖F'‖ + Σk)R) for p
-    = |F'ȳ' − κȳ' + Σ k ȳ_j'|, with R = r + radii and J = M − diag(growth).
+    ȳ' = a + b, where ȧ = (iω − M) a begins as ȳ' does, turning with all legs but for the
+    inhibition that sets in, and is known; ḃ = (F' − M) b + N'a + iω̇ȳ, with N the part of F that
+    does not turn, ‖N'‖ ≤ ν. So u̇ ≤ g − Mu, |b|˙ ≤ −J|b| + ν|a| + |ω̇|R, and c = ḃ − iω̇ȳ has
+    |c|˙ ≤ −J|c| + 6ρR|ȳ'|² + ν|ȧ| + |ω̇|(|b| + (κ + ‖F'‖ + Σk)R), R = r + radii, J = M −
+    diag(growth).
 
     Parameters
     ----------
@@ -349,68 +352,102 @@ class Undelayed:
         Length of a step [s].
     """
 
-    u: Array
-    v: Array
-    p: Array
-
     def __init__(self, capture: Capture, step: float) -> None:
         """Bound what is known at the entry."""
         system, k, found = capture.system, capture.coupling, capture.undelayed
         rho, r, omega, r0 = (float(system.rho.max()), capture.radius, capture.omega,
                              capture.region_radius)
-        self.k, self.box, self._step = k, found.distance, step
         degree, R = k.sum(axis=1), r + capture.radii
         kappa = degree + capture.gains
         fall = kappa - growth(system.rho, system.radius, found.smallest_radius)
         M, J = np.diag(kappa) - k, np.diag(fall) - k
+        self.k, self.box, self._step, self._M, self._J = k, found.distance, step, M, J
+        self._kappa, self._fall, self._omega, self._rate = kappa, fall, omega, capture.omega_rate
         self._out = capture.growth_out(found.distance)
         self.borne = np.linalg.solve(M, self._out)
-        self._shape = np.linalg.solve(J, np.ones(len(k)))
-        self._J, (self._to, by) = J, phi_functions(-J * step, 1)
-        self._by, self._to_u = step * by, phi_functions(-M * step, 0)[0]
+        self._to, self._kept = phi_functions(-M * step, 0)[0], np.eye(len(k))
+        self._to_b, by = phi_functions(-J * step, 1)
+        self._by = step * by
         self._most = phi_functions((k + np.diag(kappa - fall)) * step, 0)[0]
-        self._u_rate, self._rate = kappa, fall
-        steep = omega + rho * (3.0 * R * R - r * r)                          # ‖F'‖
+        self._mild = rho * (3.0 * R * R - r * r)                             # ν
         self.drive = np.full(len(k), capture.omega_rate * R)
-        self._sharp, self._turn = 6.0 * rho * R, (kappa + steep + degree) * self.drive
-        self._omega_rate = capture.omega_rate
+        self._sharp = 6.0 * rho * R
+        self._turn = (kappa + omega + self._mild + degree) * self.drive
         near = 3.0 * rho * R * R * capture.radii + degree * capture.places
         jump = capture.gains * r0                                            # of ȳ', at the entry
+        self._jump, self._first = jump, np.stack([omega * R + near + jump, omega * R + near], 1)
+        uneven = omega * capture.places + near
+        self._common = omega * R * capture.gains
+        self._uneven = np.stack([uneven + jump, uneven], 1)
         self.u = np.where(capture.held, r0, r0 + capture.places)
-        self.v = omega * R + near + jump
-        self.p = (omega * omega * R + (2.0 * omega + steep + degree) * near + k @ near
-                  + capture.gains * (omega * R + near) + (steep + kappa) * jump + k @ jump)
+        self._b, self._v = np.zeros(len(k)), self._first[:, 0]
+        self._c = omega * near + self._mild * (near + jump)
+        self._p = self._c + omega * self._v + omega * capture.places * degree + (
+            kappa * near + k @ near + self._common + kappa * jump + k @ jump)
 
-    def _largest(self, at: Array, fed: Array, rate: Array, others: Array) -> Array:
-        """Largest x_i in a step, of ẋ = fed − rate x + k x from ``at``, where others are known."""
-        kept = np.exp(-rate * self._step)
-        return np.maximum(at, kept * at + (1.0 - kept) / rate * (fed + self.k @ others))
+    def _largest(self, at: Array, fed: Array, fall: Array, others: Array) -> Array:
+        """Largest x_i in a step, of ẋ = fed − fall x + k x from ``at``, where others are known."""
+        kept = np.exp(-fall * self._step)
+        return np.maximum(at, kept * at + (1.0 - kept) / fall * (fed + self.k @ others))
+
+    def _grown(self, at: Array, fed: Array) -> Array:
+        """Largest of ẋ ≤ fed − Jx in a step."""
+        return self._largest(at, fed, self._fall, self._most @ (at + self._step * fed))
+
+    def _first_part(self) -> tuple[Array, Array]:
+        """|a|, and |ȧ| but for what turns, now: of all, and but for the inhibition, (N, 2)."""
+        M = np.abs(self._M @ self._kept)
+        return self._kept @ self._first, (self._kept @ self._common)[:, None] + M @ self._uneven
+
+    @property
+    def moved(self) -> Array:
+        """How far the inhibition by itself has moved nodes by now."""
+        return np.asarray(np.linalg.solve(self._M, self._jump - self._kept @ self._jump))
 
     def _feed(self, v: Array) -> Array:
-        return np.asarray(self._sharp * v * v + self._omega_rate * v + self._turn)
+        return np.asarray(self._sharp * v * v + self._rate * v + self._turn)
 
-    def advance(self) -> tuple[Array, Array]:
-        """Make a step; the largest distances and second derivatives in it."""
-        u = np.minimum(self.box, self._largest(self.u, self._out, self._u_rate, self.box))
-        u = np.minimum(u, self._largest(self.u, self._out, self._u_rate, u))
-        v = self._largest(self.v, self.drive, self._rate,
-                          self._most @ (self.v + self._step * self.drive))
+    def advance(self) -> tuple[Array, Array, Array]:
+        """Make a step; the largest distances and second derivatives in it, and those but for what
+        the inhibition by itself moves.
+        """
+        nothing = np.zeros_like(self.u)
+        u = np.minimum(self.box, self._largest(self.u, self._out, self._kappa, self.box))
+        u = np.minimum(u, self._largest(self.u, self._out, self._kappa, u))
+        (a, turning), (a_rate, rest) = (
+            [self._largest(x, nothing, self._kappa, self._most @ x) for x in part.T]
+            for part in self._first_part())
+        a_rate, rest = a_rate + self._omega * a, rest + self._omega * turning
+        fed = self._mild * a + self.drive
+        v = np.minimum(self._grown(self._v, self.drive), a + self._grown(self._b, fed))
         feed = self._feed(v)
-        p = self._largest(self.p, feed, self._rate, self._most @ (self.p + self._step * feed))
-        self.u = self.borne + self._to_u @ (self.u - self.borne)
-        self.v = self._to @ self.v + self._by @ self.drive
-        self.p = self._to @ self.p + self._by @ feed
-        return u, p + self.drive
+        feed_c = feed + self._mild * a_rate
+        c = self._grown(self._c, feed_c)
+        bend = np.minimum(self._grown(self._p, feed), a_rate + c)
+        self.u = self.borne + self._to @ (self.u - self.borne)
+        self._kept = self._to @ self._kept
+        for name, gained in (('_b', fed), ('_v', self.drive), ('_c', feed_c), ('_p', feed)):
+            setattr(self, name, self._to_b @ getattr(self, name) + self._by @ gained)
+        return u, bend + self.drive, rest + c + self.drive
 
     def ever(self) -> tuple[Array, Array]:
         """The largest from now on."""
-        v = self._later(self.v, self.drive)
+        nothing = np.zeros_like(self.u)
+        a, a_rate = (_later(self._M, part[:, 0], nothing) for part in self._first_part())
+        a_rate = a_rate + self._omega * a
+        v = np.minimum(_later(self._J, self._v, self.drive), a + _later(
+            self._J, self._b, self._mild * a + self.drive))
+        feed = self._feed(v)
+        bend = np.minimum(_later(self._J, self._p, feed), a_rate + _later(
+            self._J, self._c, feed + self._mild * a_rate))
         u = self.borne + max(0.0, float((self.u - self.borne).max()))
-        return np.minimum(u, self.box), self._later(self.p, self._feed(v)) + self.drive
+        return np.minimum(u, self.box), bend + self.drive
 
-    def _later(self, now: Array, fed: Array) -> Array:
-        last = np.linalg.solve(self._J, fed)
-        return np.asarray(last + max(0.0, float(((now - last) / self._shape).max())) * self._shape)
+
+def _later(M: Array, now: Array, fed: Array) -> Array:
+    """Largest that x with ẋ ≤ fed − Mx can be from now on."""
+    last, shape = np.linalg.solve(M, np.stack([fed, np.ones(len(M))], axis=1)).T
+    return np.asarray(last + max(0.0, float(((now - last) / shape).max())) * shape)
 
 
 def _follows(capture: Capture, age: float) -> bool:
@@ -431,6 +468,7 @@ def _follows(capture: Capture, age: float) -> bool:
     off = float(degree.max()) * (capture.places + bent) + 3.0 * rho * r**2 * capture.radii
     entry = r0 + capture.places + bent + 2.0 * age * off
     path, bends, taken = Undelayed(capture, h), [nothing] * (_PARTS + 1), [nothing] * _PARTS
+    apart = [nothing] * (_PARTS + 1)
     weights = h * h * (np.arange(_PARTS, 0.0, -1.0) - 0.5)                   # the oldest first
     D, X, room = nothing, nothing, 0.02 * r0
 
@@ -444,12 +482,12 @@ def _follows(capture: Capture, age: float) -> bool:
         return kappa - grows, norm
 
     for n in range(_STEPS):
-        u, bend = path.advance()
-        bends = [*bends[1:], bend]
+        u, bend, rest = path.advance()
+        bends, apart = [*bends[1:], bend], [*apart[1:], rest]
         missed = np.maximum(weights @ bends[1:], weights[1:] @ bends[1:-1] + age * h * bends[0])
         old = np.max(taken, axis=0)
         before = np.minimum(2.0 * bent + 3.0 * age * off + age * age * path.drive
-                            + (n + 1) * h * capture.gains * r0 + missed,
+                            + path.moved + weights @ apart[1:] + age * h * apart[0],
                             entry + u) if n <= _PARTS else nothing
         within = 1.5 * D + room
         for _ in range(_PASSES):
@@ -462,7 +500,10 @@ def _follows(capture: Capture, age: float) -> bool:
             most = np.maximum(D, end)
             new = np.maximum(most, norm * most + age * (k @ sigma))
             if np.all(new <= X) and np.all(most <= within):
-                break
+                settled, X = bool(np.all(new > 0.999 * X)), new  # no more than what X allows
+                if settled:
+                    break
+                continue
             X, within = 1.0005 * np.maximum(X, new) + 1e-12, np.maximum(within, 1.05 * most)
             if X.max() > 5.0 * r:
                 return False

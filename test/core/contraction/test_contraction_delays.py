@@ -118,9 +118,10 @@ def test_distance_and_second_derivative_without_delay_are_within_their_bounds(
         return np.asarray((rho * (r * r - np.abs(y) ** 2) + 1j * omega) * y + y @ k.T
                           - (k.sum(axis=1) + capture.gains) * y + capture.gains * r)
 
-    time, closest = 0.0, np.zeros(2)
+    onwards = field(y, capture.omega) - capture.gains * (r - y)     # had inhibition not set in
+    first, time, closest, speed, moved = y, 0.0, np.zeros(2), 0.0, 0.0
     for _ in range(60):
-        far, bend = path.advance()
+        far, bend, rest = path.advance()
         for _ in range(parts):
             omega = capture.omega - rate * min(time, 0.2)
             before, time = field(y, omega), time + h
@@ -128,6 +129,8 @@ def test_distance_and_second_derivative_without_delay_are_within_their_bounds(
             change = (field(y, capture.omega - rate * min(time, 0.2)) - before) / h
             needed = (np.abs(y - r).max(axis=0) / far, np.abs(change).max(axis=0) / bend)
             closest = np.maximum(closest, [share.max() for share in needed])
+        moved, speed = moved + step * speed + 0.5 * step**2 * rest, speed + step * rest
+        assert np.all(np.abs(y - first - time * onwards).max(axis=0) <= moved + path.moved)
     assert closest[0] <= 1.0 and closest[1] <= 1.01
     assert closest.min() > 0.3
     far, bend = path.ever()
