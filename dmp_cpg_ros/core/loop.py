@@ -326,6 +326,10 @@ class WalkingLoop:
         """Change the gait, as :meth:`change`."""
         return self.change({'gait': name})
 
+    def told_drive(self, drive_mode: str) -> None:
+        """Hear what the robot's drives do by themselves, as on the topic ``drive_mode``."""
+        self.posture = self.body.told_drive(self.posture, drive_mode)
+
     @property
     def takers(self) -> dict[str, Callable[[Any], Any]]:
         """What takes the events of a scenario, by kind, for

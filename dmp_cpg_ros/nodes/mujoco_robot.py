@@ -202,6 +202,7 @@ class MujocoRobotNode(DrivenRobot):
         if self._faults is not None:
             targets = self._faults.driven(targets)
         self.watch_silence(now)
+        self.watch_joints()
         try:
             self._state = self._robot.step(targets)
         except RobotError as error:

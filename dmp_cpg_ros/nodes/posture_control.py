@@ -199,6 +199,7 @@ class PostureControl(SuiteNode):
             'reference': conversions.read_reference,
             'canonical_state': canonical.read,
         }, optional=self._body.optional)
+        self.listen('drive_mode', self._on_drive)
         for what in REQUESTS:
             self.serve(what, partial(self._take_request, what))
 
@@ -241,6 +242,10 @@ class PostureControl(SuiteNode):
     def _take_request(self, what: str, _: Any) -> tuple[bool, str]:
         self._state, given = self._control.request(self._state, what)
         return given.accepted, given.text
+
+    def _on_drive(self, message: Any) -> None:
+        self._state = self._control.told_drive(
+            self._state, conversions.read_drive_mode(message))
 
     def _tell(self) -> None:
         """Publish and log a new mode; a fall is an error until it is over."""

@@ -181,6 +181,7 @@ class Ros2ControlDriver(DrivenRobot):
     def _command(self) -> None:
         """Command what the newest targets ask of the joints, within their limits."""
         state, targets = self._state, self._guard.targets(self._state)
+        self.watch_joints()
         if self._enabled:
             self.watch_silence(state.time_ns)
         else:

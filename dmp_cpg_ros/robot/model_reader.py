@@ -144,7 +144,8 @@ def _read_leg(model: mujoco.MjModel, at_zero: mujoco.MjData, ids: ModelIds, inde
         torque_limit=np.array(
             file.torque_limit or [model_parts.torque_limit(model, joint) for joint in joints]),
         velocity_limit=np.array(file.velocity_limit or (USUAL_VELOCITY_LIMIT,) * 3),
-        rotor_inertia=model.dof_armature[model.jnt_dofadr[joints]].copy(), foot_radius=foot.radius)
+        rotor_inertia=model.dof_armature[model.jnt_dofadr[joints]].copy(), foot_radius=foot.radius,
+        damping=model.dof_damping[model.jnt_dofadr[joints]].copy())
 
 
 def _knee_sign(leg: str, thigh: Array, shank: Array, angle: float) -> int:

@@ -4,8 +4,10 @@
 
 A walking robot goes on with the rhythm of its last cycle, in steps that become smaller until it
 stands; without a rhythm it puts its feet down at once. A standing robot holds its stance. One that
-is upright but low (on its way up or down, or on its belly) is lowered onto its belly. The joints
-of a tilted one are damped. Targets are followed again when they rest where the joints are.
+is upright but low (on its way up or down, or on its belly) is lowered onto its belly. So is one
+with a joint that does not do what it is told, as fast as its feet stay on the ground: three legs do
+not carry a body that moves, and from its belly nothing falls. The joints of a tilted one are
+damped. Targets are followed again when they rest where the joints are.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from dmp_cpg_ros.core.modes.motion_library import RISE, Movements, lying_posture
 from dmp_cpg_ros.core.primitives.demonstration import minimum_jerk
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets, RobotState
+from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.last_cycle import LastCycle, Rhythm
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
@@ -37,6 +40,9 @@ STAND_S = 0.15
 before the robot tips over to its side.
 """
 
+DROP = 1.5
+"""Time in which it is lowered from a stand when a joint fails, in √(l/g): a free fall takes 1.3."""
+
 STOP_CYCLES = 2.0
 """Periods of its last rhythm in which a walking robot comes to a stand by itself."""
 
@@ -51,6 +57,9 @@ AT_EASE_NS = 100_000_000
 
 TAKEN_UP_S = 0.3
 """Time in which the joints go over to targets that are followed again [s]."""
+
+SLOWER = (('stand', 'stand'), ('lie', 'lie'))
+"""What a robot does by itself, and the way of it, that gives way to lying down at once."""
 
 STANDING_HEIGHT = 0.7
 """Fraction of the standing height from which the robot stands."""
@@ -81,6 +90,8 @@ class CommandWatchdog:
         Of the newest targets of each leg [ns].
     fallback : str
         ``stand``, ``lie`` or ``damp`` while the robot falls back; else empty.
+    drives : DriveWatch
+        Which joints do not do what they are told.
     """
 
     def __init__(self, description: RobotDescription, timeout_ns: int, lead_ns: int = 0) -> None:
@@ -89,8 +100,11 @@ class CommandWatchdog:
         self.stamps: list[int | None] = [None] * len(LEGS)
         self.fallback = ''
         self._sense, self._stance_height = BodySense(description), description.stance_height
+        lying, unit = lying_posture(description), Movements(description).time_unit
         self._ways = {'stand': (home_joint_position(description), STAND_S),
-                      'lie': (lying_posture(description), RISE * Movements(description).time_unit)}
+                      'lie': (lying, RISE * unit), 'drop': (lying, DROP * unit)}
+        self._way = ''
+        self.drives = DriveWatch(description)
         self._tilt = FallParameters().fall_tilt
         self._memory = LastCycle()
         self._rhythm: Rhythm | None = None
@@ -125,14 +139,17 @@ class CommandWatchdog:
 
     def targets(self, state: RobotState) -> JointTargets:
         """Targets of all joints, (12,) each, at a state of the robot."""
+        self.drives.see(state)
         targets = self._chosen(state)
         self._given = targets.position.copy()
+        self.drives.tell(state.time_ns, targets)
         return targets
 
     def _chosen(self, state: RobotState) -> JointTargets:
         now, known = state.time_ns, None not in self.stamps
         ages = self._take_what_acts(now)
-        if self.silent(now) or (self.fallback and known and not self._at_ease(now)):
+        if self.drives.limp or self.silent(now) or (
+                self.fallback and known and not self._at_ease(now)):
             return self._falling_back(state)
         if self.fallback:
             self._taken_ns, self.fallback = now, ''
@@ -191,24 +208,30 @@ class CommandWatchdog:
         """Targets of the fallback that the robot's state asked for when it began; a robot that
         tips over meanwhile is damped.
         """
-        now, here = state.time_ns, state.joint_position
+        now, limp = state.time_ns, self.drives.limp
         if self.fallback != 'damp' and self._sense.condition(state).tilt > self._tilt:
             self.fallback = 'damp'
-        elif not self.fallback:
-            self.fallback = 'stand' if self._stands(state) else 'lie'
-            known, still = None not in self.stamps, np.zeros((2, 12))
-            start = np.array((self._given if known else here, *still))
-            if known and not self._late_ns:
-                self._going_on(state, start)
-            self._begin_ns, self._late_ns, self._start = now, 0, start
-            self._off = self._given - self._rhythm.at(now)[0] if self._rhythm else np.zeros(12)
-        if self.silent(now):
+        elif not self.fallback or (limp and (self.fallback, self._way) in SLOWER):
+            self._begin_falling_back(state)
+        if limp or self.silent(now):
             self._uneasy_ns = now
         if self.fallback == 'damp':
-            return JointTargets(here.copy(), np.zeros(12), np.zeros(12))
+            return JointTargets(state.joint_position.copy(), np.zeros(12), np.zeros(12))
         if self.fallback == 'stand' and self._rhythm is not None:
             return self._coming_to_a_stand(self._rhythm, state)
-        return JointTargets(*self._taking_up(self.fallback, now - self._begin_ns, state))
+        return JointTargets(*self._taking_up(self._way, now - self._begin_ns, state))
+
+    def _begin_falling_back(self, state: RobotState) -> None:
+        """Choose what the robot's state asks for."""
+        now, stands, limp = state.time_ns, self._stands(state), self.drives.limp
+        self.fallback = 'stand' if stands and not limp else 'lie'
+        self._way = 'drop' if limp else self.fallback
+        known = None not in self.stamps
+        start = np.array((self._given if known else state.joint_position, *np.zeros((2, 12))))
+        if known and not self._late_ns and not limp:
+            self._going_on(state, start)
+        self._begin_ns, self._late_ns, self._start = now, 0, start
+        self._off = self._given - self._rhythm.at(now)[0] if self._rhythm else np.zeros(12)
 
     def _taking_up(self, posture: str, ahead_ns: int, state: RobotState) -> Array:
         """Targets (3, 12) on the way to a posture; a standing robot carries its weight."""

@@ -18,7 +18,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dmp_cpg_ros.analysis.motion import tilt
 from dmp_cpg_ros.commands.ros_arguments import run_command
+from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.fault import (
@@ -30,7 +32,7 @@ from dmp_cpg_ros.core.scenario.fault import (
     Message,
 )
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs
-from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.robot.mujoco_robot import LYING_TILT, MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.studies.output import (
     at_least_one,
@@ -104,7 +106,8 @@ class Outcome(NamedTuple):
     ----------
     end : str
         ``rests``: it walked on and stopped when it was told to; ``stops``: it stopped or did not
-        come to rest as told, and is on its feet or its belly; ``falls``.
+        come to rest as told, and is on its feet; ``lies``: it lowered itself, and lies on its
+        belly; ``falls``.
     named : tuple of str
         What was named as failing, by the estimator, the watchdog or the legs' readers.
     """
@@ -124,7 +127,7 @@ class FailingWalk:
         self.injector = FaultInjector(0)
         self.watchdog = CommandWatchdog(
             self.robot.description, round(suite.robot.target_timeout * 1e9))
-        self.state, self.named = self.robot.reset(), set[str]()
+        self.state, self.named, self.tilt = self.robot.reset(), set[str](), 0.0
         self._ticks = TickInputs(self._on_tick, ('robot',), 'robot')
         self._sent: list[Message] = []
 
@@ -139,8 +142,16 @@ class FailingWalk:
         for left in np.arange(seconds, 1e-6, -0.1):
             self.loop.command(speed)
             self.run(min(0.1, left))
-            fell = fell or self.robot.fallen
+            fell = fell or self.fallen
         return fell
+
+    @property
+    def fallen(self) -> bool:
+        """Whether the robot is down: low or tilted while it should stand, as in its node, or at
+        any time tilted so far that it does not lie on its belly.
+        """
+        should_stand = self.loop.mode.mode in BALANCED
+        return self.tilt > LYING_TILT or (should_stand and self.robot.fallen)
 
     def tick(self) -> None:
         """One tick of the robot; of the suite if it takes the stamp, by the rule of its nodes."""
@@ -153,11 +164,16 @@ class FailingWalk:
             sound = all(np.isfinite(values).all() for values in vars(targets).values())
             if stamp <= state.time_ns and sound:  # as the robot's reader takes them
                 guard.accept(leg, stamp, targets)
+        self.tilt = max(self.tilt, float(tilt(state.base_quaternion[None])[0]))
         estimator = self.loop.estimator_state
         if injector.acting:
             self.named.update(f'targets of {leg}' for leg in guard.silent(state.time_ns))
             self.named.update(() if estimator is None else estimator.estimate.problems)
-        self.state = self.robot.step(injector.driven(guard.targets(state)))
+        targets = guard.targets(state)
+        self.loop.told_drive(guard.fallback)
+        if injector.acting:
+            self.named.update(f'joint {name}' for name in guard.drives.failing)
+        self.state = self.robot.step(injector.driven(targets))
 
     def _on_tick(self, stamp_ns: int, inputs: Mapping[str, Any]) -> None:
         tick = self.loop.tick(inputs['robot'])
@@ -190,12 +206,14 @@ def trial(case: Case) -> Outcome:
     rested = 0
     for _ in range(round(STOPS_S / 0.1)):
         walk.run(0.1)
-        fell = fell or walk.robot.fallen
+        fell = fell or walk.fallen
         rested = rested + 1 if walk.loop.stop.state == 'at_rest' else 0
         if fell or rested == RESTS:
             break
     rests = walked and rested > 0
-    return Outcome('falls' if fell else 'rests' if rests else 'stops', tuple(sorted(walk.named)))
+    lies = walk.loop.mode.mode not in BALANCED
+    return Outcome('falls' if fell else 'lies' if lies else 'rests' if rests else 'stops',
+                   tuple(sorted(walk.named)))
 
 
 def study(cases: Sequence[Case], workers: Workers) -> dict[Case, Outcome]:
@@ -238,7 +256,7 @@ def _told(outcomes: Sequence[Outcome]) -> str:
         end, named = outcomes[0]
         return f'{end} ({", ".join(named)})' if named else end
     ends = [of.end for of in outcomes]
-    return (f'{ends.count("falls")} fall, {ends.count("stops")} stop, '
+    return (f'{ends.count("falls")} fall, {ends.count("lies")} lie, {ends.count("stops")} stop, '
             f'{sum(bool(of.named) for of in outcomes)} named of {len(ends)}')
 
 

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.balance.controller import (
@@ -78,6 +78,15 @@ class BodyControl:
         """Take a request; see :func:`~dmp_cpg_ros.core.modes.requests.request`."""
         mode, answer = request(self.modes, state.mode, what)
         return BodyState(mode, state.balance), answer
+
+    def told_drive(self, state: BodyState, drive_mode: str) -> BodyState:
+        """State that knows what the drives do by themselves: who is lowered by them does not stand
+        any more, and has not fallen.
+        """
+        lowered = drive_mode == 'lie'
+        if lowered == state.mode.lowered:
+            return state
+        return BodyState(replace(state.mode, lowered=lowered), state.balance)
 
     def step(self, state: BodyState, measured: RobotState, gait: GaitInForce, x: Array,
              x_dot: Array, r: Array, dt: float) -> tuple[BodyState, PostureFeedback]:

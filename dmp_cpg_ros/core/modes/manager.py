@@ -76,6 +76,8 @@ class ModeState:
         As last measured.
     fall : FallState
         Of the detector.
+    lowered : bool
+        Whether the drives lower the robot by themselves.
     """
 
     time_ns: int
@@ -86,6 +88,7 @@ class ModeState:
     reason: str = ''
     condition: falls.BodyCondition | None = None
     fall: falls.FallState = field(default_factory=falls.FallState)
+    lowered: bool = False
 
 
 class ModeManager:
@@ -185,6 +188,10 @@ class ModeManager:
             state, time_ns=time_ns, condition=condition, begun_ns=begun, fall=fall)
         if sign:
             return _enter_now(state, 'damped', f'fell at {time_ns * 1e-9:.3f} s: {sign}')
+        if state.lowered and state.mode in BALANCED and (
+                condition.height < RISEN_HEIGHT * self._stance_height):
+            return _enter_now(state, 'lowering', 'the drives lower the robot by themselves; see '
+                              'who moves the joints', ('fold',))
         if state.mode == 'stopping':
             return self._stopped(state, at_rest)
         if state.movements and self._elapsed(state) >= self._time_of(state.movements[0]):

@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, Array
 
@@ -39,6 +41,8 @@ class LegGeometry:
     foot_radius : float
         Distance from the centre of the contact sphere to where it touches the ground while the
         robot stands: its radius, less the compression of soft feet [m].
+    damping : ndarray (3,)
+        Viscous friction of the joints, which their drives may make up for [N m s/rad].
     """
 
     name: str
@@ -54,6 +58,7 @@ class LegGeometry:
     velocity_limit: Array
     rotor_inertia: Array
     foot_radius: float
+    damping: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True)

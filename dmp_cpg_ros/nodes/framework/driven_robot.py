@@ -76,6 +76,16 @@ class DrivenRobot(SuiteNode):
                           f'{self._drive_options.target_timeout} s: the robot looks after itself: '
                           f'{RETREATS[self._guard.fallback]}', error=True)
 
+    def watch_joints(self) -> None:
+        """Name joints that do not do what they are told, until they have for a while."""
+        failing = self._guard.drives.failing
+        if not failing:
+            self.clear('joints')
+            return
+        self.warn('joints', f'joint {", ".join(failing)} does not follow: the torque that its '
+                  'drive reports is not what its targets ask for; the robot lowers itself onto '
+                  'its belly', error=True)
+
     def tell_drive(self, fallback: str) -> None:
         """Say whether the joints follow the legs, or what the robot does by itself."""
         mode = fallback or conversions.DRIVE_MODES[0]

@@ -233,8 +233,9 @@ TOPICS: tuple[Interface, ...] = (
               (INHIBITION,), (REFERENCE, CANONICAL), latched=True,
               sometimes=(REFERENCE, CANONICAL, INHIBITION)),
     Interface('drive_mode', String,
-              'following, or what the robot does by itself while legs are silent: stand, lie, '
-              'damp; when it changes', (ROBOT,), (INHIBITION,), latched=True),
+              'following, or what the robot does by itself while legs are silent or joints do not '
+              'follow: stand, lie, damp; when it changes', (ROBOT,), (POSTURE, INHIBITION),
+              latched=True),
     Interface('body_mode', String,
               'standing, lying, moving between the two, or fallen, when it changes',
               (POSTURE,), (ROBOT,), latched=True),

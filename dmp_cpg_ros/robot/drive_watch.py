@@ -1,0 +1,129 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which joints do not do what they are told, by the torques that their drives report.
+
+The drive law says which torque τ* the last targets ask for at the measured angle and velocity.
+A drive with power gives it, a weak one a part of it; one without power gives nothing, and one that
+follows anything but the targets gives what has nothing to do with it. So does not follow whoever
+reports, over the last few hundredths of a second, ∫ τ τ* < 0.15 ∫ τ*² while much is asked.
+"""
+
+from __future__ import annotations
+
+from math import exp
+
+import numpy as np
+
+from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.robot_model.description import RobotDescription
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.robot.joint_drive import JointDrive
+
+MEMORY_S = 0.02
+"""Time constant with which what was is forgotten [s]."""
+
+MUCH = 0.15
+"""Share of its torque limit from which what is asked of a joint tells whether it follows."""
+
+FOLLOWS, WORKS = 0.15, 0.5
+"""Share of what it is asked for from which a joint follows; and from which its drive reports
+torques: nothing is said of drives that never did.
+"""
+
+LIMP = 0.06
+"""Share of the squared torques asked for below which a leg gives none."""
+
+MOVES = 0.5
+"""Joint speed above which a leg without torque is not one that is held [rad/s]."""
+
+STRANGE, STRANGE_NS = 0.3, 1_000_000_000
+"""Share of its torque limits that a leg gives without being asked, and for how long it is known by
+that to have power [ns].
+"""
+
+WELL_NS = 1_000_000_000
+"""Time for which a joint must have done what it is told until it counts as sound again [ns]."""
+
+LONGEST_NS = 50_000_000
+"""Longest time between two states that are judged together [ns]."""
+
+
+class DriveWatch:
+    """Compares the torques of twelve joints with what their targets ask for.
+
+    Parameters
+    ----------
+    description : RobotDescription
+        Gains and limits of the drives.
+
+    Attributes
+    ----------
+    failing : tuple of str
+        Joints, by the robot's names, that do not follow or did not lately.
+    """
+
+    def __init__(self, description: RobotDescription) -> None:
+        self._kp, self._kd = np.tile(description.kp, 4), np.tile(description.kd, 4)
+        self._limit = np.concatenate([leg.torque_limit for leg in description.legs])
+        self._damping = np.concatenate([leg.damping for leg in description.legs])
+        self._limited = JointDrive(description, 1, 1e-3).limited
+        self._names = description.joint_names
+        self._told: JointTargets | None = None
+        self._told_ns = 0
+        self._reports = False
+        # τ*² and τ τ* over squared limits, of the drive law without and with the joints' friction
+        self._seen = np.zeros((2, 2, len(self._names)))
+        self._failed_ns = np.full(len(self._names), -WELL_NS)
+        self.failing: tuple[str, ...] = ()
+        self._legs = np.zeros((5, len(LEGS)))  # of τ*², τ τ* (both laws), τ², q̇² in each leg
+        self._strange_ns = np.full(len(LEGS), -STRANGE_NS)
+        self._limp_ns = -WELL_NS
+        self.limp = False
+
+    def tell(self, time_ns: int, targets: JointTargets) -> None:
+        """Keep what the joints are told at a stamp [ns]."""
+        self._told_ns, self._told = time_ns, targets
+
+    def see(self, state: RobotState) -> None:
+        """Judge what the joints have made of it."""
+        now, told = state.time_ns, self._told
+        after_ns = now - self._told_ns
+        if told is None or not 0 < after_ns <= LONGEST_NS:
+            self._seen = np.zeros_like(self._seen)
+            return
+        dt, q, q_dot = 1e-9 * after_ns, state.joint_position, state.joint_velocity
+        plain = (self._kp * (told.position + dt * told.velocity - q)
+                 + self._kd * (told.velocity - q_dot) + told.effort)
+        asked = np.array([self._limited(torque, q_dot) for torque in (
+            plain, plain + self._damping * told.velocity)]) / self._limit
+        given, fade = state.joint_effort / self._limit, exp(-dt / MEMORY_S)
+        news = np.array((asked * asked, asked * given))
+        self._seen = fade * self._seen + (1.0 - fade) * news
+        self._watch_legs(now, fade, news, given, q_dot)
+        power, shared = self._seen
+        much = power > MUCH * MUCH
+        if not self._reports:
+            self._reports = bool((much & (shared > WORKS * power)).any())
+            return
+        failing = (much & (shared < FOLLOWS * power)).all(axis=0)
+        if failing.any():
+            self._failed_ns = np.where(failing, now, self._failed_ns)
+        elif not self.failing:
+            return
+        lately = now - self._failed_ns < WELL_NS
+        self.failing = tuple(name for name, of in zip(self._names, lately, strict=True) if of)
+
+    def _watch_legs(self, now: int, fade: float, news: Array, given: Array, q_dot: Array) -> None:
+        """Judge whether a leg moves without any torque."""
+        power, shared = news
+        squares = np.array((power[0], *shared, given * given, q_dot * q_dot))
+        added = squares.reshape(len(squares), len(LEGS), -1).sum(axis=2)
+        self._legs = legs = fade * self._legs + (1.0 - fade) * added
+        asked, reported, moves = legs[0], legs[3], legs[4]
+        strange = reported - np.maximum(legs[1:3].max(axis=0), 0.0) > STRANGE * STRANGE
+        self._strange_ns = np.where(strange, now, self._strange_ns)
+        limp = ((asked > MUCH * MUCH) & (reported < LIMP * asked) & (moves > MOVES * MOVES)
+                & (now - self._strange_ns > STRANGE_NS))
+        if self._reports and limp.any():
+            self._limp_ns = now
+        self.limp = now - self._limp_ns < WELL_NS
