@@ -30,13 +30,13 @@ FOLLOWS, WORKS = 0.15, 0.5
 torques: nothing is said of drives that never did.
 """
 
-LIMP = 0.06
+LIMP = 0.15
 """Share of the squared torques asked for below which a leg gives none."""
 
 MOVES = 0.5
 """Joint speed above which a leg without torque is not one that is held [rad/s]."""
 
-STRANGE, STRANGE_NS = 0.3, 1_000_000_000
+STRANGE, STRANGE_NS = 0.45, 1_000_000_000
 """Share of its torque limits that a leg gives without being asked, and for how long it is known by
 that to have power [ns].
 """
@@ -120,10 +120,11 @@ class DriveWatch:
         added = squares.reshape(len(squares), len(LEGS), -1).sum(axis=2)
         self._legs = legs = fade * self._legs + (1.0 - fade) * added
         asked, reported, moves = legs[0], legs[3], legs[4]
-        strange = reported - np.maximum(legs[1:3].max(axis=0), 0.0) > STRANGE * STRANGE
+        explained = np.maximum(legs[1:3].max(axis=0), 0.0)
+        strange = reported - explained > STRANGE * STRANGE
         self._strange_ns = np.where(strange, now, self._strange_ns)
-        limp = ((asked > MUCH * MUCH) & (reported < LIMP * asked) & (moves > MOVES * MOVES)
-                & (now - self._strange_ns > STRANGE_NS))
+        limp = ((asked > MUCH * MUCH) & (np.maximum(reported, explained) < LIMP * asked)
+                & (moves > MOVES * MOVES) & (now - self._strange_ns > STRANGE_NS))
         if self._reports and limp.any():
             self._limp_ns = now
         self.limp = now - self._limp_ns < WELL_NS

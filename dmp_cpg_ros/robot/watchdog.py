@@ -5,9 +5,9 @@
 A walking robot goes on with the rhythm of its last cycle, in steps that become smaller until it
 stands; without a rhythm it puts its feet down at once. A standing robot holds its stance. One that
 is upright but low (on its way up or down, or on its belly) is lowered onto its belly. So is one
-with a joint that does not do what it is told, as fast as its feet stay on the ground: three legs do
-not carry a body that moves, and from its belly nothing falls. The joints of a tilted one are
-damped. Targets are followed again when they rest where the joints are.
+with a leg that gives no torque, as fast as it would fall: three legs do not carry a body that
+moves, and from its belly nothing falls. The joints of a tilted one are damped. Targets are
+followed again when they rest where the joints are.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ before the robot tips over to its side.
 """
 
 DROP = 1.5
-"""Time in which it is lowered from a stand when a joint fails, in √(l/g): a free fall takes 1.3."""
+"""Time in which it is lowered from a stand when a leg is limp, in √(l/g); falling takes 1.3."""
 
 STOP_CYCLES = 2.0
 """Periods of its last rhythm in which a walking robot comes to a stand by itself."""
