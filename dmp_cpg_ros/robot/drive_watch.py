@@ -5,7 +5,9 @@
 The drive law says which torque τ* the last targets ask for at the measured angle and velocity.
 A drive with power gives it, a weak one a part of it; one without power gives nothing, and one that
 follows anything but the targets gives what has nothing to do with it. So does not follow whoever
-reports, over the last few hundredths of a second, ∫ τ τ* < 0.15 ∫ τ*² while much is asked.
+reports, over the last few hundredths of a second, ∫ τ τ* < 0.15 ∫ τ*² while much is asked. A leg
+is limp whose three joints move and give nothing; one that has given what nobody asked for has
+power, and carries.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ LIMP = 0.15
 MOVES = 0.5
 """Joint speed above which a leg without torque is not one that is held [rad/s]."""
 
-STRANGE, STRANGE_NS = 0.45, 1_000_000_000
+STRANGE, STRANGE_NS = 0.15, 1_000_000_000
 """Share of its torque limits that a leg gives without being asked, and for how long it is known by
 that to have power [ns].
 """
@@ -60,6 +62,8 @@ class DriveWatch:
     ----------
     failing : tuple of str
         Joints, by the robot's names, that do not follow or did not lately.
+    limp : bool
+        Whether a leg moves without giving torque that is asked of it, or did lately.
     """
 
     def __init__(self, description: RobotDescription) -> None:
@@ -75,6 +79,7 @@ class DriveWatch:
         self._seen = np.zeros((2, 2, len(self._names)))
         self._failed_ns = np.full(len(self._names), -WELL_NS)
         self.failing: tuple[str, ...] = ()
+        self._means = np.zeros((4, len(self._names)))  # of τ* (both laws), friction, τ
         self._legs = np.zeros((5, len(LEGS)))  # of τ*², τ τ* (both laws), τ², q̇² in each leg
         self._strange_ns = np.full(len(LEGS), -STRANGE_NS)
         self._limp_ns = -WELL_NS
@@ -99,6 +104,8 @@ class DriveWatch:
         given, fade = state.joint_effort / self._limit, exp(-dt / MEMORY_S)
         news = np.array((asked * asked, asked * given))
         self._seen = fade * self._seen + (1.0 - fade) * news
+        self._means = fade * self._means + (1.0 - fade) * np.array(
+            (*asked, self._damping * q_dot / self._limit, given))
         self._watch_legs(now, fade, news, given, q_dot)
         power, shared = self._seen
         much = power > MUCH * MUCH
@@ -121,8 +128,12 @@ class DriveWatch:
         self._legs = legs = fade * self._legs + (1.0 - fade) * added
         asked, reported, moves = legs[0], legs[3], legs[4]
         explained = np.maximum(legs[1:3].max(axis=0), 0.0)
-        strange = reported - explained > STRANGE * STRANGE
-        self._strange_ns = np.where(strange, now, self._strange_ns)
+        *laws, friction, mean = self._means
+        low = np.minimum(np.minimum(*laws), 0.0) + np.minimum(friction, 0.0)
+        high = np.maximum(np.maximum(*laws), 0.0) + np.maximum(friction, 0.0)
+        unasked = mean - np.minimum(np.maximum(mean, low), high)
+        strange = (unasked * unasked).reshape(len(LEGS), -1).sum(axis=1)
+        self._strange_ns = np.where(strange > STRANGE * STRANGE, now, self._strange_ns)
         limp = ((asked > MUCH * MUCH) & (np.maximum(reported, explained) < LIMP * asked)
                 & (moves > MOVES * MOVES) & (now - self._strange_ns > STRANGE_NS))
         if self._reports and limp.any():
