@@ -72,7 +72,8 @@ class DriveWatch:
         self._damping = np.concatenate([leg.damping for leg in description.legs])
         self._limited = JointDrive(description, 1, 1e-3).limited
         self._names = description.joint_names
-        self._told: JointTargets | None = None
+        self._told: Array | None = None  # (3, 12)
+        self._goes = np.zeros(len(self._names))  # velocities that the drives still follow
         self._told_ns = 0
         self._reports = False
         # τ*² and τ τ* over squared limits, of the drive law without and with the joints' friction
@@ -87,7 +88,10 @@ class DriveWatch:
 
     def tell(self, time_ns: int, targets: JointTargets) -> None:
         """Keep what the joints are told at a stamp [ns]."""
-        self._told_ns, self._told = time_ns, targets
+        told, last = np.array((targets.position, targets.velocity, targets.effort)), self._told
+        held = False if last is None else (told == last).all(axis=0)  # nothing new to the drive
+        self._goes = np.where(held, 0.0, told[1])
+        self._told_ns, self._told = time_ns, told
 
     def see(self, state: RobotState) -> None:
         """Judge what the joints have made of it."""
@@ -97,10 +101,11 @@ class DriveWatch:
             self._seen = np.zeros_like(self._seen)
             return
         dt, q, q_dot = 1e-9 * after_ns, state.joint_position, state.joint_velocity
-        plain = (self._kp * (told.position + dt * told.velocity - q)
-                 + self._kd * (told.velocity - q_dot) + told.effort)
+        position, velocity, effort = told
+        plain = (self._kp * (position + dt * velocity - q) + self._kd * (self._goes - q_dot)
+                 + effort)
         asked = np.array([self._limited(torque, q_dot) for torque in (
-            plain, plain + self._damping * told.velocity)]) / self._limit
+            plain, plain + self._damping * self._goes)]) / self._limit
         given, fade = state.joint_effort / self._limit, exp(-dt / MEMORY_S)
         news = np.array((asked * asked, asked * given))
         self._seen = fade * self._seen + (1.0 - fade) * news
