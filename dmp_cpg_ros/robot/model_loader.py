@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from dmp_cpg_ros.core.errors import MissingFileError, ParameterError
-from dmp_cpg_ros.core.robot_model.world import World
+from dmp_cpg_ros.core.robot_model.world import Surface, World
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 
 _log = logging.getLogger(__name__)
@@ -104,6 +104,9 @@ def _add_world(spec: mujoco.MjSpec, world: World) -> None:
     floor = next((geom for geom in spec.worldbody.geoms if geom.type == _PLANE), None)
     if floor is not None:
         floor.pos = [floor.pos[0], floor.pos[1], floor.pos[2] + world.floor]
+    surface = world.surface()
+    if surface is not None:
+        _add_surface(spec, surface, floor)
     boxes = world.boxes()
     tops = np.array([box.centre[2] + box.half_size[2] for box in boxes])
     for i, box in enumerate(boxes):
@@ -114,3 +117,18 @@ def _add_world(spec: mujoco.MjSpec, world: World) -> None:
             rgba=_LOW + share * (_HIGH - _LOW))
         for part in _CONTACT if floor is not None else ():
             setattr(geom, part, getattr(floor, part))
+
+
+def _add_surface(spec: mujoco.MjSpec, surface: Surface, floor: mujoco.MjsGeom | None) -> None:
+    """Add ground that is not made of boxes."""
+    (x_0, x_1), (y_0, y_1), height = surface
+    low, high = float(height.min()), float(height.max())
+    # MuJoCo scales what is given to [0, 1]
+    spec.add_hfield(name='terrain', nrow=height.shape[0], ncol=height.shape[1],
+                    size=[0.5 * (x_1 - x_0), 0.5 * (y_1 - y_0), high - low, 0.1],
+                    userdata=((height - low) / (high - low)).ravel().tolist())
+    geom = spec.worldbody.add_geom(
+        name='terrain', type=mujoco.mjtGeom.mjGEOM_HFIELD, hfieldname='terrain', rgba=_LOW,
+        pos=[0.5 * (x_0 + x_1), 0.5 * (y_0 + y_1), low])
+    for part in _CONTACT if floor is not None else ():
+        setattr(geom, part, getattr(floor, part))

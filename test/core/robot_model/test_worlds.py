@@ -17,7 +17,10 @@ from dmp_cpg_ros.core.robot_model.world import (
     PATCH,
     WORLDS,
     Blocks,
+    Gaps,
+    Hills,
     LowFriction,
+    RoughSlope,
     Slope,
     Steps,
     World,
@@ -35,7 +38,8 @@ ZERO = np.zeros(12)
 WORLDS_TO_TRY = (
     World(), LowFriction(), Slope(degrees=12.0), Slope(degrees=-12.0),
     Blocks(height=0.06, seed=3), Blocks(height=0.06, size=0.33), Steps(height=0.08),
-    Steps(height=0.05, depth=0.3, count=3, platform=1.0))
+    Steps(height=0.05, depth=0.3, count=3, platform=1.0), RoughSlope(degrees=12.0, height=0.04),
+    RoughSlope(degrees=-15.0, height=0.06, seed=3), Gaps(count=3), Hills(degrees=15.0, seed=2))
 
 
 @pytest.fixture(scope='module', params=WORLDS_TO_TRY, ids=str)
