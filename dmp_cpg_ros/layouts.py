@@ -33,12 +33,15 @@ CADENCE_ROW = 'cadence_scale'
 SHIFT_ROWS = tuple(f'{leg}_foot_{axis}' for leg in LEGS for axis in 'xyz')
 CORRECTION_ROWS = ('base_x', 'base_y', 'base_yaw')
 MARGIN_ROWS = tuple(f'margin/{edge}' for edge in EDGES)
+PROGRESS_ROWS = ('progress/x', 'progress/y', 'progress/behind')
 MODE_ROWS = tuple(f'mode/{mode}' for mode in MODES)
 MOVEMENT_ROWS = tuple(f'movement/{name}' for name in MOVEMENT_NAMES)
 POSTURE_ROWS = (
-    *JOINT_NAMES, *SHIFT_ROWS, *CORRECTION_ROWS, *MARGIN_ROWS, *MODE_ROWS, *MOVEMENT_ROWS)
+    *JOINT_NAMES, *SHIFT_ROWS, *CORRECTION_ROWS, *MARGIN_ROWS, *PROGRESS_ROWS, *MODE_ROWS,
+    *MOVEMENT_ROWS)
 """Of ``posture_feedback``. A margin's position is that of the capture point to an edge of the
-support polygon [m]. A mode's position is 1 while it lasts, else 0; a movement's is the
+support polygon [m]; those of the progress are the body's velocity [m/s] and how far the leading
+feet are behind [m]. A mode's position is 1 while it lasts, else 0; a movement's is the
 phase of its canonical system, 0 while it does not move the legs.
 """
 

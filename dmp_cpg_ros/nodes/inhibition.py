@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting
@@ -142,16 +142,18 @@ class InhibitionNode(SuiteNode):
         if not self._joined and not self._join(stamp_ns):
             return
         self._slow, before = self._unhurried(gait), self._state
-        self._body_mode, margins = values['posture_feedback'] or (self._body_mode, None)
+        self._body_mode, margins, progress = values['posture_feedback'] or (
+            self._body_mode, None, None)
         self._votes = self._voting.step(
             self._votes, stamp_ns, network, _vote_sensors(stamp_ns, values), self._x, self._r,
             before.state in ('walking', 'free'), self._inbox.take())
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
-            self._votes.tally, self._barring, margins)
+            self._votes.tally, self._barring, margins, progress)
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
             self._predict()
+        self._tell_block(before)
         news = self._news() != self._told
         if news:
             self._publish()
@@ -167,6 +169,16 @@ class InhibitionNode(SuiteNode):
             self._blind = ''
             self.clear('blind')
         self._watch_bound(stamp_ns)
+
+    def _tell_block(self, before: SupervisorState) -> None:
+        """Say that the robot has stopped by itself, and when it no longer has."""
+        if self._state.block.acts == before.block.acts:
+            return
+        if self._state.block.acts:
+            self.warn('blocked', 'walked and made no way: stopped as before an obstacle; a '
+                      'command that leads elsewhere, or inhibit with false, starts the gait')
+        else:
+            self.clear('blocked')
 
     def _unhurried(self, gait: GaitInForce) -> GaitNetwork:
         """Oscillators at the cadence that a gait has but for the quickness that acts."""
@@ -250,7 +262,7 @@ class InhibitionNode(SuiteNode):
     def diagnostic_values(self) -> Mapping[str, Any]:
         """State of the stop."""
         return {'inhibition': self._state.state, 'requested': self._state.in_force,
-                'pushed': self._state.push.acts,
+                'pushed': self._state.push.acts, 'blocked': self._state.block.acts,
                 'command': self._gate.at(self._state.time_ns)}
 
     # The service -------------------------------------------------------------------------------
@@ -342,7 +354,8 @@ class InhibitionNode(SuiteNode):
         """What is told when it changes."""
         now = self._state
         return (now.state, now.requested, now.armed, now.automatic, now.request_ns, now.voted,
-                now.tally.causes, now.tally.weights.tobytes(), now.leg, now.rest_phase)
+                now.tally.causes, now.tally.weights.tobytes(), now.leg, now.rest_phase,
+                now.block.acts)
 
     def _publish_gains(self) -> None:
         self._told_ns = self._state.time_ns
@@ -351,7 +364,7 @@ class InhibitionNode(SuiteNode):
     def _publish(self) -> None:
         state, acting, self._told = self._state, self._acting, self._news()
         told = {'requested': state.in_force, 'armed': state.armed, 'automatic': state.automatic,
-                'pushed': state.push.acts,
+                'pushed': state.push.acts, 'blocked': state.block.acts,
                 **_by_leg('gain', acting.gains), 'region_radius': acting.region_radius,
                 'rest_phase': acting.rest_phase,
                 'request_stamp': state.request_ns * 1e-9, 'predicted_s': self._predicted,

@@ -6,11 +6,12 @@ speeds: steady velocities against the commanded ones. pushes: largest speed chan
 eight directions at every phase. timing: falls by drawn pushes in other gaits, of other robots and
 on blocks too, with and without quicker steps. manoeuvres: falls by pushes at rest, while stopping,
 starting, changing gait and turning. unpushed: stops that nobody pushes against. rough: share of
-seeds that cross 5 m of rough ground. contacts: the same with and without the feedback of touchdown
-and the stumbling reflex. delays: targets that arrive late. mismatch: a robot that is not as its
-controllers know it. gaits: every ordered pair of gaits
-changed while moving. robots: other robots, with their files alone; those of the extra `robots` are
-left out where it is not installed.
+seeds that cross 5 m of rough ground; rougher, higher: of harder grounds, and of stairs on a robot
+with longer legs. obstacles: steps that are too high. contacts: rough ground with and without the
+feedback of touchdown and the stumbling reflex. delays: targets that arrive late. mismatch: a robot
+that is not as its controllers know it. gaits: every ordered pair of gaits changed while moving.
+robots: other robots, with their files alone; those of the extra `robots` are left out where it is
+not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """
@@ -50,14 +51,40 @@ DIRECTIONS = {'ahead': 0.0, 'ahead left': 0.25 * pi, 'left': 0.5 * pi, 'back lef
 PUSHED = (('amble', 0.5), ('trot', 0.5), ('trot', 1.0))
 """Gaits and speeds that are pushed."""
 
-ROUGH = (('blocks', 'height', 0.05), ('slope', 'degrees', 15.0), ('slope', 'degrees', -15.0),
-         ('steps', 'height', 0.08), ('low_friction', 'friction', 0.3))
-"""Grounds that are crossed: worlds with one of their parameters."""
+Ground = tuple[str, dict[str, float]]
+"""A world with some of its parameters."""
+
+ROUGH: tuple[Ground, ...] = (
+    ('blocks', {'height': 0.05}), ('slope', {'degrees': 15.0}), ('slope', {'degrees': -15.0}),
+    ('steps', {'height': 0.08}), ('low_friction', {'friction': 0.3}))
+"""Grounds that are crossed."""
+
+STAIRS = {'count': 5, 'depth': 0.3, 'platform': 1.5}
+"""Five stairs up and five down within ``FINISH``."""
+
+ROUGHER: tuple[Ground, ...] = (
+    ('steps', {'height': 0.1, **STAIRS}), ('slope', {'degrees': 20.0}),
+    ('slope', {'degrees': -20.0}), ('low_friction', {'friction': 0.2}),
+    ('rough_slope', {'degrees': 12.0, 'height': 0.04}), ('hills', {'degrees': 15.0}),
+    ('blocks', {'height': 0.07}), ('gaps', {'width': 0.1, 'count': 5, 'depth': 0.5}))
+"""Harder grounds."""
+
+HIGHER: tuple[Ground, ...] = (('steps', {'height': 0.15, **STAIRS}),)
+"""Grounds for a robot with longer legs, ``CLIMBER``."""
+
+CLIMBER = 'robots/go2.yaml'
+
+OBSTACLES = (0.13, 0.16, 0.2, 0.25, 1.0)
+"""Heights of steps that the package's own robot does not cross [m]."""
+
+OBSTACLE_SPEEDS = (0.3, 0.5)
+"""Speeds at which it walks at them [m/s]."""
 
 ROUGH_GAITS = ('amble', 'trot')
 
-FELT_GROUNDS = (('blocks', 'height', 0.03), ('blocks', 'height', 0.05), ('blocks', 'height', 0.07),
-                ('steps', 'height', 0.05), ('steps', 'height', 0.08))
+FELT_GROUNDS: tuple[Ground, ...] = (
+    *(('blocks', {'height': height}) for height in (0.03, 0.05, 0.07)),
+    *(('steps', {'height': height}) for height in (0.05, 0.08)))
 """Grounds that are crossed with and without feeling them."""
 
 FEELING: dict[trials.Values, str] = {
@@ -298,13 +325,51 @@ def unpushed(workers: Workers, seeds: int, phases: int) -> Table:
 
 def rough(workers: Workers, seeds: int, phases: int) -> Table:
     """Share of the seeds that cross each ground."""
-    results, rows = _crossings(workers, seeds, product(ROUGH, ROUGH_GAITS, [()])), []
+    return _crossed('Rough ground', ROUGH, workers, seeds)
+
+
+def rougher(workers: Workers, seeds: int, phases: int) -> Table:
+    """The same of harder grounds."""
+    return _crossed('Rougher ground', ROUGHER, workers, seeds)
+
+
+def higher(workers: Workers, seeds: int, phases: int) -> Table:
+    """The same of grounds for longer legs, where that robot is there."""
+    there = HIGHER if _is_there(CLIMBER) else ()
+    return _crossed(f'Higher ground, {Path(CLIMBER).stem}', there, workers, seeds, CLIMBER)
+
+
+def _crossed(title: str, grounds: Sequence[Ground], workers: Workers, seeds: int,
+             robot: str | None = None) -> Table:
+    results, rows = _crossings(workers, seeds, product(grounds, ROUGH_GAITS, [()]), robot), []
     for case, words, of, shares in _groups(results, seeds):
         times = [outcome.time for outcome in of if outcome.crossed]
         rows.append((case['kind'], words, case['gait'], *shares,
-                     f'{np.median(times):.1f}' if times else '-'))
-    return Table('Rough ground, blind, at 0.5 m/s within a tenth', (
-        'ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s'), rows, results)
+                     f'{np.median(times):.1f}' if times else '-',
+                     f'{np.median([outcome.distance for outcome in of]):.1f}'))
+    return Table(f'{title}, blind, at 0.5 m/s within a tenth', (
+        'ground', 'with', 'gait', 'seeds', 'crossed 5 m', 'fell', 'median time s',
+        'median way m'), rows, results)
+
+
+def obstacles(workers: Workers, seeds: int, phases: int) -> Table:
+    """What becomes of a robot that walks at a step that is too high."""
+    cells = list(product(OBSTACLES, ROUGH_GAITS, OBSTACLE_SPEEDS))
+    results = _run(workers, trials.obstacle, [
+        {'gait': gait, 'height': height, 'seed': seed, 'speed': speed}
+        for height, gait, speed in cells for seed in range(seeds)])
+    rows = []
+    for k, (height, gait, speed) in enumerate(cells):
+        of = [outcome for _, outcome in results[k * seeds:(k + 1) * seeds]]
+        times, ways = ([getattr(one, what) for one in of if one.stopped and not one.fell]
+                       for what in ('time', 'away'))
+        rows.append((f'{height:g}', f'{gait} {speed:g}', *(
+            f'{sum(getattr(one, what) for one in of)}/{seeds}'
+            for what in ('stopped', 'fell', 'over', 'rests')),
+            *((f'{max(times):.1f}', f'{min(ways):.2f}') if times else ('-', '-'))))
+    return Table('Steps that are too high', (
+        'height m', 'gait, m/s', 'stopped', 'fell', 'over', 'rests', 'stopped after s, worst',
+        'way back m, least'), rows, [(case, one._asdict()) for case, one in results])
 
 
 def contacts(workers: Workers, seeds: int, phases: int) -> Table:
@@ -320,11 +385,13 @@ def contacts(workers: Workers, seeds: int, phases: int) -> Table:
                   'mean speed m/s', 'tilt rms deg'), rows, results)
 
 
-def _crossings(workers: Workers, seeds: int, walks: Iterator[tuple[Any, ...]]) -> Results:
+def _crossings(workers: Workers, seeds: int, walks: Iterator[tuple[Any, ...]],
+               robot: str | None = None) -> Results:
     """Crossings of ground, gait and parameters with every seed, the seeds innermost."""
     return _run(workers, trials.cross, [
-        {'gait': gait, 'kind': kind, 'numbers': {name: number}, 'seed': seed, 'values': values}
-        for ((kind, name, number), gait, values), seed in product(walks, range(seeds))])
+        {'gait': gait, 'kind': kind, 'numbers': numbers, 'seed': seed, 'values': values,
+         'robot': robot}
+        for ((kind, numbers), gait, values), seed in product(walks, range(seeds))])
 
 
 def _groups(results: Results, seeds: int) -> Iterator[tuple[
@@ -471,8 +538,8 @@ def _is_there(file: str) -> bool:
 
 
 TABLES = {make.__name__: make for make in (
-    speeds, pushes, timing, manoeuvres, unpushed, rough, contacts, delays, mismatch, gaits,
-    robots)}
+    speeds, pushes, timing, manoeuvres, unpushed, rough, rougher, higher, obstacles, contacts,
+    delays, mismatch, gaits, robots)}
 """What can be measured."""
 
 

@@ -24,7 +24,7 @@ from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
-from dmp_cpg_ros.core.robot_model.world import WORLDS, World
+from dmp_cpg_ros.core.robot_model.world import WORLDS, Steps, World
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
@@ -57,6 +57,9 @@ PUSH_RESOLUTION, LARGEST_PUSH = 0.1, 3.2
 
 FINISH, CROSSING_TIME = 5.0, 30.0
 """Distance to cross on rough ground [m], and the time after which a trial ends [s]."""
+
+OBSTACLE_TIME, AWAY = 12.0, 3.0
+"""Time for which a robot walks at an obstacle, and for which it then walks back [s]."""
 
 CHANGE_SPEEDS = (0.4, 0.6)
 """Speeds at which gaits change, which every gait can do [m/s]."""
@@ -426,10 +429,11 @@ class CrossingOutcome:
     distance: float
     time: float
     tilt: float
+    blocked: bool = False
 
 
 def cross(gait: str, kind: str, numbers: Mapping[str, float], seed: int, speed: float = 0.5,
-          values: Values = ()) -> CrossingOutcome:
+          values: Values = (), robot: str | None = None) -> CrossingOutcome:
     """Walk straight ahead until ``FINISH``, a fall, or ``CROSSING_TIME``.
 
     Parameters
@@ -446,9 +450,13 @@ def cross(gait: str, kind: str, numbers: Mapping[str, float], seed: int, speed: 
         Mean of the commanded speed [m/s]; each seed draws its own within a tenth of it.
     values : tuple of (str, value)
         Parameters that differ from the parameter file.
+    robot : str, optional
+        Robot file; the suite's own without.
+
+    A robot that stops because it takes the ground for an obstacle has not crossed.
     """
-    drawn: dict[str, Any] = {'seed': seed} if kind == 'blocks' else {}
-    run = Walk(gait, None, WORLDS[kind](**numbers, **drawn), seed + 1, values)
+    drawn: dict[str, Any] = {'seed': seed} if hasattr(WORLDS[kind], 'seed') else {}
+    run = Walk(gait, robot, WORLDS[kind](**numbers, **drawn), seed + 1, values)
     run.loop.command(speed * float(np.random.default_rng(seed).uniform(0.9, 1.1)))
     begin, tilt, distance, time = run.state.time_ns, [], 0.0, 0.0
     while distance < FINISH and time < CROSSING_TIME:
@@ -456,11 +464,61 @@ def cross(gait: str, kind: str, numbers: Mapping[str, float], seed: int, speed: 
         upright = run.walk(0.1)
         distance = float(run.state.base_position_in_world[0])
         time = (run.state.time_ns - begin) * 1e-9
-        if not upright:
+        if not upright or run.loop.stop.block.acts:
             break
         tilt.append(float(np.mean(np.sum(_attitude(run.states)[:, :2] ** 2, axis=1))))
     return CrossingOutcome(distance >= FINISH and not run.fell(), run.fell(), distance, time,
-                           float(np.rad2deg(np.sqrt(np.mean(tilt)))) if tilt else nan)
+                           float(np.rad2deg(np.sqrt(np.mean(tilt)))) if tilt else nan,
+                           run.loop.stop.block.acts)
+
+
+class ObstacleOutcome(NamedTuple):
+    """What a robot did that walked at an obstacle.
+
+    Attributes
+    ----------
+    fell, over, stopped : bool
+        Whether it fell, was over it, or stopped before it.
+    time : float
+        From the start of the gait to the stop [s].
+    rests : bool
+        Whether the gait came to rest.
+    away : float
+        Way back from there when it is then asked to walk backwards [m].
+    """
+
+    fell: bool
+    over: bool = False
+    stopped: bool = False
+    time: float = nan
+    rests: bool = False
+    away: float = nan
+
+
+def obstacle(gait: str, height: float, seed: int, speed: float = 0.5, robot: str | None = None
+             ) -> ObstacleOutcome:
+    """Walk at a step of some height [m] with a platform behind it, within a tenth of a speed
+    [m/s]; after a stop, wait for rest and walk back.
+    """
+    draw = np.random.default_rng(seed)
+    run = Walk(gait, robot, Steps(height=height, platform=4.0), seed + 1)
+    run.walk(draw.uniform(0.0, 0.5))
+    run.loop.command(speed * float(draw.uniform(0.9, 1.1)))
+    begin = run.state.time_ns
+    while not run.loop.stop.block.acts:
+        if not run.walk(run.tick_s):
+            return ObstacleOutcome(True)
+        if run.state.base_position_in_world[0] > 2.0 or (
+                run.state.time_ns - begin > 1e9 * OBSTACLE_TIME):
+            return ObstacleOutcome(False, bool(run.state.base_position_in_world[0] > 2.0))
+    time = (run.state.time_ns - begin) * 1e-9
+    if not run.walk(RECOVERY):
+        return ObstacleOutcome(True, stopped=True, time=time)
+    rests, place = run.loop.stop.state == 'at_rest', run.state.base_position_in_world[0]
+    run.loop.command(-0.3)
+    upright = run.walk(AWAY)
+    return ObstacleOutcome(not upright, False, True, time, rests,
+                           float(place - run.state.base_position_in_world[0]))
 
 
 def _attitude(states: Sequence[RobotState]) -> Array:

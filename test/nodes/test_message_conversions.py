@@ -23,6 +23,7 @@ from std_msgs.msg import String
 
 from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
+from dmp_cpg_ros.core.balance.progress import Progress
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
@@ -126,20 +127,22 @@ def test_joint_targets(leg: str, values: np.ndarray) -> None:
     assert bits(*dataclasses.astuple(targets)) == bits(*dataclasses.astuple(sent))
 
 
-@given(numbers(12), numbers(4, 3), numbers(4, 2), numbers(3), numbers(12), numbers(4), numbers(4))
+@given(numbers(12), numbers(4, 3), numbers(4, 2), numbers(3), numbers(12), numbers(4), numbers(4),
+       numbers(3))
 def test_posture_feedback(torque: np.ndarray, shift: np.ndarray, drift: np.ndarray,
                           correction: np.ndarray, measured: np.ndarray,
-                          force: np.ndarray, margins: np.ndarray) -> None:
+                          force: np.ndarray, margins: np.ndarray, way: np.ndarray) -> None:
     command = BodyCommand('rising', 'rise', 1.0 / 3.0, -0.1)
     sent = PostureFeedback(torque, shift, drift, correction, command, measured, force,
-                           tuple(margins.tolist()))
+                           tuple(margins.tolist()), Progress((way[0], way[1]), way[2]))
     message = wire(PostureFeedbackWriter().fill(0, sent))
     read = PostureFeedbackReader().read(message)
     assert bits(read.torque, read.shift_in_base, read.drift_in_base, read.correction,
                 read.measured, read.foot_force) == bits(
                     torque, shift, drift, correction, measured, force)
     assert read.command == command == CommandReader().read(message)
-    assert read.margins == sent.margins and BodyReader().read(message) == ('rising', sent.margins)
+    assert (read.margins, read.progress) == (sent.margins, sent.progress)
+    assert BodyReader().read(message) == ('rising', sent.margins, sent.progress)
     assert not message.header.frame_id
 
 

@@ -24,6 +24,7 @@ from dmp_cpg_ros.core.balance.corrections import MassOffset, VelocityCorrection
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, Pair, ground_from_base, lean
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
+from dmp_cpg_ros.core.balance.progress import Progress, feet_behind
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
@@ -66,6 +67,8 @@ class PostureFeedback:
         Measured normal forces of the feet [N]; 0 where there is none to be believed.
     margins : tuple of float
         Of the capture point to the edges of the support polygon [m]; ``WIDE`` while nobody asks.
+    progress : Progress or None
+        Whether the body comes ahead, where it balances.
     """
 
     torque: Array
@@ -76,6 +79,7 @@ class PostureFeedback:
     measured: Array = field(default_factory=lambda: np.zeros(12))
     foot_force: Array = field(default_factory=lambda: np.zeros(4))
     margins: tuple[float, ...] = WIDE
+    progress: Progress | None = None
 
     def of_leg(self, i: int) -> LegFeedback:
         """What the path of leg ``i`` takes of it."""
@@ -217,7 +221,9 @@ class PostureController:
             np.array(correction), command, state.joint_position, believed(state.foot_force),
             self._margins(R_ground_base, feet, swings, (lean_x, lean_y), (
                 measured[0] - (planned[0] - lasting[0]),
-                measured[1] - (planned[1] - lasting[1]))))
+                measured[1] - (planned[1] - lasting[1]))),
+            Progress((measured[0], measured[1]), feet_behind(
+                plan.expected, beside, feet, self._footholds, positions, duty, omega)))
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
                  under: Pair, error: Pair) -> tuple[float, ...]:

@@ -43,6 +43,8 @@ class InhibitionParameters(Parameters):
         'the robot stands again')
     caution: bool = parameter(
         True, 'whether a walking robot that is disturbed follows less of its command')
+    block_stop: bool = parameter(
+        True, 'whether a robot that makes no way although it walks waits for its feet, and stops')
     step_timing: bool = parameter(
         True, 'whether a robot that is pushed steps faster until it has its balance again')
 

@@ -56,11 +56,11 @@ def room(margins: Sequence[float] | None, leg_length: float, two_sided: float) -
     return min(margins) / (q * leg_length)
 
 
-def followed_share(share: float, left: float | None, dt: float) -> float:
-    """Share of the command after a tick of dt [s], in [LEAST, 1], from the one before and
-    :func:`room`.
+def followed_share(share: float, left: float | None, dt: float, most: float = 1.0) -> float:
+    """Share of the command after a tick of dt [s], in [LEAST, 1], from the one before,
+    :func:`room`, and the most that may be followed.
     """
-    regained = min(1.0, share + REGAIN * dt)
+    regained = min(most, share + REGAIN * dt)
     if left is None:
         return regained
     return min(regained, max(LEAST, (left - DISTURBED) / (EASY - DISTURBED)))

@@ -11,6 +11,9 @@
 - ``releasing``: a start is requested; the oscillators run up until they are phase-locked.
 - ``stepping``: a push has released the gait from a stop, which stays in force; it is on the spot
   (:mod:`~dmp_cpg_ros.core.inhibition.push_recovery`).
+
+A robot that makes no way although it walks requests a stop itself
+(:mod:`~dmp_cpg_ros.core.inhibition.blocked`).
 """
 
 from __future__ import annotations
@@ -21,9 +24,11 @@ from math import isfinite
 
 import numpy as np
 
+from dmp_cpg_ros.core.balance.progress import Progress
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, BlockState, block_step
 from dmp_cpg_ros.core.inhibition.caution import followed_share, room
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, PushState, push_step
@@ -99,6 +104,8 @@ class SupervisorState:
         Phase of fl at rest [rad].
     share, quickness : float
         Share of the command that the reference follows, and factor on the cadence.
+    block : BlockState
+        Whether the robot makes way, and whether it has stopped because it does not.
     """
 
     time_ns: int
@@ -119,6 +126,7 @@ class SupervisorState:
     rest_phase: float = 0.0
     share: float = 1.0
     quickness: float = 1.0
+    block: BlockState = NO_BLOCK
 
     @property
     def in_force(self) -> bool:
@@ -158,7 +166,8 @@ class GaitSupervisor:
         each leg of what was asked for and what was voted, once the reference is slow.
         """
         return Inhibition(state.in_force, self._gains(state, state.armed),
-                          self.parameters.region_radius, state.state == 'at_rest', state.automatic,
+                          self.parameters.region_radius, state.state == 'at_rest',
+                          state.automatic and not state.block.acts,
                           state.push.opposite, state.rest_phase, state.share, state.quickness)
 
     def _gains(self, state: SupervisorState, armed: bool) -> Array:
@@ -173,9 +182,11 @@ class GaitSupervisor:
         """Ask for a stop or a start; what is already asked changes nothing but its origin.
 
         A service call that asks for a start ends a stop by votes too, once nobody votes any more.
+        What an obstacle asked for is asked for by whoever asks next.
         """
         voted = state.voted and (stop or automatic or state.tally.alive)
-        state = replace_unchecked(state, asked=stop, automatic=automatic, voted=voted)
+        state = replace_unchecked(state, asked=stop, automatic=automatic, voted=voted,
+                                  block=NO_BLOCK)
         if state.push.acts and not (stop or voted):
             state = replace_unchecked(state, push=NO_PUSH, requested=True)
         return self._turned(state)
@@ -183,7 +194,8 @@ class GaitSupervisor:
     def step(self, state: SupervisorState, time_ns: int, network: GaitNetwork, x: Array,
              x_dot: Array, r: Array, command: tuple[float, float, float],
              tally: Tally | None = None, body_mode: str = 'standing',
-             margins: Sequence[float] | None = None) -> SupervisorState:
+             margins: Sequence[float] | None = None,
+             progress: Progress | None = None) -> SupervisorState:
         """Advance by one tick.
 
         Parameters
@@ -204,6 +216,8 @@ class GaitSupervisor:
             What the body does; in every mode but ``standing`` the gait is stopped.
         margins : sequence of four floats, optional
             Of the capture point in the support polygon, where they are known [m].
+        progress : Progress, optional
+            Of the body, where it is known.
         """
         dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
         gait, rates = network.gait, scalar_phase_rates(x, x_dot)
@@ -216,6 +230,7 @@ class GaitSupervisor:
             state = self._barred(state, body_mode)
         elif self.parameters.auto_inhibit:
             state = self._automatic(state, any(command))
+        state = self._blocked(state, r, command, progress, network, body_mode, dt)
         state = self._voted(state, tally or state.tally, network)
         state = self._pushed(state, network, x, margins, body_mode)
         quick, state = state.quickness > 1.0, self._balancing(state, margins, network, dt)
@@ -230,7 +245,7 @@ class GaitSupervisor:
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.two_sided)
         predicted = state.requested or state.state == 'releasing'
         cautious = p.caution and not (predicted or state.push.acts)
-        share = followed_share(state.share, left, dt) if cautious else 1.0
+        share = followed_share(state.share, left, dt, state.block.most) if cautious else 1.0
         free = p.step_timing and (state.push.acts or not predicted)
         quickness = quickened(state.quickness, left if free else None, dt)
         same = (share, quickness) == (state.share, state.quickness)
@@ -241,13 +256,33 @@ class GaitSupervisor:
         if commanded:
             if state.idle_ns >= 0:
                 state = replace_unchecked(state, idle_ns=-1)
-            return self.request(state, False, True) if state.asked and state.automatic else state
+            held = not state.automatic or state.block.acts
+            return self.request(state, False, True) if state.asked and not held else state
         if state.idle_ns < 0:
             state = replace_unchecked(state, idle_ns=state.time_ns)
         waited = (state.time_ns - state.idle_ns) * 1e-9
         if not state.asked and waited >= self.parameters.auto_delay:
             return self.request(state, True, True)
         return state
+
+    def _blocked(self, state: SupervisorState, r: Array, command: tuple[float, float, float],
+                 progress: Progress | None, network: GaitNetwork, body_mode: str, dt: float
+                 ) -> SupervisorState:
+        """Stop a walk that makes no way, and start again at a command that leads elsewhere."""
+        block = state.block
+        if block.acts:
+            if not any(command):
+                block = block._replace(ahead=(0.0, 0.0))
+                return replace_unchecked(state, block=block)
+            stays = block.leads_there(command) or not state.automatic or body_mode != 'standing'
+            return state if stays else self.request(state, False, True)
+        if not self.parameters.block_stop or state.requested or state.push.acts or (
+                state.state not in ('walking', 'free')):
+            return state if block is NO_BLOCK else replace_unchecked(state, block=NO_BLOCK)
+        block = block_step(block, r, state.share, progress, network.scale.leg_length, dt)
+        if block.acts:
+            state = self.request(state, True, True)
+        return replace_unchecked(state, block=block)
 
     def _voted(self, state: SupervisorState, tally: Tally, network: GaitNetwork
                ) -> SupervisorState:

@@ -238,7 +238,7 @@ class LegPrimitive:
              stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
         """Path of the foot for the corrected reference, higher after a stumble."""
         v_x, v_y, gamma = plus(reference, triple(feedback.correction.tolist()))
-        clearance = self.clearance + (self.stumble_lift if stumble.post_stumble else 0.0)
+        clearance = self.clearance + self.stumble_lift * stumble.lifts
         return FootPath(
             self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
 

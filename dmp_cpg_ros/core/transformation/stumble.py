@@ -15,7 +15,9 @@ the posture's feedback.
 
 A foot that tripped yields at once, so that it neither pushes the body back nor is wedged by
 friction, rises, and goes on when it is up. What comes too late in a swing to be cleared is cleared
-by the next ones: for ``POST_STUMBLE_SWINGS`` swings the foot steps as high from the start.
+by the next ones: for ``POST_STUMBLE_SWINGS`` swings the foot steps as high from the start. A foot
+that trips in one of them has met something higher, and steps higher again, up to ``HIGHEST``
+lifts.
 
 A foot that comes down on something high stands still as well, above its target. It yields, too,
 and its path comes back to the height of the others over the stance, so that it does not throw the
@@ -151,6 +153,9 @@ SLOWEST = 0.02
 POST_STUMBLE_SWINGS = 2
 """Swings after a stumble in which the foot steps higher from the start."""
 
+HIGHEST = 2
+"""Additional heights by which a foot steps higher that trips again and again."""
+
 
 class SwingProgress(NamedTuple):
     """How far a swinging foot has come, along the direction in which the body moves over it.
@@ -232,6 +237,8 @@ class Stumble(NamedTuple):
         Of the swinging foot at the last tick; None in stance.
     speed, sinking : float
         Its speed over the ground, and downwards in the base, followed [m/s].
+    lifts : int
+        Additional heights by which these swings are higher.
     """
 
     tripped: bool = False
@@ -244,6 +251,7 @@ class Stumble(NamedTuple):
     progress: SwingProgress | None = None
     speed: float = 0.0
     sinking: float = 0.0
+    lifts: int = 0
 
 
 def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, threshold: float,
@@ -274,7 +282,7 @@ def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, t
     last = before.progress
     if last is None:  # the foot has time to set off
         return Stumble(post_stumble=before.post_stumble, height=before.height,
-                       progress=progress, speed=progress.swing_speed)
+                       progress=progress, speed=progress.swing_speed, lifts=before.lifts)
     share = 1.0 - exp(-FOLLOWING * dt)
     moved = (progress.place - last.place) / dt + progress.body_speed
     speed = before.speed + share * (moved - before.speed)
@@ -297,7 +305,7 @@ def stumble_step(before: Stumble, progress: SwingProgress | None, lift: float, t
         height = max(0.0, height - GENTLENESS * lift * dt)
     compliant = landed or (tripped and not up)
     return Stumble(tripped, landed, compliant, before.post_stumble, up, height,
-                   (height - before.height) / dt, progress, speed, sinking)
+                   (height - before.height) / dt, progress, speed, sinking, before.lifts)
 
 
 def _in_stance(before: Stumble, lift: float, dt: float) -> Stumble:
@@ -305,10 +313,12 @@ def _in_stance(before: Stumble, lift: float, dt: float) -> Stumble:
     if before.progress is None and before.rate == 0.0:
         return before
     height = max(0.0, before.height - GENTLENESS * lift * dt)
-    post_stumble = before.post_stumble
+    post_stumble, lifts = before.post_stumble, before.lifts
     if before.progress is not None:
         post_stumble = POST_STUMBLE_SWINGS if before.tripped else max(0, post_stumble - 1)
-    return Stumble(post_stumble=post_stumble, height=height, rate=(height - before.height) / dt)
+        lifts = min(lifts + before.tripped, HIGHEST) if post_stumble else 0
+    return Stumble(post_stumble=post_stumble, height=height, rate=(height - before.height) / dt,
+                   lifts=lifts)
 
 
 def compliant_offset_rate(stumble: Stumble, offset_rate: Triple, velocity: Triple,

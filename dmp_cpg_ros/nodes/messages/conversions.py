@@ -22,6 +22,7 @@ from std_msgs.msg import String
 from dmp_cpg_ros import layouts
 from dmp_cpg_ros.core.balance.body_command import MODES, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
+from dmp_cpg_ros.core.balance.progress import Progress
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits, shares_of
@@ -48,7 +49,8 @@ _JOINTS = slice(0, len(JOINT_NAMES))
 _FEET = slice(_JOINTS.stop, _JOINTS.stop + len(layouts.SHIFT_ROWS))
 _BASE = slice(_FEET.stop, _FEET.stop + len(layouts.CORRECTION_ROWS))
 _MARGINS = slice(_BASE.stop, _BASE.stop + len(layouts.MARGIN_ROWS))
-_COMMAND = slice(_MARGINS.stop, None)
+_PROGRESS = slice(_MARGINS.stop, _MARGINS.stop + len(layouts.PROGRESS_ROWS))
+_COMMAND = slice(_PROGRESS.stop, None)
 
 
 def read_twist(message: Twist) -> tuple[float, float, float]:
@@ -268,6 +270,8 @@ class PostureFeedbackWriter:
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
         self._position[_MARGINS] = feedback.margins
+        velocity, behind = feedback.progress or Progress()
+        self._position[_PROGRESS] = (*velocity, behind)
         self._effort[_JOINTS] = feedback.torque
         self._effort[_FEET].reshape(len(LEGS), 3)[:, 2] = feedback.foot_force
         self._position[_COMMAND], self._velocity[_COMMAND] = layouts.command_rows(feedback.command)
@@ -288,7 +292,13 @@ class PostureFeedbackReader:
             effort[_JOINTS], position[_FEET].reshape(len(LEGS), 3),
             velocity[_FEET].reshape(len(LEGS), 3)[:, :2], velocity[_BASE],
             self._command.of(position[_COMMAND], velocity[_COMMAND]), position[_JOINTS],
-            effort[_FEET].reshape(len(LEGS), 3)[:, 2], tuple(position[_MARGINS].tolist()))
+            effort[_FEET].reshape(len(LEGS), 3)[:, 2], tuple(position[_MARGINS].tolist()),
+            _progress(position[_PROGRESS]))
+
+
+def _progress(row: Array) -> Progress:
+    x, y, behind = row.tolist()
+    return Progress((x, y), behind)
 
 
 class CommandReader:
@@ -317,12 +327,15 @@ class BodyReader:
     def __init__(self) -> None:
         """Prepare the order."""
         self._command = CommandReader()
-        self._margins = JointStateReader(layouts.MARGIN_ROWS, cdr.FIELDS[:1])
+        self._rows = JointStateReader(
+            (*layouts.MARGIN_ROWS, *layouts.PROGRESS_ROWS), cdr.FIELDS[:1])
 
-    def read(self, message: AnyJointState) -> tuple[str, tuple[float, ...]]:
-        """Mode of the body, and margins of the capture point [m]; raises DataError."""
-        (margins,) = self._margins.read(message)
-        return self._command.read(message).mode, tuple(margins.tolist())
+    def read(self, message: AnyJointState) -> tuple[str, tuple[float, ...], Progress]:
+        """Mode of the body, margins of the capture point [m], and progress; raises DataError."""
+        (rows,) = self._rows.read(message)
+        count = len(layouts.MARGIN_ROWS)
+        return (self._command.read(message).mode, tuple(rows[:count].tolist()),
+                _progress(rows[count:]))
 
 
 class InhibitionGainsWriter:

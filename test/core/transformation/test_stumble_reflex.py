@@ -14,6 +14,7 @@ from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, LegParameters, LegPrimitive, LegState
 from dmp_cpg_ros.core.transformation.stumble import (
     GENTLENESS,
+    HIGHEST,
     LATENCY,
     POST_STUMBLE_SWINGS,
     Stumble,
@@ -112,6 +113,14 @@ def test_the_swings_after_a_stumble_step_higher_and_then_no_more() -> None:
     period = round(first / TICK)
     counts = [states[(i + 1) * period - 2].post_stumble for i in range(POST_STUMBLE_SWINGS + 2)]
     assert counts == [*range(POST_STUMBLE_SWINGS, -1, -1), 0]
+
+
+def test_a_foot_that_trips_again_steps_higher_each_time_and_no_more_than_highest() -> None:
+    swing, swings = 0.2, HIGHEST + 2
+    states = walked(swing, riser(0.2), 1.0, swings=swings + POST_STUMBLE_SWINGS)
+    period = round(swing / (1.0 - DUTY) / TICK)
+    lifts = [states[(i + 1) * period - 2].lifts for i in range(swings)]
+    assert lifts == [min(i + 1, HIGHEST) for i in range(swings)]
 
 
 @pytest.mark.parametrize('height', (0.025, 0.04))

@@ -1,0 +1,200 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""A robot that makes no way although it walks waits for its feet and stops; nothing else does.
+
+But for the last test the robot only stands, and is told how its body comes ahead.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, pi, sin
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from limbless import NO_FEEDBACK
+from test_core_supervisor import ROBOT, TICK, Run, walking
+from test_push_recovery import ahead
+
+from dmp_cpg_ros.core.balance.controller import (
+    PostureController,
+    PostureFeedback,
+    PostureParameters,
+    PostureState,
+)
+from dmp_cpg_ros.core.balance.progress import Progress, feet_behind
+from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.inhibition.blocked import (
+    BRISK,
+    FIRM,
+    HELD,
+    NO_BLOCK,
+    PATIENCE,
+    PINNED,
+    SLOW,
+    STEP,
+    block_step,
+)
+from dmp_cpg_ros.core.inhibition.caution import LEAST
+from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.robot_model.world import Steps
+from dmp_cpg_ros.studies.walking_trials import Walk
+
+LENGTH = 0.28
+FROUDE = (GRAVITY * LENGTH) ** 0.5
+STUCK = Progress()
+
+
+class Told(PostureController):
+    """Knows nothing but how the body comes ahead."""
+
+    progress: Progress | None = STUCK
+
+    def step(self, memory: PostureState, *_: object) -> tuple[PostureState, PostureFeedback]:
+        return memory, replace(NO_FEEDBACK, progress=self.progress)
+
+
+def told(run: Run, progress: Progress | None = STUCK) -> Told:
+    run.loop.body.posture = posture = Told(ROBOT, PostureParameters())
+    posture.progress = progress
+    return posture
+
+
+def blocked(**changes: object) -> Run:
+    run = walking(**changes)
+    told(run)
+    run.until('waiting')
+    return run
+
+
+def test_a_body_that_makes_no_way_stops_as_predicted_and_stays() -> None:
+    run = walking()
+    told(run)
+    length = run.loop.canonical.scale.leg_length
+    patience = PATIENCE * length / (BRISK * (GRAVITY * length) ** 0.5)
+    assert run.until('waiting') == pytest.approx(patience, rel=0.02)
+    assert run.loop.stop.block.acts and run.loop.inhibition.requested
+    assert not run.loop.inhibition.automatic
+    predicted, bound = ahead(run.loop), run.loop.time_to_rest()
+    assert run.until('at_rest') == pytest.approx(predicted) and predicted <= bound
+    run.go(4.0)
+    assert run.words()[-1] == 'at_rest' and run.loop.stop.block.acts
+
+
+@pytest.mark.parametrize('command', [(-0.3, 0.0, 0.0), (0.0, 0.0, 0.5), (0.1, 0.3, 0.0)])
+@pytest.mark.parametrize('auto', [True, False])
+def test_a_command_that_leads_elsewhere_starts_it(command: tuple[float, float, float],
+                                                  auto: bool) -> None:
+    run = blocked(inhibition=InhibitionParameters(auto_inhibit=auto, start_inhibited=False))
+    run.until('at_rest')
+    run.loop.command(0.3, 0.1)
+    run.go(0.2)
+    assert run.loop.stop.state == 'at_rest'
+    run.loop.command(*command)
+    run.until('walking')
+    assert not run.loop.stop.block.acts
+
+
+def test_the_service_starts_it_at_the_same_command_and_it_is_found_again() -> None:
+    run = blocked()
+    run.until('at_rest')
+    run.loop.request(False)
+    run.until('walking')
+    run.until('waiting')
+    assert run.loop.stop.block.acts
+
+
+def test_any_command_starts_it_after_a_zero_command() -> None:
+    run = blocked()
+    run.until('at_rest')
+    run.loop.command(0.0)
+    run.go(0.1)
+    assert run.loop.stop.state == 'at_rest'
+    run.loop.command(0.5)
+    run.until('walking')
+
+
+def test_a_stop_that_the_service_asks_for_is_its_own() -> None:
+    run = blocked()
+    run.loop.request(True)
+    run.loop.command(-0.3)
+    run.until('at_rest')
+    run.go(0.5)
+    assert run.loop.stop.state == 'at_rest' and not run.loop.stop.block.acts
+
+
+def test_without_block_stop_or_knowledge_it_walks_on() -> None:
+    for run, progress in ((walking(inhibition=InhibitionParameters(block_stop=False)), STUCK),
+                          (walking(), None)):
+        told(run, progress)
+        run.go(6.0)
+        assert run.loop.stop.state == 'walking' and run.loop.stop.block is NO_BLOCK
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(SLOW, 1.5), st.floats(LEAST, 1.0), st.floats(-pi, pi), st.floats(1.1, 10.0))
+def test_no_body_is_blocked_that_makes_a_step_in_its_time(speed: float, share: float, angle: float,
+                                                          hurry: float) -> None:
+    """Whatever is asked: it makes ``STEP`` before ``PATIENCE`` is over."""
+    asked = min(speed, BRISK) * FROUDE
+    rate = hurry * asked * STEP / PATIENCE
+    heading = np.array((cos(angle), sin(angle)))
+    r = np.array((*(heading * speed * share * FROUDE), 0.3))
+    state, progress = NO_BLOCK, Progress(tuple((rate * heading).tolist()), 0.5 * HELD * LENGTH)
+    for _ in range(1500):
+        state = block_step(state, r, share, progress, LENGTH, 0.02)
+        assert not state.acts and state.most == 1.0
+
+
+def test_a_body_waits_for_feet_that_are_held_and_stops_when_they_stay_so() -> None:
+    r, going = np.array((0.5, 0.0, 0.0)), (0.3, 0.0)
+    most = []
+    for behind in np.linspace(HELD, PINNED + 0.2, 20):
+        state = NO_BLOCK
+        for _ in range(200):
+            state = block_step(state, r, 1.0, Progress(going, float(behind) * LENGTH), LENGTH,
+                               TICK)
+        most.append(state.most)
+    assert np.all(np.diff(most) <= 1e-12) and (most[0], most[-1]) == (1.0, LEAST)
+    state, held = NO_BLOCK, Progress(going, (PINNED + 0.2) * LENGTH)
+    ticks = 0
+    while not state.acts:
+        state, ticks = block_step(state, r, 1.0, held, LENGTH, TICK), ticks + 1
+    assert ticks * TICK * BRISK * FROUDE == pytest.approx(FIRM * LENGTH, rel=0.1)
+
+
+@pytest.mark.parametrize('velocity', [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.4), (0.3, -0.2)])
+def test_feet_on_their_way_are_not_behind_and_held_ones_are_as_far_as_they_are(
+        velocity: tuple[float, float]) -> None:
+    holds = [(0.2, 0.1, -0.3), (0.2, -0.1, -0.3), (-0.2, 0.1, -0.3), (-0.2, -0.1, -0.3)]
+    duty, omega, beside = 0.7, 9.0, (0.02, -0.01)
+    along = np.array(velocity) / np.hypot(*velocity)
+    for phase in np.linspace(0.0, 1.0, 17):
+        places = [(phase + k / 4 + 0.5) % 1.0 - 0.5 for k in range(4)]
+        feet = []
+        for hold, at in zip(holds, places, strict=True):
+            since = (at - 0.5 if at > 0 else at + 0.5) * 2.0 * pi / omega
+            feet.append((hold[0] + beside[0] - velocity[0] * since,
+                         hold[1] + beside[1] - velocity[1] * since, hold[2]))
+        assert feet_behind(velocity, beside, feet, holds, places, duty, omega) == pytest.approx(
+            0.0, abs=1e-12)
+        leading = [np.dot(along, hold[:2]) > 0.0 for hold in holds]
+        held = [(x - 0.05 * along[0] * leads, y - 0.05 * along[1] * leads, z)
+                for (x, y, z), leads in zip(feet, leading, strict=True)]
+        stands = any(leads and abs(at) >= 0.5 * (1.0 - duty)
+                     for leads, at in zip(leading, places, strict=True))
+        assert feet_behind(velocity, beside, held, holds, places, duty, omega) == pytest.approx(
+            0.05 * stands, abs=1e-12)
+
+
+def test_before_a_block_it_stands_and_walks_away() -> None:
+    run = Walk('trot', None, Steps(height=0.25, platform=4.0), 5)
+    run.loop.command(0.5)
+    assert run.walk(7.5)
+    assert run.loop.stop.block.acts and run.loop.stop.state in ('captured', 'at_rest', 'waiting')
+    place = run.state.base_position_in_world[0]
+    run.loop.command(-0.3)
+    assert run.walk(3.0)
+    assert place - run.state.base_position_in_world[0] > 0.3
