@@ -28,7 +28,8 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import RunningGait, limiting_gaits
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition.voters import vote_sensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting

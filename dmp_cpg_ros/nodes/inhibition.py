@@ -21,7 +21,8 @@ from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.handover import adopted
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition.voters import VoteSensors
 from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.inhibition.voting import Voting

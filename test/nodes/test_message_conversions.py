@@ -23,10 +23,10 @@ from std_msgs.msg import String
 
 from dmp_cpg_ros.core.balance.body_command import BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
-from dmp_cpg_ros.core.balance.progress import Progress
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
+from dmp_cpg_ros.core.inhibition.caution import Progress
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets, RobotState
 from dmp_cpg_ros.nodes.messages.cdr import Serialized
 from dmp_cpg_ros.nodes.messages.conversions import (

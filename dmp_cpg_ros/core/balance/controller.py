@@ -24,12 +24,13 @@ from dmp_cpg_ros.core.balance.corrections import MassOffset, VelocityCorrection
 from dmp_cpg_ros.core.balance.footholds import FootPlacement, Pair, ground_from_base, lean
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.balance.progress import Progress, feet_behind
+from dmp_cpg_ros.core.balance.progress import feet_behind
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
 from dmp_cpg_ros.core.gait.contact_feedback import believed
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.inhibition.caution import Progress
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple

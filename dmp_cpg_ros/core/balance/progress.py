@@ -1,12 +1,11 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the body comes ahead, as its own joints and sensors tell."""
+"""How far the feet that lead the way are behind, which an obstacle holds up."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import hypot, pi
-from typing import NamedTuple
 
 from dmp_cpg_ros.core.maths.vec3 import Triple
 
@@ -14,22 +13,6 @@ Pair = tuple[float, float]
 
 SLOWEST = 0.02
 """Speed below which no foot is ahead of the others [m/s]."""
-
-
-class Progress(NamedTuple):
-    """How the body comes ahead.
-
-    Attributes
-    ----------
-    velocity : tuple of float
-        Of the body over the ground, ahead and to the left, less its planned sway [m/s].
-    behind : float
-        How far the feet that lead the way stand behind where the gait has them [m]; negative
-        where they are ahead of it, 0 where none of them stands.
-    """
-
-    velocity: Pair = (0.0, 0.0)
-    behind: float = 0.0
 
 
 def feet_behind(planned: Pair, beside: Pair, feet: Sequence[Triple],

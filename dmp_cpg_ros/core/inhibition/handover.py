@@ -8,7 +8,8 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import LEGS
 

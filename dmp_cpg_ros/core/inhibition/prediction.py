@@ -17,7 +17,8 @@ from typing import NamedTuple
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.gait.running import CanonicalState, RunningGait
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.transformation.foot_path import swing_height

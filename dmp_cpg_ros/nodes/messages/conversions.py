@@ -22,11 +22,11 @@ from std_msgs.msg import String
 from dmp_cpg_ros import layouts
 from dmp_cpg_ros.core.balance.body_command import MODES, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
-from dmp_cpg_ros.core.balance.progress import Progress
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.transition import GaitInForce
+from dmp_cpg_ros.core.inhibition.caution import Progress
 from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.parameters import range_of

@@ -14,7 +14,8 @@ from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor, SupervisorState
+from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
+from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
 from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.reference.stop_distance import slowing_time, stop_distance

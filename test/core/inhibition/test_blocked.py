@@ -24,20 +24,21 @@ from dmp_cpg_ros.core.balance.controller import (
     PostureParameters,
     PostureState,
 )
-from dmp_cpg_ros.core.balance.progress import Progress, feet_behind
+from dmp_cpg_ros.core.balance.progress import feet_behind
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.inhibition.blocked import (
+from dmp_cpg_ros.core.inhibition.caution import (
     BRISK,
     FIRM,
     HELD,
+    LEAST,
     NO_BLOCK,
     PATIENCE,
     PINNED,
     SLOW,
     STEP,
+    Progress,
     block_step,
 )
-from dmp_cpg_ros.core.inhibition.caution import LEAST
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.world import Steps
 from dmp_cpg_ros.studies.walking_trials import Walk
