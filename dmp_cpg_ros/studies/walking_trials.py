@@ -500,8 +500,8 @@ def obstacle(gait: str, height: float, seed: int, speed: float = 0.5, robot: str
     """Walk at a step of some height [m] with a platform behind it, within a tenth of a speed
     [m/s]; after a stop, wait for rest and walk back.
     """
-    draw = np.random.default_rng(seed)
-    run = Walk(gait, robot, Steps(height=height, platform=4.0), seed + 1)
+    draw = np.random.default_rng(3000 + seed)
+    run = Walk(gait, robot, Steps(height=height, platform=4.0), 3000 + seed)
     run.walk(draw.uniform(0.0, 0.5))
     run.loop.command(speed * float(draw.uniform(0.9, 1.1)))
     begin = run.state.time_ns

@@ -20,8 +20,10 @@ A walk may also come to an obstacle that it does not cross. Nothing is seen: wha
 is that it does not come ahead although its legs walk (:class:`Progress`).
 
 - **Held.** The feet that lead the way come down short of their places, because something holds
-  them up, and the body that goes on would fall over them. Beyond ``HELD`` lengths of the leg less
-  of the command is followed, down to the least at ``PINNED``: the body waits for its feet.
+  them up, and the body that goes on would fall over them. Where it comes on with less than
+  ``SLUGGISH`` of the speed that is asked for, and the feet are behind beyond ``HELD`` lengths of
+  the leg, less of the command is followed, down to the least at ``PINNED``: the body waits for its
+  feet.
 - **Blocked.** While it is asked to go at speed u, the body's way along the reference grows by
   ``STEP`` l again and again. Where it has not come farther than it once was while it was to go
   ``PATIENCE`` l, with u up to ``BRISK`` √(g l) counted, it is blocked: a stop is requested as the
@@ -94,7 +96,12 @@ only setting off is behind.
 FASTER = 0.1
 
 MEAN = 15.0
-"""Rate at which the mean of what the feet are behind follows [1/s]."""
+"""Rate at which the means of what the feet are behind, and of the speed, follow [1/s]."""
+
+SLUGGISH = 0.6
+"""Share of the speed that is asked for beyond which the feet are not held: a body that runs ahead
+downhill leaves its feet behind, too.
+"""
 
 STEP = 0.4
 """Way that counts as having come ahead, in lengths of the leg."""
@@ -153,6 +160,8 @@ class BlockState(NamedTuple):
         Most of the command that a body with these feet may follow, in [LEAST, 1].
     pinned : float
         Way asked for while the leading feet were held, less that while they were not [m].
+    comes : float
+        Speed along the reference, in the mean [m/s].
     """
 
     acts: bool = False
@@ -162,6 +171,7 @@ class BlockState(NamedTuple):
     behind: float = 0.0
     most: float = 1.0
     pinned: float = 0.0
+    comes: float = 0.0
 
     def leads_there(self, command: tuple[float, float, float]) -> bool:
         """Whether a command (v_x, v_y, γ) leads to the obstacle."""
@@ -173,7 +183,7 @@ class BlockState(NamedTuple):
 NO_BLOCK = BlockState()
 
 
-def block_step(state: BlockState, r: Array, share: float, progress: Progress | None,
+def block_step(state: BlockState, r: Array, wanted: float, progress: Progress | None,
                leg_length: float, dt: float) -> BlockState:
     """Advance by one tick of a walk.
 
@@ -183,8 +193,8 @@ def block_step(state: BlockState, r: Array, share: float, progress: Progress | N
         After the last tick.
     r : ndarray (3,)
         Reference v_x, v_y [m/s], γ [rad/s].
-    share : float
-        Of the command that the reference follows, in (0, 1].
+    wanted : float
+        Speed that is asked for, of which the reference may follow a share [m/s].
     progress : Progress or None
         Of the body, where it is known.
     leg_length : float
@@ -194,17 +204,20 @@ def block_step(state: BlockState, r: Array, share: float, progress: Progress | N
     """
     v_x, v_y, _ = r.tolist()
     speed, froude = hypot(v_x, v_y), (GRAVITY * leg_length) ** 0.5
-    if progress is None or speed < SLOW * froude * share:
+    if progress is None or wanted < SLOW * froude or speed == 0.0:
         return NO_BLOCK
-    behind = progress.behind + (state.behind - progress.behind) * exp(-MEAN * dt)
-    ahead_x, ahead_y = ahead = v_x / speed, v_y / speed
-    made = state.made + dt * (progress.velocity[0] * ahead_x + progress.velocity[1] * ahead_y)
-    due = dt * min(speed / share, BRISK * froude)
+    kept, ahead = exp(-MEAN * dt), (v_x / speed, v_y / speed)
+    comes = progress.velocity[0] * ahead[0] + progress.velocity[1] * ahead[1]
+    behind = progress.behind + (state.behind - progress.behind) * kept
+    comes_on = comes + (state.comes - comes) * kept
+    made, due = state.made + dt * comes, dt * min(wanted, BRISK * froude)
     asked = state.asked + due
     if made > STEP * leg_length:
         made = asked = 0.0
     far = behind / leg_length - FASTER * speed / froude
-    held = min(1.0, max(LEAST, (PINNED - far) / (PINNED - HELD)))
+    if comes_on > SLUGGISH * wanted:
+        far = 0.0
+    most = min(1.0, max(LEAST, (PINNED - far) / (PINNED - HELD)))
     pinned = max(0.0, state.pinned + (due if far > HELD else -due))
     blocked = asked > PATIENCE * leg_length or pinned > FIRM * leg_length
-    return BlockState(blocked, ahead, made, asked, behind, held, pinned)
+    return BlockState(blocked, ahead, made, asked, behind, most, pinned, comes_on)

@@ -19,7 +19,7 @@ A robot that makes no way although it walks requests a stop itself
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
+from math import hypot, isfinite
 
 import numpy as np
 
@@ -212,7 +212,8 @@ class GaitSupervisor:
         if not self.parameters.block_stop or state.requested or state.push.acts or (
                 state.state not in ('walking', 'free')):
             return state if block is NO_BLOCK else replace_unchecked(state, block=NO_BLOCK)
-        block = block_step(block, r, state.share, progress, network.scale.leg_length, dt)
+        wanted = min(hypot(r[0], r[1]) / state.share, hypot(command[0], command[1]))
+        block = block_step(block, r, wanted, progress, network.scale.leg_length, dt)
         if block.acts:
             state = self.request(state, True, True)
         return replace_unchecked(state, block=block)

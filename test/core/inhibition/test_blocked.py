@@ -35,6 +35,7 @@ from dmp_cpg_ros.core.inhibition.caution import (
     PATIENCE,
     PINNED,
     SLOW,
+    SLUGGISH,
     STEP,
     Progress,
     block_step,
@@ -142,28 +143,36 @@ def test_no_body_is_blocked_that_makes_a_step_in_its_time(speed: float, share: f
     asked = min(speed, BRISK) * FROUDE
     rate = hurry * asked * STEP / PATIENCE
     heading = np.array((cos(angle), sin(angle)))
-    r = np.array((*(heading * speed * share * FROUDE), 0.3))
+    wanted, r = speed * FROUDE, np.array((*(heading * speed * share * FROUDE), 0.3))
     state, progress = NO_BLOCK, Progress(tuple((rate * heading).tolist()), 0.5 * HELD * LENGTH)
     for _ in range(1500):
-        state = block_step(state, r, share, progress, LENGTH, 0.02)
+        state = block_step(state, r, wanted, progress, LENGTH, 0.02)
         assert not state.acts and state.most == 1.0
 
 
 def test_a_body_waits_for_feet_that_are_held_and_stops_when_they_stay_so() -> None:
-    r, going = np.array((0.5, 0.0, 0.0)), (0.3, 0.0)
+    r, going = np.array((0.5, 0.0, 0.0)), (0.9 * SLUGGISH * 0.5, 0.0)
     most = []
     for behind in np.linspace(HELD, PINNED + 0.2, 20):
         state = NO_BLOCK
         for _ in range(200):
-            state = block_step(state, r, 1.0, Progress(going, float(behind) * LENGTH), LENGTH,
+            state = block_step(state, r, 0.5, Progress(going, float(behind) * LENGTH), LENGTH,
                                TICK)
         most.append(state.most)
     assert np.all(np.diff(most) <= 1e-12) and (most[0], most[-1]) == (1.0, LEAST)
     state, held = NO_BLOCK, Progress(going, (PINNED + 0.2) * LENGTH)
     ticks = 0
     while not state.acts:
-        state, ticks = block_step(state, r, 1.0, held, LENGTH, TICK), ticks + 1
+        state, ticks = block_step(state, r, 0.5, held, LENGTH, TICK), ticks + 1
     assert ticks * TICK * BRISK * FROUDE == pytest.approx(FIRM * LENGTH, rel=0.1)
+
+
+def test_a_body_that_runs_ahead_of_its_feet_is_not_held() -> None:
+    r, state = np.array((0.5, 0.0, 0.0)), NO_BLOCK
+    for _ in range(500):
+        state = block_step(state, r, 0.5, Progress((0.45, 0.0), PINNED * LENGTH), LENGTH, TICK)
+        assert state.pinned == 0.0 or state.comes < SLUGGISH * 0.5
+    assert state.most == 1.0 and not state.acts
 
 
 @pytest.mark.parametrize('velocity', [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.4), (0.3, -0.2)])
