@@ -15,7 +15,8 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -30,18 +31,14 @@ from dmp_cpg_ros.core.contraction.capture import capture_set, place_tolerance, r
 from dmp_cpg_ros.core.contraction.delays import Capture
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.paper.carried_slowly import slowly_carried_margin
 from dmp_cpg_ros.studies.output import markdown_table
 
 Complex = NDArray[np.complex128]
 
-def steady_margin(capture: Capture) -> float:
-    """What is certified for states that are carried on while ω stands still [s]."""
-    return delays.carried_margin(replace(capture, omega_rate=0.0))
-
-
 MARGINS: dict[str, Callable[[Capture], float]] = {
     'late': delays.late_margin, 'held': delays.held_margin, 'carried': delays.carried_margin,
-    'steady': steady_margin}
+    'steady': partial(slowly_carried_margin, omega_rate=0.0)}
 """Kinds of delay, and what is certified: ``carried`` for an ω that may jump, ``steady`` for one
 that stands still."""
 
