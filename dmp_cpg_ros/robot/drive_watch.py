@@ -76,12 +76,11 @@ class DriveWatch:
         self._goes = np.zeros(len(self._names))  # velocities that the drives still follow
         self._told_ns = 0
         self._reports = False
-        # τ*² and τ τ* over squared limits, of the drive law without and with the joints' friction
-        self._seen = np.zeros((2, 2, len(self._names)))
         self._failed_ns = np.full(len(self._names), -WELL_NS)
         self.failing: tuple[str, ...] = ()
-        self._means = np.zeros((4, len(self._names)))  # of τ* (both laws), friction, τ
-        self._legs = np.zeros((5, len(LEGS)))  # of τ*², τ τ* (both laws), τ², q̇² in each leg
+        # Means over squared limits: τ* by both laws, friction, τ; τ*² by both (the second first),
+        # τ τ* by both, τ², q̇².
+        self._means, self._news = np.zeros((2, 10, len(self._names)))
         self._strange_ns = np.full(len(LEGS), -STRANGE_NS)
         self._limp_ns = -WELL_NS
         self.limp = False
@@ -98,21 +97,21 @@ class DriveWatch:
         now, told = state.time_ns, self._told
         after_ns = now - self._told_ns
         if told is None or not 0 < after_ns <= LONGEST_NS:
-            self._seen = np.zeros_like(self._seen)
+            self._means = np.zeros_like(self._means)
             return
         dt, q, q_dot = 1e-9 * after_ns, state.joint_position, state.joint_velocity
         position, velocity, effort = told
         plain = (self._kp * (position + dt * velocity - q) + self._kd * (self._goes - q_dot)
                  + effort)
-        asked = np.array([self._limited(torque, q_dot) for torque in (
-            plain, plain + self._damping * self._goes)]) / self._limit
-        given, fade = state.joint_effort / self._limit, exp(-dt / MEMORY_S)
-        news = np.array((asked * asked, asked * given))
-        self._seen = fade * self._seen + (1.0 - fade) * news
-        self._means = fade * self._means + (1.0 - fade) * np.array(
-            (*asked, self._damping * q_dot / self._limit, given))
-        self._watch_legs(now, fade, news, given, q_dot)
-        power, shared = self._seen
+        news, given, fade = self._news, state.joint_effort / self._limit, exp(-dt / MEMORY_S)
+        news[0], news[1] = plain, plain + self._damping * self._goes
+        asked = self._limited(news[:2], q_dot) / self._limit
+        news[:2], news[2], news[3] = asked, self._damping * q_dot / self._limit, given
+        news[5:3:-1] = asked * asked
+        news[6:8], news[8], news[9] = asked * given, given * given, q_dot * q_dot
+        self._means = fade * self._means + (1.0 - fade) * news
+        self._watch_legs(now)
+        power, shared = self._means[5:3:-1], self._means[6:8]
         much = power > MUCH * MUCH
         if not self._reports:
             self._reports = bool((much & (shared > WORKS * power)).any())
@@ -125,17 +124,14 @@ class DriveWatch:
         lately = now - self._failed_ns < WELL_NS
         self.failing = tuple(name for name, of in zip(self._names, lately, strict=True) if of)
 
-    def _watch_legs(self, now: int, fade: float, news: Array, given: Array, q_dot: Array) -> None:
+    def _watch_legs(self, now: int) -> None:
         """Judge whether a leg moves without any torque."""
-        power, shared = news
-        squares = np.array((power[0], *shared, given * given, q_dot * q_dot))
-        added = squares.reshape(len(squares), len(LEGS), -1).sum(axis=2)
-        self._legs = legs = fade * self._legs + (1.0 - fade) * added
-        asked, reported, moves = legs[0], legs[3], legs[4]
-        explained = np.maximum(legs[1:3].max(axis=0), 0.0)
-        *laws, friction, mean = self._means
-        low = np.minimum(np.minimum(*laws), 0.0) + np.minimum(friction, 0.0)
-        high = np.maximum(np.maximum(*laws), 0.0) + np.maximum(friction, 0.0)
+        means = self._means
+        asked, *shared, reported, moves = means[5:].reshape(5, len(LEGS), -1).sum(axis=2)
+        explained = np.maximum(np.maximum(*shared), 0.0)
+        first, second, friction, mean = means[:4]
+        low = np.minimum(np.minimum(first, second), 0.0) + np.minimum(friction, 0.0)
+        high = np.maximum(np.maximum(first, second), 0.0) + np.maximum(friction, 0.0)
         unasked = mean - np.minimum(np.maximum(mean, low), high)
         strange = (unasked * unasked).reshape(len(LEGS), -1).sum(axis=1)
         self._strange_ns = np.where(strange > STRANGE * STRANGE, now, self._strange_ns)

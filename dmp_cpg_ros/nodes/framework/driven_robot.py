@@ -82,9 +82,9 @@ class DrivenRobot(SuiteNode):
         if not failing:
             self.clear('joints')
             return
+        limp = '; the robot lowers itself onto its belly' if self._guard.drives.limp else ''
         self.warn('joints', f'joint {", ".join(failing)} does not follow: the torque that its '
-                  'drive reports is not what its targets ask for; the robot lowers itself onto '
-                  'its belly', error=True)
+                  f'drive reports is not what its targets ask for{limp}', error=True)
 
     def tell_drive(self, fallback: str) -> None:
         """Say whether the joints follow the legs, or what the robot does by itself."""
