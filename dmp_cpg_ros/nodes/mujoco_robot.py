@@ -328,6 +328,11 @@ class MujocoRobotNode(DrivenRobot):
     # Inside --------------------------------------------------------------------------------------
 
     @property
+    def has_drives(self) -> bool:
+        """Joints that are exactly where they are told to be need none."""
+        return self._options.physics == 'mujoco'
+
+    @property
     def _file(self) -> Path:
         return find_config(self.parameters_of(core.RobotFileParameters).robot)
 

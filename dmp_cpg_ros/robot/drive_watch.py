@@ -60,6 +60,8 @@ class DriveWatch:
 
     Attributes
     ----------
+    watches : bool
+        Whether there are drives that can be judged.
     failing : tuple of str
         Joints, by the robot's names, that do not follow or did not lately.
     limp : bool
@@ -76,6 +78,7 @@ class DriveWatch:
         self._goes = np.zeros(len(self._names))  # velocities that the drives still follow
         self._told_ns = 0
         self._reports = False
+        self.watches = True
         self._failed_ns = np.full(len(self._names), -WELL_NS)
         self.failing: tuple[str, ...] = ()
         # Means over squared limits: τ* by both laws, friction, τ; τ*² by both (the second first),
@@ -96,6 +99,8 @@ class DriveWatch:
         """Judge what the joints have made of it."""
         now, told = state.time_ns, self._told
         after_ns = now - self._told_ns
+        if not self.watches:
+            return
         if told is None or not 0 < after_ns <= LONGEST_NS:
             self._means = np.zeros_like(self._means)
             return

@@ -35,7 +35,7 @@ ROBOT = quadruped()
 def recording() -> Recording:
     loop = WalkingLoop(ROBOT, GAITS['amble'], SuiteParameters(
         ReferenceParameters(cmd_vel_timeout=0.0),
-        inhibition=InhibitionParameters(start_inhibited=False)), GAITS)
+        inhibition=InhibitionParameters(start_inhibited=False, block_stop=False)), GAITS)
     loop.command(0.5)
     states, ticks = [], []
     for k in range(round(9.0 / TICK)):

@@ -21,6 +21,8 @@ from ros_processes import SHARED_HZ, NodeProcess, Processes
 
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import tilt
+from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION
+from dmp_cpg_ros.suite_table import PROCESSES
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
@@ -76,26 +78,11 @@ def test_in_lock_step_the_walk_goes_on_as_if_nobody_had_died(
         'gait']['phase_error_rad_max'] < 0.05
 
 
-@pytest.mark.parametrize('node', ['canonical_oscillators', 'inhibition'])
-def test_a_stop_outlives_any_process_of_blocks(
-        processes: Processes, tmp_path: Path, node: str) -> None:
-    """Under a command that would start a gait that nobody has stopped."""
-    file = tmp_path / 'stopped.yaml'
-    file.write_text(json.dumps({'name': 'stopped', 'duration': 9.0, 'events': [
-        {'at': 0.3, 'command': {'v_x': 0.4}}, {'at': 1.5, 'inhibit': True},
-        {'at': 7.0, 'inhibit': False}]}), encoding='utf-8')
-    out = tmp_path / 'run'
-    process = processes.executable(
-        'walk', str(file), '--no-report', '--out', str(out), '--lock-step', '--respawn',
-        '--processes', 'blocks', '--rate', str(SHARED_HZ))
-    process.wait_for_output(r's +at rest\n(.*\n)*.*s +at rest', RUN_S)
-    send(process, node, signal.SIGKILL)
-    process.wait_for_output(AGAIN, RUN_S)
-    assert process.wait(RUN_S) == 0, str(process)
-    odometry = load_recording(out).odometry
-    speed = np.linalg.norm(odometry.velocity_in_base[:, :2], axis=1)
-    stopped = (odometry.time > 3.5) & (odometry.time < 7.0)
-    assert speed[stopped].max() < 0.05 and speed[odometry.time > 8.5].mean() > 0.3
+def test_who_knows_of_a_stop_is_not_all_in_one_process() -> None:
+    """What acts is told by the oscillators to a restarted inhibition, and the other way round."""
+    for processes in (PROCESSES['each'], PROCESSES['blocks']):
+        (knows,) = (nodes for nodes in processes.values() if INHIBITION in nodes)
+        assert CANONICAL not in knows
 
 
 @pytest.mark.parametrize('node', ['canonical_oscillators', 'inhibition'])

@@ -51,8 +51,9 @@ def watching(ros: Ros, acting: Inhibition | None) -> tuple[InhibitionNode, int]:
     if acting is not None:
         node._find(acting)
     for _ in range(30):
-        node.on_tick(state.time_ns, {'canonical_state': (tick.x, tick.x_dot, tick.gait),
-                                     'reference': tick.r, 'posture_feedback': ('standing', None)})
+        node.on_tick(state.time_ns, {
+            'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r,
+            'posture_feedback': ('standing', None, None)})
     return node, state.time_ns
 
 

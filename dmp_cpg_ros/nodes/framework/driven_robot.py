@@ -47,6 +47,12 @@ class DrivenRobot(SuiteNode):
         p = self._drive_options
         self._guard = CommandWatchdog(self._description, round(p.target_timeout * 1e9),
                                       round(p.target_lead * 1e9))
+        self._guard.drives.watches = self.has_drives
+
+    @property
+    def has_drives(self) -> bool:
+        """Whether something moves the joints whose torques tell how it does."""
+        return True
 
     def leg_of(self, joint: str) -> str:
         """Leg of a joint by the robot's names."""
