@@ -129,6 +129,24 @@ def test_a_second_signal_does_not_break_into_the_end_of_a_recording(
     assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
 
 
+def test_a_middleware_that_does_not_end_is_ended_after_the_recording(
+        processes: Processes, tmp_path: Path) -> None:
+    program = (
+        'import sys, threading\n'
+        'from dmp_cpg_ros.nodes.bag_recorder import BagRecorder\n'
+        'from dmp_cpg_ros.nodes.framework import execution\n'
+        'execution.TORN_DOWN_S = 0.5\n'
+        'BagRecorder.destroy_node = lambda node: threading.Event().wait()\n'
+        "sys.exit(execution.run_node('bag_recorder'))\n")
+    process = processes.python(
+        '-c', program, '--ros-args', '-p', f'output:={tmp_path / "bag"}')
+    process.wait_for_output('active')
+    process.signal(signal.SIGTERM)
+    assert process.wait() == 1, str(process)
+    assert 'most recent call first' in process.output, process
+    assert (tmp_path / 'bag' / 'metadata.yaml').is_file()
+
+
 def test_a_killed_recorder_leaves_what_it_had_flushed(
     processes: Processes, ros: Ros, tmp_path: Path) -> None:
     joints = publisher(ros, 'joint_states')

@@ -11,6 +11,7 @@ sleeps. The policy needs no privilege and changes nobody's share of the processo
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import gc
 import os
 import signal
@@ -116,6 +117,11 @@ FOREVER_S = 1e6
 
 YOUNG_OBJECTS = 20_000
 """New objects after which the garbage collector looks for cycles; Python's own figure is 700."""
+
+TORN_DOWN_S, ENDED_S = 10.0, 120.0
+"""What the middleware may take to end, once a node has completed what it does, and all of an end
+since the signal for it [s]. Seldom, once in some thousand ends, a process waits there for ever.
+"""
 
 OK, FAILED, BAD_INPUT = 0, 1, 2
 """Exit statuses."""
@@ -227,9 +233,18 @@ def run_nodes(program: str, arguments: Sequence[str],
     until = _first_signal()
     status = _status(program, lambda: _run(program, arguments, make, nodes, until))
     for node in nodes:
-        status = max(status, _status(program, node.close), _status(program, node.destroy_node))
+        status = max(status, _status(program, node.close))
+        _end_within(TORN_DOWN_S)
+        status = max(status, _status(program, node.destroy_node))
     rclpy.try_shutdown()
     return status
+
+
+def _end_within(seconds: float) -> None:
+    """End the process at the latest after a time, saying where its threads are, whoever holds
+    Python's lock then.
+    """
+    faulthandler.dump_traceback_later(seconds, exit=True, file=2)
 
 
 def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[SuiteNode]],
@@ -284,6 +299,7 @@ def _first_signal() -> Future:
 
     def wait() -> None:
         os.read(readable, 1)
+        _end_within(ENDED_S)
         until.set_result(None)
 
     threading.Thread(target=wait, daemon=True).start()
