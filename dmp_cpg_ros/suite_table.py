@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters, StateSourceParameters
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingSwitch
 from dmp_cpg_ros.core.modes.manager import ModeParameters
 from dmp_cpg_ros.core.parameters import Parameters
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
@@ -22,6 +21,7 @@ from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.core.voting.parameters import VoteSourceParameters, VotingSwitch
 
 LEG, POSTURE, ROBOT, RECORDER, VISUALIZATION, DRIVER = (
     'leg_transformation', 'posture_control', 'mujoco_robot', 'bag_recorder', 'visualization',

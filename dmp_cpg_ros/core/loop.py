@@ -30,9 +30,6 @@ from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitInForce
 from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
-from dmp_cpg_ros.core.inhibition.voters import vote_sensors
-from dmp_cpg_ros.core.inhibition.votes import VoteInbox
-from dmp_cpg_ros.core.inhibition.voting import Voting
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -48,6 +45,9 @@ from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
+from dmp_cpg_ros.core.voting.voters import vote_sensors
+from dmp_cpg_ros.core.voting.votes import VoteInbox
+from dmp_cpg_ros.core.voting.voting import Voting
 
 
 class Tick(NamedTuple):

@@ -23,10 +23,6 @@ from dmp_cpg_ros.core.inhibition.prediction import Outlook, look_ahead
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
-from dmp_cpg_ros.core.inhibition.voters import VoteSensors
-from dmp_cpg_ros.core.inhibition.votes import VoteInbox
-from dmp_cpg_ros.core.inhibition.voting import Voting
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
@@ -37,6 +33,10 @@ from dmp_cpg_ros.core.suite_parameters import (
     TickParameters,
 )
 from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.core.voting.parameters import VoteSourceParameters, VotingParameters
+from dmp_cpg_ros.core.voting.voters import VoteSensors
+from dmp_cpg_ros.core.voting.votes import VoteInbox
+from dmp_cpg_ros.core.voting.voting import Voting
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode

@@ -20,12 +20,12 @@ from dmp_cpg_ros.core import suite_parameters as core
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.errors import DataError, ParameterError
 from dmp_cpg_ros.core.estimation.parameters import StateSourceParameters
-from dmp_cpg_ros.core.inhibition.voting_parameters import VotingSwitch
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
 from dmp_cpg_ros.core.robot_model.sensors import SensorParameters
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import WorldParameters
 from dmp_cpg_ros.core.scenario.fault import Fault, FaultInjector
+from dmp_cpg_ros.core.voting.parameters import VotingSwitch
 from dmp_cpg_ros.nodes.framework.certified import Sets
 from dmp_cpg_ros.nodes.framework.driven_robot import DrivenRobot
 from dmp_cpg_ros.nodes.framework.health import Intervals, ReadinessOfOthers

@@ -19,14 +19,14 @@ from dmp_cpg_ros.core.certificates.gate import Running
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.supervisor import GaitSupervisor
-from dmp_cpg_ros.core.inhibition.voters import VoteSensors
-from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, WINNER_TAKE_ALL
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.core.voting.parameters import SUM, WINNER_TAKE_ALL
+from dmp_cpg_ros.core.voting.voters import VoteSensors
 from dmp_cpg_ros.suite import load_gaits
 
 CONDITIONS = ('places', 'arming', 'acting', 'holding')

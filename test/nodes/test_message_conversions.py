@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
-from dmp_cpg_ros.core.inhibition.caution import Progress
+from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, JointTargets, RobotState
 from dmp_cpg_ros.nodes.messages.cdr import Serialized
 from dmp_cpg_ros.nodes.messages.conversions import (

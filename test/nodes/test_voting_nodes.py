@@ -24,9 +24,9 @@ from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario, main
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.errors import DataError
-from dmp_cpg_ros.core.inhibition.votes import VoteInbox
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.scenario.scenario import play
+from dmp_cpg_ros.core.voting.votes import VoteInbox
 from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter, read_votes
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter

@@ -47,8 +47,8 @@ LAYERS = {
 }
 
 CORE = ['errors', 'maths', 'clock', 'parameters', 'robot_model', 'canonical', 'gait', 'reference',
-        'primitives', 'learning', 'transformation', 'contraction', 'inhibition', 'balance',
-        'estimation', 'modes', 'suite_parameters', 'certificates', 'scenario', 'loop']
+        'primitives', 'learning', 'transformation', 'contraction', 'voting', 'inhibition',
+        'balance', 'estimation', 'modes', 'suite_parameters', 'certificates', 'scenario', 'loop']
 """Folders and files of the core, each above all that it may import."""
 
 

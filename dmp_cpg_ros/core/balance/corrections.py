@@ -13,11 +13,11 @@ from collections.abc import Sequence
 from math import atan2, exp, hypot, isnan, pi
 from typing import NamedTuple
 
-from dmp_cpg_ros.core.balance.motion_plan import MotionPlan, Pair
+from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.maths import vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 
 SLOWEST = 0.3
 """Froude speed below which the limit of the correction shrinks no more."""

@@ -27,11 +27,9 @@ from math import sqrt
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.maths import Array, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple
+from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import RobotState
-
-Pair = tuple[float, float]
 
 LARGEST_RAISE = 0.35
 """Largest correction of a swinging foot's height by levelling, in leg lengths."""

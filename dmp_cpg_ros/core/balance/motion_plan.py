@@ -21,9 +21,7 @@ from __future__ import annotations
 from math import exp, hypot
 from typing import NamedTuple
 
-from dmp_cpg_ros.core.maths.vec3 import Triple
-
-Pair = tuple[float, float]
+from dmp_cpg_ros.core.maths.vec3 import Pair, Triple
 
 
 class MotionPlan(NamedTuple):

@@ -7,9 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import hypot, pi
 
-from dmp_cpg_ros.core.maths.vec3 import Triple
-
-Pair = tuple[float, float]
+from dmp_cpg_ros.core.maths.vec3 import Pair, Triple
 
 SLOWEST = 0.02
 """Speed below which no foot is ahead of the others [m/s]."""

@@ -27,10 +27,10 @@ from dmp_cpg_ros.core.gait.running import CADENCE_RATE
 from dmp_cpg_ros.core.gait.transition import SETTLING_RATE, STANDING, GaitTransition
 from dmp_cpg_ros.core.inhibition.entry import eligible_legs, farthest_way
 from dmp_cpg_ros.core.inhibition.supervisor import REST_ACTIVITY
-from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import LegParameters
+from dmp_cpg_ros.core.voting.parameters import VotingParameters
 
 
 def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,

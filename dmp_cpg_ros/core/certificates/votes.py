@@ -29,11 +29,11 @@ from dmp_cpg_ros.core.contraction.voting import (
     rest_threshold,
 )
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.voting import VoteClamp, vote_clamp
-from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.voting.parameters import VotingParameters
+from dmp_cpg_ros.core.voting.voting import VoteClamp, vote_clamp
 
 
 @dataclass(frozen=True)

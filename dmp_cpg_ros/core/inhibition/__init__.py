@@ -1,3 +1,3 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Switched and voted inhibition: the state machine of stopping and starting."""
+"""Switched inhibition: the state machine of stopping and starting, and what asks for it."""

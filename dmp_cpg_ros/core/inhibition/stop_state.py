@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dmp_cpg_ros.core.inhibition.caution import NO_BLOCK, BlockState
+from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, BlockState
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, PushState
-from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, Tally
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.voting.votes import NO_VOTES, Tally
 
 
 @dataclass(frozen=True)

@@ -26,24 +26,19 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition.caution import (
-    NO_BLOCK,
-    Progress,
-    block_step,
-    followed_share,
-    room,
-)
+from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
+from dmp_cpg_ros.core.inhibition.caution import followed_share, room
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, push_step
 from dmp_cpg_ros.core.inhibition.step_timing import quickened
 from dmp_cpg_ros.core.inhibition.stop_state import SupervisorState
-from dmp_cpg_ros.core.inhibition.votes import Tally
-from dmp_cpg_ros.core.inhibition.voting import holds_at_rest
-from dmp_cpg_ros.core.inhibition.voting_parameters import SUM, VotingParameters
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import activities_step
+from dmp_cpg_ros.core.voting.parameters import SUM, VotingParameters
+from dmp_cpg_ros.core.voting.votes import Tally
+from dmp_cpg_ros.core.voting.voting import holds_at_rest
 
 STATES = ('free', 'walking', 'waiting', 'captured', 'at_rest', 'releasing', 'stepping')
 """What ``inhibition_state`` can say."""

@@ -13,6 +13,9 @@ from math import sqrt
 Triple = tuple[float, float, float]
 """A vector."""
 
+Pair = tuple[float, float]
+"""A horizontal vector."""
+
 Matrix = tuple[Triple, Triple, Triple]
 """A matrix (3, 3), by rows."""
 
@@ -23,7 +26,7 @@ def triple(values: Sequence[float]) -> Triple:
     return x, y, z
 
 
-def pair(values: Sequence[float]) -> tuple[float, float]:
+def pair(values: Sequence[float]) -> Pair:
     """As :func:`triple` for two numbers."""
     x, y = values
     return x, y

@@ -26,13 +26,13 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.transition import GaitInForce
-from dmp_cpg_ros.core.inhibition.caution import Progress
+from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST
-from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.parameters import range_of
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, JOINTS_OF_LEG, LEGS, JointTargets
 from dmp_cpg_ros.core.scenario.push import FRAMES, PushForce
 from dmp_cpg_ros.core.suite_parameters import INHIBITION
+from dmp_cpg_ros.core.voting.parameters import VotingParameters
 from dmp_cpg_ros.nodes.messages import cdr
 from dmp_cpg_ros.nodes.messages.joint_states import JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.robot_state import BASE_FRAME
@@ -395,7 +395,7 @@ def read_votes(message: JointState) -> tuple[dict[str, float], str]:
     ------
     DataError
         If names and numbers do not match, or are of several voters; what they say is checked by
-        :meth:`~dmp_cpg_ros.core.inhibition.votes.VoteInbox.accept`.
+        :meth:`~dmp_cpg_ros.core.voting.votes.VoteInbox.accept`.
     """
     voters, _, legs = zip(*(name.rpartition('/') for name in message.name), strict=True) if (
         message.name) else ((), (), ())

@@ -26,11 +26,10 @@ from dmp_cpg_ros.core.balance.controller import (
 )
 from dmp_cpg_ros.core.balance.progress import feet_behind
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.inhibition.caution import (
+from dmp_cpg_ros.core.inhibition.blocked import (
     BRISK,
     FIRM,
     HELD,
-    LEAST,
     NO_BLOCK,
     PATIENCE,
     PINNED,
@@ -40,6 +39,7 @@ from dmp_cpg_ros.core.inhibition.caution import (
     Progress,
     block_step,
 )
+from dmp_cpg_ros.core.inhibition.caution import LEAST
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.world import Steps
 from dmp_cpg_ros.studies.walking_trials import Walk

@@ -23,18 +23,18 @@ from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.voting import MajorityClamp, majority_clamp
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.inhibition import voters
-from dmp_cpg_ros.core.inhibition.voters import NEVER, FootWatch, LastGood, UpFilter, VoteSensors
-from dmp_cpg_ros.core.inhibition.votes import NO_VOTES, OWN_SOURCES, Tally, Vote, VoteMemory
-from dmp_cpg_ros.core.inhibition.voting_parameters import (
-    WINNER_TAKE_ALL,
-    VoteSourceParameters,
-    VotingParameters,
-)
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.voting import voters
+from dmp_cpg_ros.core.voting.parameters import (
+    WINNER_TAKE_ALL,
+    VoteSourceParameters,
+    VotingParameters,
+)
+from dmp_cpg_ros.core.voting.voters import NEVER, FootWatch, LastGood, UpFilter, VoteSensors
+from dmp_cpg_ros.core.voting.votes import NO_VOTES, OWN_SOURCES, Tally, Vote, VoteMemory
 
 FRESH_NS = 20_000_000
 """Age up to which contacts are compared with the phase of the tick [ns]."""

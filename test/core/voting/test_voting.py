@@ -15,7 +15,11 @@ from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.errors import DataError, ParameterError
-from dmp_cpg_ros.core.inhibition.voters import (
+from dmp_cpg_ros.core.reference.filter import ReferenceParameters
+from dmp_cpg_ros.core.reference.operating_range import operating_range
+from dmp_cpg_ros.core.robot_model.state import LEGS
+from dmp_cpg_ros.core.voting.parameters import VoteSourceParameters, VotingParameters
+from dmp_cpg_ros.core.voting.voters import (
     FootWatch,
     LastGood,
     UpFilter,
@@ -23,24 +27,20 @@ from dmp_cpg_ros.core.inhibition.voters import (
     vote_sensors,
     watch_feet,
 )
-from dmp_cpg_ros.core.inhibition.votes import (
+from dmp_cpg_ros.core.voting.votes import (
     FADE_STEPS,
     MOST_VOTERS,
     NO_VOTES,
     VoteInbox,
     VoteMemory,
 )
-from dmp_cpg_ros.core.inhibition.voting import (
+from dmp_cpg_ros.core.voting.voting import (
     VoteClamp,
     Voting,
     acting_gains,
     holds_at_rest,
     vote_clamp,
 )
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters, VotingParameters
-from dmp_cpg_ros.core.reference.filter import ReferenceParameters
-from dmp_cpg_ros.core.reference.operating_range import operating_range
-from dmp_cpg_ros.core.robot_model.state import LEGS
 
 NAN = float('nan')
 ROBOT = quadruped()

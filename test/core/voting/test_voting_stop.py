@@ -20,10 +20,10 @@ from dmp_cpg_ros.core.certificates.suggest import suggest_gains
 from dmp_cpg_ros.core.certificates.votes import vote_bound, votes_needed
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
 from dmp_cpg_ros.core.inhibition.prediction import look_ahead
-from dmp_cpg_ros.core.inhibition.voting_parameters import VotingParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
+from dmp_cpg_ros.core.voting.parameters import VotingParameters
 
 WEAK = CanonicalParameters(coupling_gain=5.0)
 """Couplings with which the legs synchronise, and no leg alone can stop the others."""

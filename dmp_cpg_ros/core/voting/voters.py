@@ -18,12 +18,12 @@ from math import acos, exp, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.inhibition.voting_parameters import VoteSourceParameters
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.rotations import turned
 from dmp_cpg_ros.core.maths.vec3 import rotation
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
+from dmp_cpg_ros.core.voting.parameters import VoteSourceParameters
 
 Stamps = NDArray[np.int64]
 Mask = NDArray[np.bool_]

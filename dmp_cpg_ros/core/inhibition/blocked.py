@@ -1,0 +1,164 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""When a walking body that is held up waits, and when it stops.
+
+A walk may come to an obstacle that it does not cross. Nothing is seen: what the robot feels
+is that it does not come ahead although its legs walk (:class:`Progress`).
+
+- **Held.** The feet that lead the way come down short of their places, because something holds
+  them up, and the body that goes on would fall over them. Where it comes on with less than
+  ``SLUGGISH`` of the speed that is asked for, and the feet are behind beyond ``HELD`` lengths of
+  the leg, less of the command is followed, down to the least at ``PINNED``: the body waits for its
+  feet.
+- **Blocked.** While it is asked to go at speed u, the body's way along the reference grows by
+  ``STEP`` l again and again. Where it has not come farther than it once was while it was to go
+  ``PATIENCE`` l, with u up to ``BRISK`` √(g l) counted, it is blocked: a stop is requested as the
+  service does, with its prediction and its bound.
+
+It stays stopped while the same is asked: a command within 60° of the way that was blocked does not
+start the gait. The service does, a command that leads elsewhere (back, aside or a turn on the
+spot), and any after a zero command, when the stop is as any automatic one.
+"""
+
+from __future__ import annotations
+
+from math import exp, hypot
+from typing import NamedTuple
+
+from dmp_cpg_ros.core.inhibition.caution import LEAST
+from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.vec3 import Pair
+
+HELD, PINNED = 0.3, 0.5
+"""How far the leading feet are behind where the body begins to wait for them, and where it waits,
+in lengths of the leg; both are ``FASTER`` for every √(g l) of speed more, by which a body that is
+only setting off is behind.
+"""
+
+FASTER = 0.1
+
+MEAN = 15.0
+"""Rate at which the means of what the feet are behind, and of the speed, follow [1/s]."""
+
+SLUGGISH = 0.6
+"""Share of the speed that is asked for beyond which the feet are not held: a body that runs ahead
+downhill leaves its feet behind, too.
+"""
+
+STEP = 0.4
+"""Way that counts as having come ahead, in lengths of the leg."""
+
+PATIENCE = 3.5
+"""Way that was asked for, without having come ahead, at which it is blocked, in lengths of the
+leg.
+"""
+
+FIRM = 0.6
+"""Way that was asked for while the leading feet were held, less that while they were not, at which
+it is blocked, in lengths of the leg.
+"""
+
+SLOW, BRISK = 0.04, 0.15
+"""Speeds in √(g l): below the first nothing is asked, beyond the second no more is counted."""
+
+SAME_WAY = 0.5
+"""Cosine between two directions that count as the same."""
+
+
+class Progress(NamedTuple):
+    """How the body comes ahead.
+
+    Attributes
+    ----------
+    velocity : tuple of float
+        Of the body over the ground, ahead and to the left, less its planned sway [m/s].
+    behind : float
+        How far the feet that lead the way stand behind where the gait has them [m]; negative
+        where they are ahead of it, 0 where none of them stands.
+    """
+
+    velocity: Pair = (0.0, 0.0)
+    behind: float = 0.0
+
+
+class BlockState(NamedTuple):
+    """What an obstacle has done to the walk.
+
+    Attributes
+    ----------
+    acts : bool
+        Whether a stop is in force because of it.
+    ahead : tuple of float
+        Direction in which it was, in the base frame; (0, 0) where every command ends the stop.
+    made : float
+        Way made since the farthest place, at most 0 but for a part of a step [m].
+    asked : float
+        Way asked for since then [m].
+    behind : float
+        How far the leading feet are behind, in the mean [m].
+    most : float
+        Most of the command that a body with these feet may follow, in [LEAST, 1].
+    pinned : float
+        Way asked for while the leading feet were held, less that while they were not [m].
+    comes : float
+        Speed along the reference, in the mean [m/s].
+    """
+
+    acts: bool = False
+    ahead: Pair = (0.0, 0.0)
+    made: float = 0.0
+    asked: float = 0.0
+    behind: float = 0.0
+    most: float = 1.0
+    pinned: float = 0.0
+    comes: float = 0.0
+
+    def leads_there(self, command: tuple[float, float, float]) -> bool:
+        """Whether a command (v_x, v_y, γ) leads to the obstacle."""
+        v_x, v_y, _ = command
+        along = v_x * self.ahead[0] + v_y * self.ahead[1]
+        return along > SAME_WAY * hypot(v_x, v_y)
+
+
+NO_BLOCK = BlockState()
+
+
+def block_step(state: BlockState, r: Array, wanted: float, progress: Progress | None,
+               leg_length: float, dt: float) -> BlockState:
+    """Advance by one tick of a walk.
+
+    Parameters
+    ----------
+    state : BlockState
+        After the last tick.
+    r : ndarray (3,)
+        Reference v_x, v_y [m/s], γ [rad/s].
+    wanted : float
+        Speed that is asked for, of which the reference may follow a share [m/s].
+    progress : Progress or None
+        Of the body, where it is known.
+    leg_length : float
+        l [m].
+    dt : float
+        Time since the last tick [s].
+    """
+    v_x, v_y, _ = r.tolist()
+    speed, froude = hypot(v_x, v_y), (GRAVITY * leg_length) ** 0.5
+    if progress is None or wanted < SLOW * froude or speed == 0.0:
+        return NO_BLOCK
+    kept, ahead = exp(-MEAN * dt), (v_x / speed, v_y / speed)
+    comes = progress.velocity[0] * ahead[0] + progress.velocity[1] * ahead[1]
+    behind = progress.behind + (state.behind - progress.behind) * kept
+    comes_on = comes + (state.comes - comes) * kept
+    made, due = state.made + dt * comes, dt * min(wanted, BRISK * froude)
+    asked = state.asked + due
+    if made > STEP * leg_length:
+        made = asked = 0.0
+    far = behind / leg_length - FASTER * speed / froude
+    if comes_on > SLUGGISH * wanted:
+        far = 0.0
+    most = min(1.0, max(LEAST, (PINNED - far) / (PINNED - HELD)))
+    pinned = max(0.0, state.pinned + (due if far > HELD else -due))
+    blocked = asked > PATIENCE * leg_length or pinned > FIRM * leg_length
+    return BlockState(blocked, ahead, made, asked, behind, most, pinned, comes_on)
