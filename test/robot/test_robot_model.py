@@ -164,3 +164,17 @@ def test_home_keyframe_stands_on_feet_below_the_hips(model):
 def test_joints_and_motors_bear_our_names_in_our_order(model):
     assert tuple(model.joint(i).name for i in range(1, model.njnt)) == JOINT_NAMES
     assert tuple(model.actuator(i).name for i in range(model.nu)) == JOINT_NAMES
+
+
+def test_a_model_for_accelerators_is_solved_as_any_other(model, tmp_path):
+    text = own_robot_file().model.read_text()
+    quick = tmp_path / 'quick.xml'
+    quick.write_text(text.replace('<option ', '<option iterations="1" ls_iterations="5" ', 1))
+    loaded, data = load_model(quick, 'base_link'), []
+    for each in (model, loaded):
+        state = mujoco.MjData(each)
+        mujoco.mj_resetDataKeyframe(each, state, 0)
+        state.qvel[:2] = 0.3, 0.1  # feet that bear against sliding
+        mujoco.mj_step(each, state, 200)
+        data.append(state.qpos.copy())
+    np.testing.assert_array_equal(*data)
