@@ -67,10 +67,11 @@ ACTIVATED := . $(BIN)/activate &&
 
 STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
+DUEL_ARGS ?=
 FIGURE_ARGS ?=
 PAGE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking doc-images view-image paper-figures paper-page bench bench-ros doc lint install clean
+.PHONY: help demo test study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images view-image paper-figures paper-page bench bench-ros doc lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -107,6 +108,9 @@ study-files: $(INSTALLED) ## read 20,000 spoiled files of every kind (STUDY_ARGS
 
 benchmark-walking: $(INSTALLED) ## measure speeds, pushes, rough ground, gait changes (BENCHMARK_ARGS=...)
 	$(ACTIVATED) benchmark_walking $(BENCHMARK_ARGS)
+
+duel: $(INSTALLED) $(VENV)/.policy ## walk the suite and a learned policy on one robot (DUEL_ARGS='POLICY.yaml ROBOT.yaml')
+	$(ACTIVATED) python -m dmp_cpg_ros.studies.duel $(DUEL_ARGS)
 
 doc-images: $(INSTALLED) ## make the pictures of the documents
 	rm -rf build/doc_images
@@ -157,6 +161,10 @@ $(INSTALLED): $(READY) $(SOURCES)
 
 $(VENV)/.documentation: $(READY) | $(INSTALLED)
 	@$(INSTALL_WHEEL) "$$(echo $(BUILD)/wheel/*.whl)[doc]"
+	@touch $@
+
+$(VENV)/.policy: $(READY) | $(INSTALLED)
+	@$(INSTALL_WHEEL) "$$(echo $(BUILD)/wheel/*.whl)[policy]"
 	@touch $@
 
 $(READY): setup.py constraints.txt

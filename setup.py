@@ -133,6 +133,8 @@ setup(
         'parquet': ['pyarrow>=14'],
         # Studies on several machines: --cluster.
         'cluster': ['distributed>=2024.4'],
+        # A learned policy beside the suite: python -m dmp_cpg_ros.studies.duel.
+        'policy': ['onnxruntime>=1.17'],
     },
     entry_points={
         'console_scripts': [f'{NAME} = {NAME}.__main__:main',

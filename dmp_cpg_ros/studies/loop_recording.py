@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from math import ceil
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from dmp_cpg_ros.analysis import motion, recording
 from dmp_cpg_ros.analysis.metrics.summary import STILL_SPEED
 from dmp_cpg_ros.analysis.recording import Recording, taken
 from dmp_cpg_ros.core.gait.known_gaits import shares_of
-from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
+from dmp_cpg_ros.core.loop import Array, Tick
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
@@ -24,7 +25,23 @@ from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 PUSH_DURATION = 0.1
 """Time over which the impulse of a push is spread [s]."""
 
-Loop = TypeVar('Loop', bound=WalkingLoop)
+RAMP = 1.0
+"""Rate at which commands rise [m/s^2]; three times that for turning [rad/s^2]."""
+
+Velocity = tuple[float, float, float]
+
+
+class Controller(Protocol):
+    """What walks a robot."""
+
+    def tick(self, state: RobotState) -> Any:
+        """Advance by a tick, and give what has ``targets``."""
+
+    def command(self, v_x: float, v_y: float = 0.0, gamma: float = 0.0) -> None:
+        """Command a velocity [m/s], [rad/s]."""
+
+
+Loop = TypeVar('Loop', bound=Controller)
 
 
 class LoopRun(Generic[Loop]):
@@ -36,7 +53,7 @@ class LoopRun(Generic[Loop]):
     ----------
     robot : MujocoRobot
         Is reset.
-    loop : WalkingLoop
+    loop : Controller
         At its start.
 
     Attributes
@@ -47,6 +64,8 @@ class LoopRun(Generic[Loop]):
         Those that ticks gave.
     tick_s : float
         Control tick [s].
+    asked : tuple of float
+        Velocity that :meth:`reach` has come to [m/s], [rad/s].
     """
 
     def __init__(self, robot: MujocoRobot, loop: Loop) -> None:
@@ -54,6 +73,7 @@ class LoopRun(Generic[Loop]):
         self.state: RobotState = robot.reset()
         self.states: list[RobotState] = []
         self.tick_s = robot.tick_ns * 1e-9
+        self.asked: Velocity = (0.0, 0.0, 0.0)
 
     def fell(self) -> bool:
         """Whether the robot lies on the ground."""
@@ -65,9 +85,10 @@ class LoopRun(Generic[Loop]):
             self.state = self.robot.step(self.acting(self.loop.tick(self.state)))
             self.states.append(self.state)
 
-    def acting(self, tick: Tick) -> JointTargets:
+    def acting(self, tick: Any) -> JointTargets:
         """Targets that act in a tick."""
-        return tick.targets
+        targets: JointTargets = tick.targets
+        return targets
 
     def walk(self, seconds: float) -> bool:
         """Tick for a time [s], or until the robot falls; return whether it is on its feet."""
@@ -76,6 +97,21 @@ class LoopRun(Generic[Loop]):
                 return False
             self.tick(self.tick_s)
         return not self.fell()
+
+    def reach(self, velocity: Velocity) -> bool:
+        """Ramp the command to a velocity; return whether the robot is on its feet."""
+        begin, change = np.array(self.asked), np.array(velocity) - self.asked
+        steps = max(1, ceil(np.max(np.abs(change) / (RAMP, RAMP, 3.0 * RAMP)) / 0.1))
+        for i in range(1, steps + 1):
+            self.loop.command(*(begin + change * i / steps).tolist())
+            if not self.walk(0.1):
+                return False
+        self.asked = velocity
+        return True
+
+    def settle(self, velocity: Velocity) -> bool:
+        """Ramp to a velocity and hold it; return whether the robot is on its feet."""
+        return self.reach(velocity) and self.walk(3.0)
 
     def push(self, impulse: Array) -> None:
         """Push the base by an impulse in the world (3,) [N s], from the next tick on."""

