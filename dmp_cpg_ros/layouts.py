@@ -55,6 +55,11 @@ REFERENCE_ROWS = ('v_x', 'v_y', 'gamma')
 """Of ``gait_memory``, after those of ``canonical_state``."""
 
 
+def work_rows(joints: Sequence[str]) -> tuple[str, ...]:
+    """Rows of ``joint_work``: of each joint its work, and at the end what it lost."""
+    return (*joints, *(f'loss/{joint}' for joint in joints))
+
+
 def canonical_rows(gaits: Iterable[str]) -> tuple[str, ...]:
     """Rows of ``canonical_state`` where some gaits are known."""
     return (*OSCILLATOR_ROWS, *(GAIT_PREFIX + name for name in gaits), CADENCE_ROW)

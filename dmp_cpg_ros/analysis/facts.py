@@ -78,6 +78,8 @@ def _walking(metrics: Mapping[str, Any]) -> list[Fact]:
             None if error is None else error <= SPEED_TOLERANCE),
         *_if_known(robot['cost_of_transport'], 'Cost of transport',
                    f'{{:.2f}}, {COSTS.get(robot["cost_of_transport_from"])}'),
+        *_if_known(robot['cost_without_joint_losses'],
+                   'Cost of transport without damping and friction in the joints', '{:.2f}'),
         *_if_known(robot['yaw_drift_deg_per_10m'], 'Yaw drift on straight stretches',
                    '{:.2f}° per 10 m'),
         *_if_known(metrics['gait']['phase_error_rad_max'],

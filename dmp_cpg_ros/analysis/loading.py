@@ -95,7 +95,7 @@ def _loaded(bag: Path, fields: Mapping[str, Sequence[str]], tell: Callable[[str]
     return Recording(
         joints=_joints(topics.pop('joint_states'), names),
         targets=_joints(topics.pop('joint_targets'), names),
-        work=recording.WorkSeries(*_table(topics['joint_work'], names)),
+        work=_work(topics['joint_work'], names),
         canonical=_canonical(topics['canonical_state']),
         reference=recording.VelocitySeries(*_rows(topics['reference'].joined(3), (3,))),
         commands=recording.VelocitySeries(*_rows(commands, (3,))),
@@ -136,6 +136,13 @@ def _rows(block: Block, widths: Sequence[int]) -> list[Array]:
         stamps, last = np.unique(stamps[::-1], return_index=True)
         values = values[::-1][last]
     return [stamps / 1e9, *np.split(values, np.cumsum(widths)[:-1], axis=1)]
+
+
+def _work(topic: Topic, names: Sequence[str]) -> recording.WorkSeries:
+    """Work and losses of the joints."""
+    time, energy, peak = _table(topic, layouts.work_rows(names))
+    count = len(names)
+    return recording.WorkSeries(time, energy[:, :count], peak[:, :count], energy[:, count:])
 
 
 def _table(topic: Topic, names: Sequence[str]) -> list[Array]:

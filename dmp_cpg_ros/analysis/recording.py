@@ -76,10 +76,14 @@ class WorkSeries(Series):
         Positive mechanical work since time 0 [J].
     peak_effort : ndarray (n, 12)
         Largest size of the torque since the row before [N m].
+    loss : ndarray (n, 12)
+        What the joints' damping and dry friction have taken since time 0 [J]; NaN where that was
+        not told.
     """
 
     work: Array = no_rows(JOINT_NAMES, unit='j')
     peak_effort: Array = no_rows(JOINT_NAMES, unit='n_m')
+    loss: Array = no_rows(JOINT_NAMES, unit='j')
 
 
 @dataclass(frozen=True)

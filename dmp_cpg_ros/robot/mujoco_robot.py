@@ -167,6 +167,8 @@ class MujocoRobot:
         else:
             self._start = start_pose_of(start_pose, self.description, seed)
         self.data = mujoco.MjData(model)
+        self._damping, self._friction = (of[self._dof] for of in (
+            model.dof_damping, model.dof_frictionloss))
         self._torques = np.zeros((self._steps, 12))  # of each physics step of the tick
         self._rates = np.zeros((self._steps + 1, 12))  # before each of them and after the last
         self.reset()
@@ -179,7 +181,7 @@ class MujocoRobot:
         """
         data, model, start = self.data, self.model, self._start
         self._push_force, self._push_steps, self._pushes = np.zeros(3), -1, PushQueue()
-        self._tick, self._work = 0, np.zeros(12)
+        self._tick, self._work, self._loss = 0, np.zeros(12), np.zeros(12)
         mujoco.mj_resetData(model, data)
         self._drive.reset()
         if self._sensors is not None:
@@ -193,7 +195,7 @@ class MujocoRobot:
                 state = self.step(JointTargets(held, np.zeros(12), np.zeros(12)))
                 held = state.joint_position if start.limp else held
             self._drive.reset()
-            self._work = np.zeros(12)
+            self._work, self._loss = np.zeros(12), np.zeros(12)
         else:
             holding = model_parts.standing_torque(model, data, self._ids, self._dof)
             self._effort = self._strength * self._drive.limited(holding, np.zeros(12))
@@ -241,8 +243,11 @@ class MujocoRobot:
         rates[-1] = qvel[self._dof]
         # Over a physics step the torque is constant and the velocity changes evenly: with their
         # mean the work is what the step adds to the kinetic energy.
-        power = 0.5 * torques * (rates[1:] + rates[:-1])
-        self._work = self._work + np.maximum(power, 0.0).sum(axis=0) * self._step_s
+        mean = 0.5 * (rates[1:] + rates[:-1])
+        power = np.maximum(torques * mean, 0.0).sum(axis=0)
+        self._work = self._work + power * self._step_s
+        lost = (self._damping * mean * mean + self._friction * np.abs(mean)).sum(axis=0)
+        self._loss = self._loss + lost * self._step_s
         self._peak_effort = np.abs(torques).max(axis=0)
         return self._state()
 
@@ -330,7 +335,7 @@ class MujocoRobot:
             base_rate_in_base=qvel[d + 3:d + 6].copy(),
             acceleration_in_base=self._specific_force.copy(),
             foot_force=self._contacts.foot_force(self.data),
-            joint_work=self._work, joint_peak_effort=self._peak_effort)
+            joint_work=self._work, joint_peak_effort=self._peak_effort, joint_loss=self._loss)
         return state if self._sensors is None else self._sensors.measured(state)
 
 

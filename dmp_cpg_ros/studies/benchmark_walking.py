@@ -108,8 +108,9 @@ OTHERS: tuple[tuple[str, trials.Velocity], ...] = (
     ('trot', (0.0, 0.0, 2.0)), ('amble', (0.5, 0.0, 0.5)), ('trot', (1.0, 0.0, 1.0)))
 """Velocities of the table ``speeds`` that are not straight ahead."""
 
-ROBOTS = tuple(f'robots/{name}.yaml' for name in
-               ('mini_quadruped', 'mini_cheetah', 'go1', 'go2', 'aliengo'))
+ROBOTS = tuple(f'robots/{name}.yaml' for name in (
+    'mini_quadruped', 'mini_cheetah', 'go1', 'go2', 'aliengo', 'a2', 'spot', 'pegasus', 'b2',
+    'hyqreal1', 'hyqreal2'))
 """Robots by their files; all but the first need the extra ``robots``."""
 
 TIMED: tuple[dict[str, Any], ...] = (
@@ -229,17 +230,21 @@ def speeds(workers: Workers, seeds: int, phases: int) -> Table:
     results = _run(workers, trials.steady, [{'gait': gait, 'velocity': v} for gait, v in walks])
     rows = [(case['gait'], _velocity(case['velocity']), *steady_cells(case['velocity'], outcome))
             for case, outcome in results]
-    return Table('Speeds', ('gait', 'asked m/s, rad/s', 'reached', 'error %',
-                            'yaw drift deg/10 m', 'cost of transport'), rows, results)
+    return Table('Speeds; cost of transport with / without losses in the joints',
+                 ('gait', 'asked m/s, rad/s', 'reached', 'error %', 'yaw drift deg/10 m',
+                  'cost of transport'), rows, results)
 
 
 def steady_cells(velocity: trials.Velocity, outcome: trials.SteadyOutcome) -> tuple[str, ...]:
-    """Cells of one held velocity: reached, error, yaw drift, cost of transport."""
+    """Cells of one held velocity: reached, error, yaw drift, cost of transport with and without
+    the losses in the joints.
+    """
     if outcome.fell:
         return 'fell', '-', '-', '-'
+    costs = (outcome.cost_of_transport, outcome.without_losses)
     error = 100.0 * trials.relative_error(outcome, velocity)
     return (_velocity(outcome.velocity, 3), _number(error, 1), _number(outcome.yaw_drift, 2),
-            _number(outcome.cost_of_transport, 2))
+            ' / '.join(_number(cost, 2) for cost in costs))
 
 
 def _velocity(velocity: trials.Velocity, digits: int = 2) -> str:
@@ -528,8 +533,8 @@ def robots(workers: Workers, seeds: int, phases: int) -> Table:
                      _number(of['top_speed'], 1), f'{of["stood"]}/{of["stops"]}',
                      f'{of["walked_on"]}/{of["stops"]}', str(of['stop_falls']),
                      _number(of['pushed'], 1)))
-    return Table('Robots; CoT is positive joint work over m g d, the push is survived at every '
-                 'phase of the amble',
+    return Table('Robots; CoT is positive joint work over m g d, with / without what damping and '
+                 'friction in the joints take, the push is survived at every phase of the amble',
                  ('robot', 'kg', 'amble 0.5 m/s: error %', 'CoT', 'trot 1 m/s: error %', 'CoT',
                   'top trot m/s', 'stood', 'walked on', 'fell', 'push sideways m/s'),
                  rows, results)

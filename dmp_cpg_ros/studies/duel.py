@@ -146,7 +146,8 @@ def tracking_table(walkers: Sequence[Walker], phases: int, run: Map) -> Table:
         cells.append(reached if outcome.fell else f'{error} %, {drift}°, {cost}')
     rows = [(', '.join(f'{part:g}' for part in v),
              *cells[k * len(walkers):(k + 1) * len(walkers)]) for k, v in enumerate(VELOCITIES)]
-    return Table('Velocities held: error of the speed, yaw drift per 10 m, cost of transport',
+    return Table('Velocities held: error of the speed, yaw drift per 10 m, cost of transport '
+                 'with / without losses in the joints',
                  ('m/s, m/s, rad/s', *(walker.name for walker in walkers)), rows,
                  list(zip(cases, outcomes, strict=True)))
 

@@ -278,7 +278,7 @@ READERS: dict[str, Callable[[Path, Path], int]] = {
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 NAMES = {'joint_states': JOINT_NAMES, 'joint_targets': JOINT_NAMES, 'foot_contacts': LEGS,
-         'joint_work': JOINT_NAMES, 'canonical_state': (
+         'joint_work': layouts.work_rows(JOINT_NAMES), 'canonical_state': (
              *layouts.OSCILLATOR_ROWS, f'{layouts.GAIT_PREFIX}amble', layouts.CADENCE_ROW),
          'posture_feedback': layouts.MODE_ROWS}
 

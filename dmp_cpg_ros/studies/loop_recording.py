@@ -140,8 +140,9 @@ def recording_of(states: Sequence[RobotState], ticks: Sequence[Tick] = ()) -> re
             states, 'time_ns', 'base_position_in_world', 'base_quaternion',
             'base_velocity_in_base', 'base_rate_in_base')),
         feet=recording.FootForceSeries(*_columns(states, 'time_ns', 'foot_force')),
-        work=recording.WorkSeries(*_columns(states, 'time_ns', 'joint_work', 'joint_peak_effort')
-                                  if work_is_known else ()))
+        work=recording.WorkSeries(*_columns(
+            states, 'time_ns', 'joint_work', 'joint_peak_effort', 'joint_loss'
+        ) if work_is_known else ()))
     if not ticks:
         return robot
     time, r, x, x_dot = _columns(ticks, 'time_ns', 'r', 'x', 'x_dot')

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dmp_cpg_ros.analysis.context import RunContext
-from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport
+from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport, cost_without_losses
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
@@ -169,12 +169,15 @@ class SteadyOutcome:
         Heading gained beyond what was commanded, per 10 m of way [deg]; NaN without way.
     cost_of_transport : float
         Positive mechanical work over m g d; NaN without way.
+    without_losses : float
+        The same less what damping and dry friction in the joints took.
     """
 
     fell: bool
     velocity: Velocity = (nan, nan, nan)
     yaw_drift: float = nan
     cost_of_transport: float = nan
+    without_losses: float = nan
 
 
 def steady(gait: str, velocity: Velocity, robot: str | None = None, seed: int = 0,
@@ -200,10 +203,10 @@ def held(run: LoopRun[Any], velocity: Velocity) -> SteadyOutcome:
     # a straight line through all samples, which the swaying of a cycle does not turn
     yaw = np.unwrap(_attitude(states)[:, 2])
     gained = np.polyfit(np.linspace(0.0, 1.0, len(yaw)), yaw, 1)[0]
-    work, _ = cost_of_transport(
-        recording_of(states), RunContext(robot=run.robot.description), way)
+    of = recording_of(states), RunContext(robot=run.robot.description), way
+    cost, _ = cost_of_transport(*of)
     return replace(outcome, yaw_drift=abs(float(np.rad2deg(gained))) * 10.0 / way,
-                   cost_of_transport=work or nan)
+                   cost_of_transport=cost or nan, without_losses=cost_without_losses(*of) or nan)
 
 
 @dataclass(frozen=True)

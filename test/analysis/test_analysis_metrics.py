@@ -246,12 +246,15 @@ def test_work_that_the_robot_told_is_believed_rather_than_the_stamps() -> None:
         recording.joints, velocity=np.ones((n, 12)), effort=np.full((n, 12), 20.0))
     told = np.zeros((2, 12))
     told[:, 3], told[:, 7] = (100.0, 160.0), (5.0, 45.0)
-    work = WorkSeries(recording.joints.time[[0, -1]], told, np.full((2, 12), 25.0))
+    work = WorkSeries(recording.joints.time[[0, -1]], told, np.full((2, 12), 25.0), 0.25 * told)
     metrics = metrics_of(walk, joints=joints, work=work)['robot']
     estimate = metrics_of(walk, joints=joints)['robot']
     assert metrics['cost_of_transport'] == pytest.approx(
         100.0 / (MASS * 9.81 * metrics['distance_m']), rel=1e-9)
+    assert metrics['cost_without_joint_losses'] == pytest.approx(
+        0.75 * metrics['cost_of_transport'], rel=1e-9)
     assert metrics['cost_of_transport_from'] == 'joint_work'
+    assert estimate['cost_without_joint_losses'] is None
     assert estimate['cost_of_transport_from'] == 'joint_states'
     assert metrics['peak_torque_share'] == pytest.approx(1.25 * estimate['peak_torque_share'])
     for series, words in ((work, 'every physics step'), (WorkSeries(), 'estimated')):

@@ -186,14 +186,16 @@ def test_work_comes_at_every_tenth_state_with_the_largest_torque_since() -> None
     for k, peak in enumerate(peaks):
         plain = state_of(np.ones(59), k)
         writer.fill(dataclasses.replace(
-            plain, joint_work=np.full(12, float(k)), joint_peak_effort=peak))
+            plain, joint_work=np.full(12, float(k)), joint_peak_effort=peak,
+            joint_loss=np.full(12, 0.5 * k)))
         if writer.joint_work is not None:
             sent.append((k, wire(writer.joint_work)))
     assert [k for k, _ in sent] == [0, 10, 20, 30]
     for k, message in sent:
-        assert (header_ns(message), message.name) == (k, list(JOINT_NAMES))
-        assert bits(message.position) == bits(np.full(12, float(k)))
-        assert bits(message.effort) == bits(peaks[max(0, k - 9):k + 1].max(axis=0))
+        assert (header_ns(message), message.name) == (k, [*JOINT_NAMES, *(
+            f'loss/{name}' for name in JOINT_NAMES)])
+        assert bits(message.position) == bits(np.repeat((float(k), 0.5 * k), 12))
+        assert bits(message.effort[:12]) == bits(peaks[max(0, k - 9):k + 1].max(axis=0))
     writer.fill(state_of(np.ones(59)))  # of a robot that does not know its work
     assert writer.joint_work is None
 

@@ -219,6 +219,25 @@ def test_work_and_peaks_are_those_of_every_physics_step(robot, monkeypatch):
     assert per_tick > 1
 
 
+def test_what_joints_lose_is_what_their_damping_and_friction_take(monkeypatch):
+    robot, steps, advance = MujocoRobot(), [], mujoco.mj_step
+    b, f = robot.model.dof_damping[6:], robot.model.dof_frictionloss[6:]
+    assert b.any() and f.any()
+
+    def watched(model, data):
+        before = data.qvel[6:].copy()
+        advance(model, data)
+        steps.append(0.5 * (before + data.qvel[6:]))
+
+    monkeypatch.setattr(mujoco, 'mj_step', watched)
+    states = wriggle(robot, 30)
+    rates, step = np.array(steps), robot.model.opt.timestep
+    lost = step * (b * rates ** 2 + f * np.abs(rates)).sum(axis=0)
+    np.testing.assert_allclose(states[-1].joint_loss, lost, rtol=1e-9)
+    for before, after in pairwise(states):
+        assert (after.joint_loss >= before.joint_loss).all()
+
+
 def test_a_seed_makes_the_start_vary_reproducibly():
     starts = [MujocoRobot(seed=seed, initial_spread=0.02).reset().joint_position
               for seed in (0, 0, 1)]

@@ -16,6 +16,9 @@ DEFINITIONS: dict[str, tuple[str, str]] = {
     'robot.cost_of_transport_from': ('',
         'topic of that work: joint_work, summed over every physics step, or joint_states, an '
         'estimate from torque and velocity at the stamps alone'),
+    'robot.cost_without_joint_losses': ('',
+        "the same less what damping and dry friction of the model's joints took, "
+        '∫Σ (b q̇² + f |q̇|) dt over m g distance'),
     'robot.peak_torque_share': ('',
         'largest torque of a joint over its limit, of every physics step where joint_work tells'),
     'robot.down_at_start': ('', 'whether the robot lay fallen when the recording began'),

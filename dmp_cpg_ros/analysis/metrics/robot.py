@@ -43,6 +43,7 @@ def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         ``yaw_drift_deg_per_10m``, the size of the yaw gained on straight, steady stretches;
         ``cost_of_transport``, positive mechanical joint work over m g distance, and
         ``cost_of_transport_from``, the topic that it was taken from;
+        ``cost_without_joint_losses``, less what damping and friction in the joints took;
         ``peak_torque_share``, the largest torque of a joint over its limit; ``foot_slip_m``,
         the sum over feet and run of sliding under load, and ``foot_slip_m_per_foot_and_m``;
         ``down_at_start``, whether the recording begins with a fall that was before it.
@@ -58,6 +59,7 @@ def robot_metrics(recording: Recording, context: RunContext) -> dict[str, Any]:
         'down_at_start': recording.modes[0].message == 'damped' if recording.modes else None,
         'distance_m': distance, 'yaw_drift_deg_per_10m': yaw_drift(recording),
         'cost_of_transport': cost, 'cost_of_transport_from': source,
+        'cost_without_joint_losses': cost_without_losses(recording, context, far),
         'peak_torque_share': peak_torque_share(recording, context), 'foot_slip_m': slip,
         'foot_slip_m_per_foot_and_m': slip / 4.0 / far if far and slip is not None else None}
 
@@ -127,6 +129,20 @@ def cost_of_transport(recording: Recording, context: RunContext, distance: float
         power = np.maximum(joints.effort * joints.velocity, 0.0).sum(axis=1)
         work, source = motion.integral(joints.time, power)[-1], 'joint_states'
     return float(work / (context.robot.mass * 9.81 * distance)), source
+
+
+def cost_without_losses(recording: Recording, context: RunContext, distance: float | None,
+                        ) -> float | None:
+    """As :func:`cost_of_transport`, less what damping and dry friction in the joints take; None
+    where the robot did not tell it.
+    """
+    told = recording.work
+    if context.robot is None or not distance or told.time.size < 2:
+        return None
+    loss = (told.loss[-1] - told.loss[0]).sum()
+    cost, _ = cost_of_transport(recording, context, distance)
+    without = (cost or 0.0) - loss / (context.robot.mass * 9.81 * distance)
+    return float(without) if np.isfinite(without) else None
 
 
 def peak_torque_share(recording: Recording, context: RunContext) -> float | None:

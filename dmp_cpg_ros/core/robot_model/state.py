@@ -45,8 +45,10 @@ class RobotState:
     joint_work : ndarray (12,), optional
         Positive mechanical work that each joint's torque has done since time 0 [J].
     joint_peak_effort : ndarray (12,), optional
-        Largest size of each joint's torque during the tick that ends here [N m]. Both are known
-        where torques are applied more often than states are told: in a simulator, in a drive.
+        Largest size of each joint's torque during the tick that ends here [N m].
+    joint_loss : ndarray (12,), optional
+        Energy that damping and dry friction of each joint have taken since time 0 [J]. These three
+        are known where torques are applied more often than states are told: in a simulator.
 
     Joints, efforts, gyroscope, accelerometer and forces are measured; position, orientation and
     velocities of the base are the truth in a simulator's state and an estimate in a controller's.
@@ -66,6 +68,7 @@ class RobotState:
     ground_normal_in_world: Array | None = None
     joint_work: Array | None = None
     joint_peak_effort: Array | None = None
+    joint_loss: Array | None = None
 
     @property
     def measured_rate_in_base(self) -> Array:

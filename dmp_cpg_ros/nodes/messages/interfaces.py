@@ -197,7 +197,8 @@ TOPICS: tuple[Interface, ...] = (
               (ROBOT,), FEELING, sometimes=FEELING),
     Interface('joint_work', JointState,
               'position = positive work of each joint since time 0 [J], effort = largest torque '
-              'since the last message [N m], over every physics step; at every tenth tick',
+              'since the last message [N m], over every physics step; rows loss/JOINT: position = '
+              'what its damping and dry friction have taken [J]; at every tenth tick',
               (ROBOT,), (), sometimes=(ROBOT,)),
     Interface('odom', Odometry,
               "the robot's own estimate: pose and twist of base_link in odom, at estimate_rate",

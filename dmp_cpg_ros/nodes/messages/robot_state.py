@@ -16,6 +16,7 @@ from sensor_msgs.msg import Imu, JointState
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimate
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES, LEGS, RobotState
+from dmp_cpg_ros.layouts import work_rows
 from dmp_cpg_ros.nodes.messages import cdr
 from dmp_cpg_ros.nodes.messages.joint_states import JointStateReader, JointStateWriter
 from dmp_cpg_ros.nodes.messages.values import Array, checked, sensed, set_stamp
@@ -59,7 +60,8 @@ class RobotStateWriter:
         self._imu.constant(*[0.0] * 9)
         self._joints = JointStateWriter(joint_names, frame=BASE_FRAME)
         self._feet = JointStateWriter(FOOT_NAMES, ('effort',), BASE_FRAME)
-        self._work = JointStateWriter(joint_names, ('position', 'effort'), BASE_FRAME)
+        self._work = JointStateWriter(
+            work_rows(joint_names), ('position', 'effort'), BASE_FRAME)
         self._peak, self._fills = np.zeros(len(JOINT_NAMES)), 0
 
     def fill(self, state: RobotState) -> None:
@@ -89,14 +91,16 @@ class RobotStateWriter:
             stamp, state.measured_rate_in_base, state.acceleration_in_base, sound=False))
 
     def _filled_work(self, state: RobotState) -> cdr.SerializedJointState | None:
-        if state.joint_work is None or state.joint_peak_effort is None:
+        work, loss = state.joint_work, state.joint_loss
+        if work is None or loss is None or state.joint_peak_effort is None:
             return None
         self._peak = np.maximum(self._peak, state.joint_peak_effort)
         due, self._fills = self._fills % WORK_EVERY == 0, self._fills + 1
         if not due:
             return None
         peak, self._peak = self._peak, np.zeros(len(JOINT_NAMES))
-        return self._work.fill(state.time_ns, state.joint_work, peak)
+        return self._work.fill(
+            state.time_ns, np.concatenate((work, loss)), np.append(peak, np.zeros(len(loss))))
 
 
 class OdometryWriter:

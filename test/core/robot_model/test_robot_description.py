@@ -24,7 +24,8 @@ from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 ROBOTS = ROOT / 'config' / 'robots'
-FOREIGN = ('aliengo', 'go1', 'go2', 'mini_cheetah', 'spot')
+FOREIGN = ('a2', 'aliengo', 'b2', 'go1', 'go2', 'hyqreal1', 'hyqreal2', 'mini_cheetah',
+           'pegasus', 'spot')
 
 
 def robot_files():
