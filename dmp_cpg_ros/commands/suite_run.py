@@ -328,6 +328,8 @@ class _Watch:
             self._progress, self._asked = progress, None
             self._stalled, self._stalled_s = health.Intervals(FIRST_WORD_S), now
         elif self._stalled.due() and progress[0] > 0 and self._returning is None:
+            if not player.busy:
+                player.remind()
             if self._asked is None:
                 self._asked = health.ReadinessOfOthers(player, list(self._transitions))
                 self._asked.missing()

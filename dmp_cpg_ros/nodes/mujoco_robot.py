@@ -41,8 +41,10 @@ from dmp_cpg_ros.robot.robot_file import load_robot_file
 from dmp_cpg_ros.robot.urdf import urdf
 from dmp_cpg_ros.suite_table import KINDS, LEG, POSTURE, ROBOT
 
-READY_PERIOD_S = 0.05
-"""How often a lock-step robot without a gate asks whether its partners are there [s]."""
+READY_PERIOD_S, REMIND_S = 0.05, 3.0
+"""How often a lock-step robot without a gate asks whether its partners are there, and after which
+time it tells a tick again that does not end [s].
+"""
 
 MAKE_UP_NS = 100_000_000
 """Wall time that a robot in real time may lag behind and make up again; what is more is lost
@@ -260,9 +262,20 @@ class MujocoRobotNode(DrivenRobot):
         missing = self.missing() + self._others.missing()
         if not missing:
             self.deactivate()
+            self._reminded_ns = -1
+            self._timer = self.create_steady_timer(REMIND_S, self._remind)
             self._publish_state()
         elif self._waiting.due():
             self.get_logger().info(f'waiting for {"; ".join(missing)}')
+
+    def _remind(self) -> None:
+        """Tell a tick again that has not ended since the last time: a node may have been restarted
+        in it. Who holds a gate does that.
+        """
+        now = self._state.time_ns
+        if now == self._reminded_ns:
+            self._publish_all()
+        self._reminded_ns = now
 
     def _hold(self) -> None:
         """Publish the state, or wait at the gate until it may be published."""

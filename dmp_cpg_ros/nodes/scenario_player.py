@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.core.scenario.fault import Fault
 from dmp_cpg_ros.core.scenario.push import Push
-from dmp_cpg_ros.core.scenario.scenario import Command, Scenario
+from dmp_cpg_ros.core.scenario.scenario import Action, Command, Scenario
 from dmp_cpg_ros.core.suite_parameters import CHANGEABLE, OWNER
 from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.cdr import unless_refused
@@ -224,6 +224,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         What the body does, as last told; empty before.
     begun : bool
         Whether the scenario plays.
+    busy : bool
+        Whether an action is being delivered.
     """
 
     def __init__(self, scenario: Scenario, tick_ns: int, lock_step: bool,
@@ -233,7 +235,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._tick_ns, self._lock_step, self._say = tick_ns, lock_step, say
         self._actions, self._next = scenario.timeline(tick_ns), 0
         self._end_ns = scenario.ticks(tick_ns) * tick_ns
-        self.begun, self._busy, self._word = False, False, ''
+        self.begun, self.busy, self._word = False, False, ''
         self._holding_ns, self._inhibition_ns = -1, -1
         self.time_ns, self.mode, self.drive, self.finished = 0, '', DRIVE_MODES[0], Future()
         self._until_ns, self._again_ns = -1, 0
@@ -248,6 +250,8 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._setter = ParameterSetter(self)
         self._robot = self.create_client(
             SetParametersAtomically, f'{GATE_OWNER}/set_parameters_atomically')
+        self._turn = 0
+        self._unanswered: Action | None = None
         self._deliver: dict[str, Callable[[Any], None]] = {
             'command': self._send, 'push': self._push, 'votes': self._vote, 'set': self._set,
             'fail': self._fail, 'gait': lambda name: self._set({'gait': name}),
@@ -288,6 +292,14 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """
         for topic in self._topics.values():
             topic.renew(nodes)
+        if self.busy:
+            self._ask_again(nodes)
+        self.remind()
+
+    def remind(self) -> None:
+        """Let the robot tell its last tick again, in lock-step: what a node that was restarted
+        has told too early is not believed, for the node before it was heard until then.
+        """
         if self._lock_step and self._until_ns >= 0:
             self._open(self._until_ns)
 
@@ -307,13 +319,15 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         """Note that the inhibition node, which is the last of a tick, has finished it."""
         self._inhibition_ns = header_ns(message)
         if self._lock_step:
+            if self._unanswered is not None:
+                self._hand_over(self._unanswered)
             self._continue()
 
     def _continue(self) -> None:
         """Deliver what acts at the held tick once all nodes have finished the tick before, then
         open the gate.
         """
-        if (not self.begun or not self._lock_step or self._holding_ns < 0 or self._busy
+        if (not self.begun or not self._lock_step or self._holding_ns < 0 or self.busy
                 or self.finished.done()):
             return
         if self._holding_ns > 0 and self._inhibition_ns < self._holding_ns - self._tick_ns:
@@ -338,9 +352,33 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
         self._next += 1
         if action.label and not self._again_ns:
             self._say(self.time_ns * 1e-9, f'> {action.label}')
-        self._busy = True
-        self._deliver[action.kind](action.value)
+        self.busy = True
+        self._hand_over(action)
         return True
+
+    def _hand_over(self, action: Action) -> None:
+        """Deliver an action; when it was delivered before, no answer of then counts."""
+        self._turn, self._unanswered = self._turn + 1, None
+        self._deliver[action.kind](action.value)
+
+    def _this_time(self, done: Callable[..., None]) -> Callable[..., None]:
+        """Return what hears of the action that is being delivered, unless it is asked again."""
+        turn = self._turn
+        return lambda *answer: done(*answer) if turn == self._turn else None
+
+    def _ask_again(self, nodes: Collection[str]) -> None:
+        """Ask a node that was restarted before it has answered; in lock-step once ticks end, for
+        before its first one it refuses.
+        """
+        action = self._actions[self._next - 1]
+        asked = CHANGEABLE if action.kind in ('set', 'gait') else (
+            interface(action.kind).publishers if action.kind in self._callees else ())
+        if not set(nodes).intersection(asked):
+            return
+        if self._lock_step:
+            self._unanswered = action
+        else:
+            self._hand_over(action)
 
     def _send(self, command: Command) -> None:
         message = Twist()
@@ -372,7 +410,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._delivered()
 
     def _delivered(self) -> None:
-        self._busy = False
+        self.busy = False
         if self._lock_step:
             self._continue()
         else:
@@ -386,13 +424,13 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             if agreed:
                 self._say(self.time_ns * 1e-9, f'  {service}: {message}')
             elif not self._lock_step and self.time_ns < due_ns + REPEATED_NS:
-                self._busy, self._next = False, self._next - 1
+                self.busy, self._next = False, self._next - 1
                 self._again_ns = self.time_ns + REPEAT_NS
                 return
             self._again_ns = 0
             self._go_on(agreed, f'service {service}: {message}')
 
-        ask(self._callees[service], request, answered)
+        ask(self._callees[service], request, self._this_time(answered))
 
     def _go_on(self, agreed: bool, why_not: str) -> None:
         """Go on when a service has agreed, or end the run."""
@@ -423,7 +461,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             self._say(self.time_ns * 1e-9, f'  refused: {refusal}' if refusal else '  accepted')
             self._delivered()
 
-        self._setter.set(values, done)
+        self._setter.set(values, self._this_time(done))
 
     def _fail(self, fault: Fault) -> None:
         """Set the robot's parameter; the scenario goes on when it has taken it."""
@@ -441,7 +479,7 @@ class ScenarioPlayer(Node):  # type: ignore[misc]
             return
         if self.time_ns >= self._end_ns:
             self.finished.set_result(None)
-        elif not self._busy:
+        elif not self.busy:
             self._deliver_due()
 
     def stop(self) -> None:

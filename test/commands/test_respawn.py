@@ -22,7 +22,7 @@ from ros_processes import SHARED_HZ, NodeProcess, Processes
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import tilt
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION
-from dmp_cpg_ros.suite_table import PROCESSES
+from dmp_cpg_ros.suite_table import PROCESSES, ROBOT
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
@@ -60,6 +60,15 @@ def send(process: NodeProcess, node: str, number: int) -> None:
     pytest.fail(f'{node} does not run:\n{process.output}')
 
 
+def assert_undisturbed(run: Path) -> None:
+    """Every tick is there, and neither the body nor the gait shows that nodes have died."""
+    recording = load_recording(run)
+    assert np.allclose(np.diff(np.unique(recording.joints.time)), 0.004)
+    assert tilt(recording.odometry.quaternion).max() < 0.2
+    assert json.loads((run / 'metrics.json').read_text(encoding='utf-8'))[
+        'gait']['phase_error_rad_max'] < 0.05
+
+
 def test_in_lock_step_the_walk_goes_on_as_if_nobody_had_died(
         processes: Processes, tmp_path: Path) -> None:
     process = walk(processes, tmp_path, 4.0, '--lock-step', '--respawn')
@@ -70,12 +79,20 @@ def test_in_lock_step_the_walk_goes_on_as_if_nobody_had_died(
         process.wait_for_output(rf'{node} was ended by signal 9 \(SIGKILL\)', RUN_S)
     process.wait_for_output(AGAIN, RUN_S)
     assert process.wait(RUN_S) == 0, str(process)
-    recording = load_recording(tmp_path / 'run')
-    stamps = np.unique(recording.joints.time)
-    assert np.allclose(np.diff(stamps), 0.004)
-    assert tilt(recording.odometry.quaternion).max() < 0.2
-    assert json.loads((tmp_path / 'run' / 'metrics.json').read_text(encoding='utf-8'))[
-        'gait']['phase_error_rad_max'] < 0.05
+    assert_undisturbed(tmp_path / 'run')
+
+
+def test_in_lock_step_the_walk_goes_on_after_the_death_of_each_block(
+        processes: Processes, tmp_path: Path) -> None:
+    process = walk(processes, tmp_path, 6.0, '--lock-step', '--respawn', '--processes', 'blocks')
+    process.wait_for_output(r's +walking', RUN_S)
+    blocks = [name for name in PROCESSES['blocks'] if name != ROBOT]
+    for count, name in enumerate(blocks, 1):
+        send(process, PROCESSES['blocks'][name][0], signal.SIGKILL)
+        process.wait_for_output(rf'{name} was ended by signal 9 \(SIGKILL\)', RUN_S)
+        process.wait_for_output(rf'(?s)({AGAIN}.*){{{count}}}', RUN_S)
+    assert process.wait(RUN_S) == 0, str(process)
+    assert_undisturbed(tmp_path / 'run')
 
 
 def test_who_knows_of_a_stop_is_not_all_in_one_process() -> None:

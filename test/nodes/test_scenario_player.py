@@ -14,6 +14,7 @@ pytest.importorskip('rclpy')
 import rclpy
 import ros_processes
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
 
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.nodes import scenario_player
@@ -62,6 +63,12 @@ def asked_at(monkeypatch: pytest.MonkeyPatch, refusals: int, said: list[str]
     return player, asked
 
 
+def gains(stamp: int) -> JointState:
+    message = JointState()
+    set_stamp(message.header.stamp, stamp)
+    return message
+
+
 def test_it_asks_again_until_the_service_agrees(
         context: None, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
@@ -78,3 +85,31 @@ def test_what_is_refused_for_good_ends_the_run_with_the_reason(
     assert isinstance(player.finished.exception(), PlayerError)
     assert 'not yet' in str(player.finished.exception())
     assert REPEATED_NS <= asked[-1] - asked[0] < REPEATED_NS + 2 * REPEAT_NS
+
+
+def test_in_lock_step_who_is_restarted_before_it_has_answered_is_asked_again(
+        context: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once its ticks go on; what the one before might still answer does not count."""
+    asked: list[Callable[[bool, str], None]] = []
+    monkeypatch.setattr(scenario_player, 'ask', lambda client, request, done: asked.append(done))
+    said: list[str] = []
+    player = ScenarioPlayer(SCENARIO, TICK_NS, True, lambda _, text: said.append(text))
+    player.begin()
+    player._on_gains(gains(100_000_000 - TICK_NS))
+    holding = Clock()
+    set_stamp(holding.clock, 100_000_000)
+    player._on_holding(holding)
+    assert len(asked) == 1 and player.busy
+    player.renew(['posture_control'])
+    player._on_gains(gains(100_000_000 - TICK_NS))
+    assert len(asked) == 1
+    player.renew(['inhibition'])
+    assert len(asked) == 1
+    player._on_gains(gains(100_000_000 - TICK_NS))
+    assert len(asked) == 2 and player.busy
+    asked[0](False, 'of before')
+    assert player.busy and not player.finished.done()
+    asked[1](True, 'walking')
+    assert not player.busy and '  inhibit: walking' in said
+    player._on_gains(gains(100_000_000 - TICK_NS))
+    assert len(asked) == 2

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ros_processes
+from rclpy.parameter import Parameter
 from ros_processes import Ros
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
@@ -20,9 +21,12 @@ from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
 from dmp_cpg_ros.nodes.inhibition import InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
+from dmp_cpg_ros.nodes.messages.values import header_ns
+from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.suite import load_suite
+from dmp_cpg_ros.suite_table import ROBOT
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.model_reader import load_description
@@ -129,3 +133,23 @@ def test_a_leg_without_feedback_of_the_posture_says_nothing(ros: Ros) -> None:
             'posture_feedback': (state.time_ns - age, tick.feedback)})
         assert bool(sent) != silent and leg.health.has_problem('feedback') == silent
     leg.destroy_node()
+
+
+def test_a_robot_in_lock_step_tells_a_tick_again_that_does_not_end(ros: Ros) -> None:
+    robot, told = MujocoRobotNode(context=ros.context, parameter_overrides=[
+        Parameter('physics', value='perfect_tracking'), Parameter('lock_step', value=True),
+        Parameter('expected_nodes', value=[ROBOT])]), []
+    robot.start()
+    robot._state_publishers['joint_states'].publish = lambda message: told.append(
+        header_ns(message))
+    robot._start_when_connected()
+    assert told == [0]
+    robot._remind()
+    assert told == [0]
+    robot._remind()
+    assert told == [0, 0]
+    robot._step()
+    robot._hold()
+    robot._remind()
+    assert told == [0, 0, TICK]
+    robot.destroy_node()

@@ -153,6 +153,16 @@ def test_in_lock_step_the_writer_does_not_keep_to_the_clock() -> None:
             assert not watch.admits(number - 500, number * TICK_NS, now)
 
 
+def test_in_lock_step_a_late_reader_hears_the_newest_of_what_was_told_before() -> None:
+    """A latched topic that tells at every tick. Afterwards a stranger is one, behind or ahead."""
+    watch = WriterWatch(lambda: True, ticked=False, lock_step=True)
+    for number in (1, 48, 500, 2000, 2001, 2002):
+        assert watch.admits(number, 0, SILENT_NS)
+    for stranger in (1, 2, 1000, 5000):
+        assert not watch.admits(stranger, 0, SILENT_NS)
+    assert watch.admits(2003, 0, SILENT_NS)
+
+
 def test_without_numbers_everybody_is_heard() -> None:
     assert WriterWatch(lambda: False).admits(None, 0, 0)
 

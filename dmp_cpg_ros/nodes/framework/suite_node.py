@@ -268,13 +268,14 @@ class SuiteNode(GuardedLifecycleNode):
         """Create a publisher of an interface of the table."""
         topic = interface(name)
         qos = topic.publisher_qos
-        if topic.latched and self.lock_step:  # it tells at every tick, and the recorder may lag
+        repeated = topic.name in REPEATED and self.lock_step
+        if topic.latched and repeated:  # it tells at every tick, and the recorder may lag
             qos.depth = PUBLISHER_DEPTH
         publisher = self.create_publisher(topic.type, topic.name, qos)
         self._undo.append(partial(self.destroy_publisher, publisher))
         self._outputs.append((topic, publisher))
-        said = self._said if topic.name in REPEATED and self.lock_step else None
-        return SuitePublisher(publisher, topic.name, self.local, said)
+        return SuitePublisher(
+            publisher, topic.name, self.local, self._said if repeated else None)
 
     def listen(self, topic: str | Interface, callback: Callable[[Any], None], *,
                command: bool = False, raw: bool = False, wakes: bool = True,

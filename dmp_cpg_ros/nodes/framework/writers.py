@@ -161,8 +161,10 @@ class WriterWatch:
         if ahead < 1 or not self._last:
             return False
         if not self._ticked:
-            return self._last + ahead != self._stranger + 1 and (
-                ahead == 1 or (ahead <= LOST and self._stranger < 0))
+            # In lock-step a latched topic begins with what was told before its reader came, of
+            # which the reader's queue keeps the newest.
+            return self._last + ahead != self._stranger + 1 and (ahead == 1 or (
+                self._stranger < 0 and (self._lock_step or ahead <= LOST)))
         if self._learned < LEARNING:
             return ahead <= LOST and passed_ns >= (ahead - self._repeats) * SHORTEST_TICK_NS
         if self._lock_step:
