@@ -32,6 +32,7 @@ from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
+from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
@@ -65,10 +66,8 @@ class CanonicalOscillators(SuiteNode):
         self._state = self._canonical.initial_state(gaits.named(gait_name(self)), inhibition)
         self._inhibition = initial_inhibition(
             inhibition, self.parameters_of(CanonicalParameters).first_leg)
-        self._echoed: Inhibition | None = None
         self._silent: SilentStop | None = None
-        self._gains_writer = conversions.InhibitionGainsWriter()
-        self._echo = self.publisher('acting_gains')
+        self._known = KnownStop(self, 'acting_gains')
         self._watch = PhaseLockWatch()
         self._lock: PhaseLock | None = None
         self._writer = conversions.CanonicalStateWriter(tuple(gaits.gaits))
@@ -82,7 +81,7 @@ class CanonicalOscillators(SuiteNode):
 
     def activate(self) -> None:
         """Tell late joiners what acts."""
-        self._echo.publish(self._gains_writer.fill(0, self._inhibition))
+        self._known.learn(0, self._inhibition)
 
     def on_parameters(self) -> None:
         """Take over what may change while walking."""
@@ -115,12 +114,14 @@ class CanonicalOscillators(SuiteNode):
 
     def _take_inhibition(self, stamp_ns: int, gains: tuple[int, Inhibition] | None) -> None:
         """Take what was heard last, or stop the gait when it is too old."""
-        if gains is not None and (self.lock_step or stamp_ns - gains[0] <= SILENT_NS):
+        if gains is None:
+            return
+        known_ns, self._inhibition = gains
+        if self.lock_step or stamp_ns - known_ns <= SILENT_NS:
             if self._silent is not None:
                 self._silent = None
                 self.clear('inhibition')
-            self._inhibition = gains[1]
-        elif gains is not None:
+        else:
             if self._silent is None:
                 of = self.parameters_of
                 self._silent = SilentStop(GaitSupervisor(
@@ -128,10 +129,8 @@ class CanonicalOscillators(SuiteNode):
                     of(LegParameters).activity_rate), self._inhibition, stamp_ns)
                 self.warn('inhibition', 'inhibition is silent: the gait stops until it is back',
                           error=True)
-            self._inhibition = self._silent.inhibition
-        if self._echoed is None or _differ(self._inhibition, self._echoed):
-            self._echoed = self._inhibition
-            self._echo.publish(self._gains_writer.fill(stamp_ns, self._inhibition))
+            known_ns, self._inhibition = stamp_ns, self._silent.inhibition
+        self._known.learn(known_ns, self._inhibition)
 
     def _acting(self) -> Acting:
         state = self._state
@@ -161,11 +160,3 @@ class CanonicalOscillators(SuiteNode):
                 'gait_wanted': self._state.wanted.name,
                 'highest_speed': self._canonical.network(self._state.gait).highest_speed,
                 'certificate': certificate_words(self.certified.certificate)}
-
-
-def _differ(one: Inhibition, other: Inhibition) -> bool:
-    return one is not other and (
-        (one.requested, one.at_rest, one.automatic, one.opposite, one.region_radius,
-         one.rest_phase, one.gains.tobytes())
-        != (other.requested, other.at_rest, other.automatic, other.opposite, other.region_radius,
-            other.rest_phase, other.gains.tobytes()))

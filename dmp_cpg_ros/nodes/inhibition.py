@@ -39,6 +39,7 @@ from dmp_cpg_ros.core.voting.votes import VoteInbox
 from dmp_cpg_ros.core.voting.voting import Voting
 from dmp_cpg_ros.nodes.framework.certified import JUDGED, Acting, Certified, certificate_words
 from dmp_cpg_ros.nodes.framework.gaits import description_of, gait_name
+from dmp_cpg_ros.nodes.framework.known_stop import OthersKnow
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.interfaces import interface
@@ -50,8 +51,8 @@ FOLLOWING = conversions.DRIVE_MODES[0]
 HEARTBEAT_NS = 100_000_000
 """Time after which the gains are told again although they are the same [ns]."""
 
-PATIENT_TICKS = 25
-"""Ticks after which a restarted node begins although nobody tells what acts."""
+PATIENT_TICKS = 100
+"""Ticks after which a restarted node begins although somebody has not told what acts."""
 
 BLIND_NS = 250_000_000
 """Time on the robot's clock without a tick after which nothing is known of the gait [ns]."""
@@ -84,13 +85,12 @@ class InhibitionNode(SuiteNode):
         self._outlook: Outlook | None = None
         self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
         self._drive, self._joined, self._waited = FOLLOWING, False, 0
-        self._found: Inhibition | None = None
+        self._began_ns, self._asked = 0, False
         self._told: tuple[Any, ...] = ()
         self._publisher = self.publisher('inhibition_state')
         self._gains_writer = conversions.InhibitionGainsWriter()
         self._gains_publisher = self.publisher('inhibition_gains')
-        gains_reader = conversions.InhibitionGainsReader()
-        self.listen('acting_gains', lambda message: self._find(gains_reader.read(message)))
+        self._others = OthersKnow(self, self._take_up)
         self.listen('drive_mode', self._on_drive)
         if self.lock_step:
             self._memory_writer = conversions.GaitMemoryWriter(tuple(gaits.gaits))
@@ -191,26 +191,30 @@ class InhibitionNode(SuiteNode):
 
     # Restarts, and what is missing -------------------------------------------------------------
 
-    def _find(self, acting: Inhibition) -> None:
-        self._found = acting
-
     def _join(self, stamp_ns: int) -> bool:
         """Take up what acts on a gait that began before this node; the first tick of a run has
         the stamp 0. False while it is not known yet: what others know of a stop holds until then.
         """
         self._waited += 1
-        if stamp_ns > 0 and self._found is None and not self.lock_step and (
-                self._waited < PATIENT_TICKS):
+        if stamp_ns > 0 and not (
+                self._others.all_told or self.lock_step or self._waited >= PATIENT_TICKS):
             return False
-        self._joined = True
+        self._joined, self._began_ns = True, stamp_ns
         if stamp_ns > 0:
             # Who does not know whether it was stopped leaves it to the service to start.
             unknown = replace(self._supervisor.inhibition(self._state), automatic=False)
-            self._state = adopted(self._found or unknown, stamp_ns)
+            _, known = self._others.newest or (0, unknown)
+            self._state = adopted(known, stamp_ns)
             self._acting = self._supervisor.inhibition(self._state)
             if self._state.requested:
                 self._predict()
         return True
+
+    def _take_up(self, stamp_ns: int, acting: Inhibition) -> None:
+        """Take up a stop of the service of before this node that is told only now."""
+        if (self._joined and stamp_ns < self._began_ns and not self._asked
+                and acting.requested and not acting.automatic):
+            self._stop_now(automatic=False)
 
     @property
     def _barring(self) -> str:
@@ -225,9 +229,9 @@ class InhibitionNode(SuiteNode):
         if self._drive != FOLLOWING and self._x is not None:
             self._stop_now()
 
-    def _stop_now(self) -> None:
-        if not self._state.in_force:
-            self._state = self._supervisor.request(self._state, True, True)
+    def _stop_now(self, automatic: bool = True) -> None:
+        if not self._state.in_force or self._state.automatic and not automatic:
+            self._state = self._supervisor.request(self._state, True, automatic)
             self._acting = self._supervisor.inhibition(self._state)
             self._predict()
             self._publish()
@@ -273,6 +277,7 @@ class InhibitionNode(SuiteNode):
         on.
         """
         stop: bool = request.data
+        self._asked = True
         if self._x is None:
             return False, 'no canonical_state and reference yet; is canonical_oscillators running?'
         barring = self._barring

@@ -8,7 +8,9 @@ import json
 import os
 import re
 import signal
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -22,6 +24,8 @@ from ros_processes import SHARED_HZ, NodeProcess, Processes
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.analysis.motion import tilt
 from dmp_cpg_ros.core.suite_parameters import CANONICAL, INHIBITION
+from dmp_cpg_ros.nodes.framework.known_stop import TELLERS
+from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.suite_table import PROCESSES, ROBOT
 
 processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
@@ -35,16 +39,17 @@ HUNG_S = 3.0
 AGAIN = 'all nodes are ready again'
 
 
-def scenario(folder: Path, duration_s: float) -> str:
+def scenario(folder: Path, duration_s: float, events: Sequence[Mapping[str, Any]] = ()) -> str:
     file = folder / 'kills.yaml'
     file.write_text(json.dumps({'name': 'kills', 'duration': duration_s, 'events': [
-        {'at': 0.3, 'command': {'v_x': 0.4}}]}), encoding='utf-8')
+        {'at': 0.3, 'command': {'v_x': 0.4}}, *events]}), encoding='utf-8')
     return str(file)
 
 
-def walk(processes: Processes, folder: Path, duration_s: float, *arguments: str) -> NodeProcess:
-    return processes.executable('walk', scenario(folder, duration_s), '--no-report', '--out',
-                                str(folder / 'run'), *arguments)
+def walk(processes: Processes, folder: Path, duration_s: float, *arguments: str,
+         events: Sequence[Mapping[str, Any]] = ()) -> NodeProcess:
+    return processes.executable('walk', scenario(folder, duration_s, events), '--no-report',
+                                '--out', str(folder / 'run'), *arguments)
 
 
 def send(process: NodeProcess, node: str, number: int) -> None:
@@ -96,10 +101,37 @@ def test_in_lock_step_the_walk_goes_on_after_the_death_of_each_block(
 
 
 def test_who_knows_of_a_stop_is_not_all_in_one_process() -> None:
-    """What acts is told by the oscillators to a restarted inhibition, and the other way round."""
+    """Of those who tell a restarted inhibition of it one is alone with what is never restarted."""
+    tellers = {kind for topic in TELLERS for kind in interface(topic).publishers}
+    assert ROBOT in tellers and all(
+        INHIBITION in interface(topic).subscribers and interface(topic).latched
+        for topic in TELLERS)
     for processes in (PROCESSES['each'], PROCESSES['blocks']):
-        (knows,) = (nodes for nodes in processes.values() if INHIBITION in nodes)
-        assert CANONICAL not in knows
+        (supervising,) = (nodes for nodes in processes.values() if INHIBITION in nodes)
+        assert not tellers.intersection(supervising)
+        assert (ROBOT,) in processes.values()
+
+
+@pytest.mark.parametrize('way', [
+    ('--lock-step', '--processes', 'each'), ('--lock-step', '--processes', 'blocks'),
+    ('--rate', str(SHARED_HZ))])
+def test_a_stop_of_the_service_outlives_inhibition_and_oscillators(
+        processes: Processes, tmp_path: Path, way: tuple[str, ...]) -> None:
+    """Under a command that never ends; afterwards the service can start the gait."""
+    resumed_s = 12.0 if '--lock-step' in way else 24.0
+    process = walk(processes, tmp_path, resumed_s + 2.0, *way, '--respawn', events=[
+        {'at': 1.5, 'inhibit': True}, {'at': resumed_s, 'inhibit': False}])
+    process.wait_for_output(r'(?s)> inhibit.*s +at rest', RUN_S)
+    dead = ('gait', 'supervision') if 'blocks' in way else (CANONICAL, INHIBITION)
+    for node in (CANONICAL, INHIBITION):
+        send(process, node, signal.SIGKILL)
+    for name in dead:
+        process.wait_for_output(rf'{name} was ended by signal 9 \(SIGKILL\)', RUN_S)
+    process.wait_for_output(AGAIN, RUN_S)
+    assert process.wait(RUN_S) == 0, str(process)
+    killed, resumed = process.output.index('was ended by'), process.output.index('> resume')
+    assert killed < resumed and 'walking' not in process.output[killed:resumed]
+    assert 'walking' in process.output[resumed:]
 
 
 @pytest.mark.parametrize('node', ['canonical_oscillators', 'inhibition'])

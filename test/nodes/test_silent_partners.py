@@ -18,7 +18,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
-from dmp_cpg_ros.nodes.inhibition import InhibitionNode
+from dmp_cpg_ros.nodes.inhibition import PATIENT_TICKS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.values import header_ns
@@ -53,8 +53,8 @@ def watching(ros: Ros, acting: Inhibition | None) -> tuple[InhibitionNode, int]:
     node = InhibitionNode('inhibition', context=ros.context)
     node.start()
     if acting is not None:
-        node._find(acting)
-    for _ in range(30):
+        node._others.hear('acting_gains', 0, acting)
+    for _ in range(PATIENT_TICKS + 1):
         node.on_tick(state.time_ns, {
             'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r,
             'posture_feedback': ('standing', None, None)})

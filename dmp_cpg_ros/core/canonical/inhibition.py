@@ -117,6 +117,16 @@ class Inhibition:
     share: float = 1.0
     quickness: float = 1.0
 
+    def differs(self, other: Inhibition) -> bool:
+        """Whether another one stops the gait in another way, or not: share and quickness, which
+        change all the time, are left aside.
+        """
+        return self is not other and (
+            (self.requested, self.at_rest, self.automatic, self.opposite, self.region_radius,
+             self.rest_phase, self.gains.tobytes())
+            != (other.requested, other.at_rest, other.automatic, other.opposite,
+                other.region_radius, other.rest_phase, other.gains.tobytes()))
+
     def acting_gains(self, x: Array, target: Array) -> Array:
         """Gains that act at a state: α_i inside C_i and zero outside.
 

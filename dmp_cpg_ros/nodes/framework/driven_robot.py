@@ -12,7 +12,9 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.core.suite_parameters import DriveParameters
+from dmp_cpg_ros.nodes.framework import known_stop
 from dmp_cpg_ros.nodes.framework.health import RobotTiming
+from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.values import header_ns
@@ -40,6 +42,8 @@ class DrivenRobot(SuiteNode):
             RobotTiming(), conversions.JointTargetsReader(description.joint_names))
         self._drive_mode, self._drive_publisher = '', self.publisher('drive_mode')
         self._silent_ns = -1
+        kept = KnownStop(self, 'kept_gains')
+        known_stop.listen(self, ('acting_gains',), lambda _, *known: kept.learn(*known))
         self.forget_targets()
 
     def forget_targets(self) -> None:

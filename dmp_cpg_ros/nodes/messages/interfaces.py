@@ -60,7 +60,8 @@ RECORDER_DEPTH = 8000
 GATE_OWNER = ROBOT
 """The node that holds the gate; its private topics bear its name."""
 
-DRIVEN = ('joint_states', 'imu', 'foot_contacts', '/clock', 'drive_mode', 'joint_targets')
+DRIVEN = ('joint_states', 'imu', 'foot_contacts', '/clock', 'drive_mode', 'joint_targets',
+          'acting_gains', 'kept_gains')
 """What the driver of a real robot writes and reads in the place of ``ROBOT``."""
 
 JOINT_BROADCASTER, IMU_BROADCASTER = 'joint_state_broadcaster', 'imu_sensor_broadcaster'
@@ -228,7 +229,10 @@ TOPICS: tuple[Interface, ...] = (
               (INHIBITION,), (REFERENCE, CANONICAL), latched=True),
     Interface('acting_gains', JointState,
               'what acts of inhibition_gains, when it changes: who restarts inhibition finds it',
-              (CANONICAL,), (INHIBITION,), latched=True),
+              (CANONICAL,), (INHIBITION, ROBOT), latched=True),
+    Interface('kept_gains', JointState,
+              'the newest of acting_gains: who restarts inhibition and the oscillators finds it',
+              (ROBOT,), (INHIBITION,), latched=True, recorded=False),
     Interface('gait_memory', JointState,
               'lock-step: canonical_state and reference of the last tick, for who is restarted',
               (INHIBITION,), (REFERENCE, CANONICAL), latched=True,
