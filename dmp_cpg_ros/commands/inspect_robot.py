@@ -13,6 +13,7 @@ from pathlib import Path
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.robot.model_reader import Inspection, inspect_model
+from dmp_cpg_ros.robot.robot_file import find_model
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -21,7 +22,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         'Find the legs of a quadruped in an MJCF and write its robot file, which walk --robot '
         'takes.'))
     add = parser.add_argument
-    add('model', metavar='FILE.xml', type=Path, help='MJCF file')
+    add('model', metavar='FILE.xml', help='MJCF file, also as package://PACKAGE/PATH of a Python '
+        'package or menagerie://ROBOT/PATH of MuJoCo Menagerie')
     add('--output', metavar='FILE.yaml', type=Path,
         help='where to write the robot file (default: print it)')
     add('--urdf', metavar='FILE.urdf', type=Path, help='write the robot as URDF too')
@@ -30,11 +32,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _inspect(options: argparse.Namespace, _: RosArguments) -> int:
-    found = inspect_model(options.model)
+    found = inspect_model(find_model(options.model, Path.cwd()))
+    asked = options.model if '://' in options.model else None
     if options.output is None:
-        print(robot_yaml(found), end='')
+        print(robot_yaml(found, name=asked), end='')
     else:
-        options.output.write_text(robot_yaml(found, options.output.parent), encoding='utf-8')
+        options.output.write_text(
+            robot_yaml(found, options.output.parent, asked), encoding='utf-8')
     if options.urdf is not None:
         from dmp_cpg_ros.robot.urdf import urdf
 
@@ -49,7 +53,7 @@ def _inspect(options: argparse.Namespace, _: RosArguments) -> int:
     return 0
 
 
-def robot_yaml(found: Inspection, folder: Path | None = None) -> str:
+def robot_yaml(found: Inspection, folder: Path | None = None, name: str | None = None) -> str:
     """Robot file of what was found, as text of at most 15 lines.
 
     Parameters
@@ -58,6 +62,8 @@ def robot_yaml(found: Inspection, folder: Path | None = None) -> str:
         What :func:`~dmp_cpg_ros.robot.model_reader.inspect_model` returned.
     folder : Path, optional
         Where the file will be; the model is then named relative to it when it lies below it.
+    name : str, optional
+        Name of the model, where it has one.
     """
     file = found.file
     joints = (f'  {leg}: [{", ".join(names)}]\n'
@@ -65,7 +71,7 @@ def robot_yaml(found: Inspection, folder: Path | None = None) -> str:
     feet = ', '.join(f'{leg}: {foot}' for leg, foot in zip(LEGS, file.feet, strict=True))
     return (
         f'# Found by inspect_robot in {file.model.name}; everything else is read from the model.\n'
-        f'model: {model_name(file.model, folder)}\nbase: {file.base}\njoints:\n'
+        f'model: {name or model_name(file.model, folder)}\nbase: {file.base}\njoints:\n'
         f'{"".join(joints)}feet: {{{feet}}}\n')
 
 

@@ -25,6 +25,7 @@ Triple = tuple[float, float, float]
 _REQUIRED = ('model', 'base', 'joints', 'feet')
 _PER_JOINT = ('kp', 'kd', 'torque_limit', 'velocity_limit')
 
+MENAGERIE = 'menagerie://'
 OWN_ROBOT = 'robots/mini_quadruped.yaml'
 _MODELS = Path(__file__).resolve().parents[1] / 'models'
 
@@ -143,14 +144,17 @@ def find_model(name: str, folder: Path | None) -> Path:
     """Return the path of a model file.
 
     `name` is looked up relative to `folder` (the robot file's), then among the package's own
-    models; ``package://NAME/PATH`` is a file inside an installed Python package.
+    models; ``package://NAME/PATH`` is a file inside an installed Python package, and
+    ``menagerie://ROBOT/PATH`` one of MuJoCo Menagerie, where its package has it already.
 
     Raises
     ------
     MissingFileError
         If it is in none of them; the message lists where it was looked for.
     """
-    if name.startswith('package://'):
+    if name.startswith(MENAGERIE):
+        places = [_menagerie_folder(name) / name[len(MENAGERIE):].partition('/')[2]]
+    elif name.startswith('package://'):
         package, _, inside = name[len('package://'):].partition('/')
         try:
             spec = importlib.util.find_spec(package) if package.isidentifier() else None
@@ -169,6 +173,26 @@ def find_model(name: str, folder: Path | None) -> Path:
             return place.resolve()
     looked = ', '.join(repr(str(place)) for place in places)
     raise MissingFileError(f'model {shown(name)} was not found; looked at {looked}')
+
+
+def _menagerie_folder(name: str) -> Path:
+    """Folder of a robot of MuJoCo Menagerie, as its package finds it; nothing is downloaded."""
+    robot = name[len(MENAGERIE):].partition('/')[0]
+    try:
+        import mujoco_menagerie
+    except ImportError:
+        raise MissingFileError(
+            f'model {shown(name)}: MuJoCo Menagerie is not installed: pip install '
+            'mujoco-menagerie') from None
+    try:
+        known, cache = mujoco_menagerie.get(robot), mujoco_menagerie.Cache()
+        if cache.root is not None or cache.is_cached(known):
+            return Path(cache.resolve(known))
+    except mujoco_menagerie.MenagerieError as error:
+        reason = str(error).partition('\n')[0]
+        raise MissingFileError(f'model {shown(name)}: {reason}') from None
+    raise MissingFileError(
+        f'model {shown(name)} is not on this machine: mujoco-menagerie prefetch {robot}')
 
 
 def _name(value: Any, where: str) -> str:

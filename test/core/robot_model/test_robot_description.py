@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 import re
+import sys
 from dataclasses import replace
 from importlib.util import find_spec
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +22,7 @@ from dmp_cpg_ros.robot.model_parts import find_ids, foot_position
 from dmp_cpg_ros.robot.model_reader import load_description, pose, read_description
 from dmp_cpg_ros.robot.mujoco_import import mujoco
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
+from dmp_cpg_ros.robot.robot_file import find_model, load_robot_file, own_robot_file
 from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 ROBOTS = ROOT / 'config' / 'robots'
@@ -224,6 +226,41 @@ def test_missing_files_are_named(tmp_path):
                     encoding='utf-8')
     with pytest.raises(MissingFileError, match="no Python package 'no_such_package'"):
         load_robot_file(path)
+
+
+class Menagerie(ModuleType):
+    """Stands in for MuJoCo Menagerie's package, which knows one robot."""
+
+    MenagerieError = type('MenagerieError', (Exception,), {})
+
+    def __init__(self, folder, cached):
+        super().__init__('mujoco_menagerie')
+        self.Cache = lambda: SimpleNamespace(
+            root=None, is_cached=lambda robot: cached, resolve=lambda robot: folder / robot)
+
+    def get(self, name):
+        if name != 'unitree_a1':
+            raise self.MenagerieError(f'no robot {name!r}\nthere are others')
+        return name
+
+
+def test_a_model_of_the_menagerie_is_found_and_never_fetched(tmp_path, monkeypatch):
+    (tmp_path / 'unitree_a1').mkdir()
+    model = tmp_path / 'unitree_a1' / 'a1.xml'
+    model.write_text('<mujoco/>', encoding='utf-8')
+
+    def find(name, menagerie):
+        monkeypatch.setitem(sys.modules, 'mujoco_menagerie', menagerie)
+        return find_model(f'menagerie://{name}', None)
+
+    assert find('unitree_a1/a1.xml', Menagerie(tmp_path, True)) == model.resolve()
+    for name, menagerie, text in (
+            ('unitree_a1/b1.xml', Menagerie(tmp_path, True), 'b1.xml.* was not found; looked at'),
+            ('unitree_a1/a1.xml', Menagerie(tmp_path, False), 'prefetch unitree_a1$'),
+            ('nessie/x.xml', Menagerie(tmp_path, True), "no robot 'nessie'$"),
+            ('unitree_a1/a1.xml', None, 'pip install mujoco-menagerie$')):
+        with pytest.raises(MissingFileError, match=text):
+            find(name, menagerie)
 
 
 def test_a_model_beside_the_yaml_file_wins(tmp_path):
