@@ -16,7 +16,7 @@ from messages import canonical_writer
 pytest.importorskip('rclpy')
 
 import ros_processes
-from core_examples import TICK_NS, network, quadruped, standing_state
+from core_examples import network, quadruped, standing_state
 from ros_processes import Processes, Ros
 from sensor_msgs.msg import JointState
 
@@ -27,9 +27,12 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.loop import Tick, WalkingLoop
 from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.core.voting.votes import VoteInbox
+from dmp_cpg_ros.nodes.framework.ticks import HOLD_TICKS
+from dmp_cpg_ros.nodes.inhibition import HEARTBEAT_NS
 from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter, read_votes
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.robot_state import RobotStateWriter
+from dmp_cpg_ros.nodes.messages.values import stamp_ns
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
 from dmp_cpg_ros.suite import load_suite
@@ -111,10 +114,15 @@ def test_a_scenario_that_votes_needs_voting(tmp_path: Path,
 
 def test_sensors_that_fall_silent_by_their_stamps_stop_the_gait(
         processes: Processes, ros: Ros) -> None:
-    """Real time; contacts are told, the IMU dies, and later a user votes what is no vote."""
+    """Contacts are told, the IMU dies, and later a user votes what is no vote. Who writes faster
+    than the node reads replaces what it wrote: a tick is told when the one before was answered
+    (without an IMU, some ticks later: what is silent is waited for).
+    """
     node = processes.node('inhibition', voting=True, start_inhibited=False, auto_inhibit=False)
     state = interface('inhibition_state')
     told = ros.collect(state.type, state.name, state.reader_qos)
+    gains = interface('inhibition_gains')
+    answers = ros.collect(gains.type, gains.name, gains.reader_qos)
     names = ('canonical_state', 'reference', 'foot_contacts', 'imu', 'votes')
     say = {name: ros.node.create_publisher(
         interface(name).type, name, interface(name).publisher_qos) for name in names}
@@ -124,10 +132,10 @@ def test_sensors_that_fall_silent_by_their_stamps_stop_the_gait(
     x, oscillators, reference = gait.locked_state(), canonical_writer(), ReferenceWriter()
     rate = gait.rate(x, np.zeros(3), Inhibition(False, np.zeros(4), 0.3))
     robot = RobotStateWriter()
-    at = {'ns': 0}
+    at = {'ns': -HEARTBEAT_NS}
 
     def tick(imu: bool) -> None:
-        at['ns'] += 5 * TICK_NS
+        at['ns'] += HEARTBEAT_NS
         robot.fill(standing_state(quadruped(), at['ns']))
         say['foot_contacts'].publish(robot.foot_contacts.serialized)
         if imu:
@@ -140,18 +148,21 @@ def test_sensors_that_fall_silent_by_their_stamps_stop_the_gait(
         return {entry.key: entry.value for entry in told[-1].status[0].values} if told else {}
 
     def until(wanted: Callable[[], bool], imu: bool) -> None:
-        def ticked() -> bool:
-            tick(imu)
-            return wanted()
+        def answered() -> bool:
+            lag_ns = 0 if imu else (1 + HOLD_TICKS) * HEARTBEAT_NS
+            return bool(answers) and stamp_ns(answers[-1].header.stamp) >= at['ns'] - lag_ns
 
-        ros.spin_until(ticked, what=lambda: f'{last()} {node}')
+        while not wanted():
+            tick(imu)
+            ros.spin_until(answered, what=lambda: f'{last()} {node}')
 
     until(lambda: at['ns'] > 1_000_000_000 and bool(told), True)
     assert last()['cause'] == 'none' and last()['requested'] == 'false'
     alive_ns = at['ns']
     until(lambda: last()['requested'] == 'true', False)
     assert last()['cause'] == 'fl silence, fr silence, rl silence, rr silence'
-    assert float(last()['request_stamp']) * 1e9 - alive_ns == pytest.approx(500_000_000, abs=5e7)
+    assert float(last()['request_stamp']) * 1e9 - alive_ns == pytest.approx(
+        500_000_000 + HEARTBEAT_NS)  # the first tick that is later than the limit
     until(lambda: last()['cause'] == 'none', True)
     assert last()['voted'] == 'true'
     say['votes'].publish(JointState(name=['fl'], effort=[math.nan]))
