@@ -27,7 +27,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParamete
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
-from dmp_cpg_ros.core.inhibition.caution import followed_share, room
+from dmp_cpg_ros.core.inhibition.caution import CLIMBING, LEAST, followed_share, room
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, push_step
 from dmp_cpg_ros.core.inhibition.step_timing import quickened
@@ -161,20 +161,25 @@ class GaitSupervisor:
         state = self._blocked(state, r, command, progress, network, body_mode, dt)
         state = self._voted(state, tally or state.tally, network)
         state = self._pushed(state, network, x, margins, body_mode)
-        quick, state = state.quickness > 1.0, self._balancing(state, margins, network, dt)
+        rough = progress is not None and progress.rough > 0.0
+        quick, state = state.quickness > 1.0, self._balancing(state, margins, network, rough, dt)
         if state.requested:
             return (replace_unchecked(state, armed=False, state='waiting') if quick
                     else self._stopping(state, network, x, rates, speed))
         return self._running(state, network.phase_errors(x), speed)
 
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
-                   network: GaitNetwork, dt: float) -> SupervisorState:
-        """Follow less of the command, and step faster, while the body is disturbed."""
+                   network: GaitNetwork, rough: bool, dt: float) -> SupervisorState:
+        """Follow less of the command, and step faster, while the body is disturbed; on rough
+        ground feet need their time to be lifted over it.
+        """
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.two_sided)
         predicted = state.requested or state.state == 'releasing'
         cautious = p.caution and not (predicted or state.push.acts)
-        share = followed_share(state.share, left, dt, state.block.most) if cautious else 1.0
-        free = p.step_timing and (state.push.acts or not predicted)
+        share = followed_share(
+            state.share, left, dt, state.block.most, CLIMBING if rough else LEAST
+        ) if cautious else 1.0
+        free = p.step_timing and (state.push.acts or not predicted) and not rough
         quickness = quickened(state.quickness, left if free else None, dt)
         same = (share, quickness) == (state.share, state.quickness)
         return state if same else replace_unchecked(state, share=share, quickness=quickness)
