@@ -15,15 +15,17 @@ follows, foot i stands
 over that plane, and is left there: its path has its stance at e_i − ``RAISED`` ρ instead of 0.
 A foot that is to stand and touches nothing goes on down, by ``SEARCHED`` l.
 
-**Rough.** ρ is the height of what the feet are to be lifted over. It grows to
+**Rough.** ρ is the height of what the feet are to be lifted over. It is 0 until one foothold is
+higher than the median of all by more than ``STEP`` l, l the length of the leg. A lower one tells
+nothing: the foot may as well hang in a gap, and to look for the ground there, or to count on it,
+overturns the robot. From there on ρ grows to
 
-- max e − min e, where this is more than ``UNEVEN`` l, l the length of the leg: feet stand on
-  steps;
+- max e − min e, where this is more than ``UNEVEN`` l: feet stand on steps, up or down;
 - h + ``MARGIN`` l for a foot that touches something in the middle of its swing, at h over the mean
   of the footholds: something is there, and is higher;
 
-up to ``HIGHEST`` l, and fades by e^(−s/(``FADES`` l)) on a way s. On flat ground neither occurs,
-ρ is 0 and so are all e_i.
+up to ``HIGHEST`` l, and fades by e^(−s/(``FADES`` l)) on a way s. On flat ground no foothold is
+that high, ρ is 0 and so are all e_i.
 """
 
 from __future__ import annotations
@@ -37,6 +39,11 @@ from dmp_cpg_ros.core.maths.vec3 import Triple, dot
 UNEVEN = 0.1
 """Difference between the heights of footholds that even ground does not feign, in lengths of the
 leg: six gaits on the flat have at most half of it.
+"""
+
+STEP = 0.25
+"""By how much a foothold is higher than the median that tells the first step, in lengths of the
+leg; the edge of a gap, into which a foot slips or the body leans, tells less.
 """
 
 SCUFFING = (0.25, 0.8)
@@ -125,12 +132,13 @@ class Terrain(NamedTuple):
             for now, last, share, touch in zip(feet, self.footholds, swung, touches, strict=True))
         heights = [dot(normal, foot) for foot in footholds]
         mean = sum(heights) / len(heights)
-        spread = max(heights) - min(heights)
+        low, lower, higher, high = sorted(heights)
         rough = 0.0 if anew else self.rough * exp(-way / (FADES * leg_length))
-        if spread > UNEVEN * leg_length:
-            rough = max(rough, spread)
+        if high - 0.5 * (lower + higher) > STEP * leg_length or (
+                rough and high - low > UNEVEN * leg_length):
+            rough = max(rough, high - low)
         for foot, share, touch in zip(feet, swung, touches, strict=True):
-            if touch and SCUFFING[0] < share < SCUFFING[1]:
+            if rough and touch and SCUFFING[0] < share < SCUFFING[1]:
                 height = dot(normal, foot) - mean
                 if height > CLEAR_OF_GROUND * leg_length:
                     rough = max(rough, height + MARGIN * leg_length)

@@ -20,6 +20,7 @@ from dmp_cpg_ros.core.balance.terrain import (
     MARGIN,
     RAISED,
     SEARCHED,
+    STEP,
     UNEVEN,
     Terrain,
 )
@@ -27,6 +28,7 @@ from dmp_cpg_ros.core.maths.vec3 import Triple
 
 LENGTH = 0.28
 NOTHING = Terrain()
+KNOWN = Terrain(0.02, ((0.0, 0.0, 0.0),) * 4, (0.0, 0.0, 0.3))
 UP = (0.0, 0.0, 1.0)
 STANDING, SWINGING = -0.2, 0.5
 PLACES = ((0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1))
@@ -50,14 +52,28 @@ def test_even_ground_leaves_nothing(z: list[float]) -> None:
 
 
 @given(heights)
-def test_feet_stand_where_the_ground_is(z: list[float]) -> None:
+def test_first_step_leads_up(z: list[float]) -> None:
+    z = (np.array(z) * STEP * LENGTH).tolist()
+    rough = felt(z)[0].rough
+    assert (rough > 0.0) == (max(z) - np.median(z) > STEP * LENGTH)
+    assert rough == 0.0 or rough == pytest.approx(max(z) - min(z))
+
+
+@pytest.mark.parametrize('z', [(0.0, 0.0, 0.0, -0.3), (0.06, 0.0, 0.0, -0.1)])
+def test_foot_that_hangs_in_a_gap_tells_nothing(z: tuple[float, ...]) -> None:
     terrain, level = felt(z)
+    assert (terrain.rough, level) == (0.0, LEVEL)
+
+
+@given(heights)
+def test_feet_stand_where_the_ground_is(z: list[float]) -> None:
+    terrain, level = felt(z, KNOWN)
     spread = max(z) - min(z)
-    if spread > UNEVEN * LENGTH:
+    if spread > KNOWN.rough:
         assert terrain.rough == pytest.approx(min(spread, HIGHEST * LENGTH))
         assert np.array(level) + RAISED * terrain.rough == pytest.approx(np.array(z) - np.mean(z))
     else:
-        assert (terrain.rough, level) == (0.0, LEVEL)
+        assert terrain.rough == KNOWN.rough
 
 
 def test_slope_of_the_plane_is_even() -> None:
@@ -82,12 +98,13 @@ def test_memory_fades_on_the_way_alone() -> None:
 
 
 def test_swinging_foot_that_touches_tells_a_step() -> None:
-    terrain, _ = felt((0.0,) * 4)
+    terrain = felt((0.0,) * 4, KNOWN)[0]
     swung, touches = (SWINGING, STANDING, STANDING, STANDING), (True,) * 4
     met, _ = felt((0.05, 0.0, 0.0, 0.0), terrain, swung=swung, touches=touches)
     assert met.rough == pytest.approx(0.05 + MARGIN * LENGTH)
     missed, _ = felt((0.05, 0.0, 0.0, 0.0), terrain, swung=swung, touches=(False, *touches[1:]))
-    assert missed.rough == 0.0
+    assert missed.rough == KNOWN.rough
+    assert felt((0.05, 0.0, 0.0, 0.0), felt((0.0,) * 4)[0], swung=swung)[0].rough == 0.0
     assert missed.footholds == terrain.footholds  # where it swings is no foothold
 
 
