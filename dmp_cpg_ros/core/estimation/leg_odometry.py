@@ -160,11 +160,6 @@ def force_from_torque(jacobian: Array, torque: Array, normal_in_base: Array) -> 
 STEEPEST = 0.7
 """Largest slope that is believed; 35 degrees."""
 
-TILTING = 0.4
-"""Largest rate at which the slope follows [1/s]: on stairs footholds tell now a step, now two on
-the length of the body, and the plane is to be what they are in the mean.
-"""
-
 STANDING = 0.5
 """Trust in a contact from which its place counts as a foothold."""
 
@@ -213,9 +208,6 @@ def terrain_step(terrain: TerrainState, contact_in_world: Sequence[Triple], trus
     footholds = tuple(now if stands >= STANDING else before for now, before, stands in feet)
     share = 1.0 - exp(-dt / time_constant)
     (x, y), (x_now, y_now) = terrain.slope, fitted_slope(footholds)
-    change = share * hypot(x_now - x, y_now - y)
-    if change > TILTING * dt:
-        share *= TILTING * dt / change
     return TerrainState(footholds, (x + share * (x_now - x), y + share * (y_now - y)))
 
 
