@@ -331,7 +331,7 @@ class SuiteNode(GuardedLifecycleNode):
         elif watched:
             receive = self.writers.only(topic, callback, read)
         subscription = self.create_subscription(
-            topic.type, topic.name, receive, qos or topic.reader_qos, raw=True)
+            topic.type, topic.name, receive, qos or self._qos_of(topic), raw=True)
         if informed:
             subscription._callback_type = type(subscription).CallbackType.WithMessageInfo
         self._undo.append(partial(self.destroy_subscription, subscription))
@@ -341,6 +341,11 @@ class SuiteNode(GuardedLifecycleNode):
         if not wakes:
             self._not_waking[topic.name] = subscription
         return subscription
+
+    def _qos_of(self, topic: Interface) -> QoSProfile:
+        delivery = self.parameters_of(parameters.NodeParameters).delivery
+        lossy = delivery == parameters.BEST_EFFORT and not self.lock_step
+        return topic.lossy_qos if lossy else topic.reader_qos
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
