@@ -98,6 +98,7 @@ class BodyState:
         else:
             node.get_logger().info(WITHOUT_TF)
         self._published, self._problem_ns = -1, 0
+        self._problems: dict[str, None] = {}
         self.on_parameters()
 
     def on_parameters(self) -> None:
@@ -153,9 +154,12 @@ class BodyState:
     def _tell_problems(self, stamp_ns: int, estimate: BodyEstimate) -> None:
         if estimate.problems:
             self._problem_ns = stamp_ns
+            # Over a link that loses packets it is another one every time.
+            self._problems = dict.fromkeys((*self._problems, *estimate.problems))
             self._node.warn('sensors', 'the estimator does without '
-                            f'{", ".join(estimate.problems)}: silent, not finite, or impossible')
+                            f'{", ".join(self._problems)}: silent, not finite, or impossible')
         elif stamp_ns > self._problem_ns + WELL_AGAIN_NS:
+            self._problems = {}
             self._node.clear('sensors')
 
 

@@ -52,14 +52,20 @@ class Timing:
 
     Attributes
     ----------
-    ticks : int
-        That were published.
+    ticks, carried : int
+        At which the robot moved its joints, and at which it carried targets on that were late.
     latencies : Durations
         From a state to the last of its targets.
     """
 
     ticks: int = 0
+    carried: int = 0
     latencies: Durations = field(default_factory=Durations)
+
+    def since(self, before: Timing) -> Timing:
+        """What has been counted after another report."""
+        return Timing(self.ticks - before.ticks, self.carried - before.carried,
+                      Durations(self.latencies - before.latencies))
 
 
 class LinkWatch:
@@ -196,4 +202,5 @@ class LinkWatch:
 
     def _count(self, values: dict[str, Any]) -> None:
         if 'latencies' in values:
-            self.timing = Timing(int(values['timed_ticks']), Durations.parse(values['latencies']))
+            self.timing = Timing(int(values['guarded_ticks']), int(values['carried_ticks']),
+                                 Durations.parse(values['latencies']))

@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A link between two TUN devices that delays and loses packets, for kernels without netem.
 
-``python -m dmp_cpg_ros.studies.lossy_link FD FD SEED`` hands IP packets from either device to the other.
-Every packet is lost or delayed by a draw of its own, uniform in delay ± jitter, so that packets
-may overtake one another, as with ``tc qdisc add dev DEVICE root netem delay 5ms 2ms loss 1%`` on
-both ends. What it does is told on its standard input, one line of numbers at a time, and it ends
-with that; what it has done is then the line that it writes.
+``python -m dmp_cpg_ros.studies.lossy_link FD FD SEED`` hands IP packets from either device to the
+other. Every packet is lost or delayed by a draw of its own, uniform in delay ± jitter, so that
+packets may overtake one another, as with ``tc qdisc add dev DEVICE root netem delay 5ms 2ms loss
+1%`` on both ends. What it does is told on its standard input, one line of numbers at a time, and
+it ends with that; what it has done is then the line that it writes.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ OWN, DEVICE = '/proc/self/ns/net', 'link0'
 
 
 class NoHostsError(DmpCpgError):
-    """This process may not make network namespaces, or has no TUN."""
+    """Network namespaces or TUN devices may not be made here."""
 
 
 class Host:
@@ -103,7 +103,8 @@ class TwoHosts:
         self.hosts = Host('10.87.0.1'), Host('10.87.0.2')
         devices = [host.device for host in self.hosts]
         self._link = subprocess.Popen(
-            [sys.executable, '-m', 'dmp_cpg_ros.studies.lossy_link', *map(str, devices), str(seed)],
+            [sys.executable, '-m', 'dmp_cpg_ros.studies.lossy_link',
+             *map(str, (*devices, seed))],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, pass_fds=devices,
             start_new_session=True)
         self.change(conditions)

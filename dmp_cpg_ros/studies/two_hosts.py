@@ -4,9 +4,10 @@
 
 The hosts are two network namespaces; lossy_link.py is the link, with the same conditions in either
 direction. On the robot's host are mujoco_robot and who watches and commands it, on the other one
-all other nodes. The robot walks for --seconds of its time; with --then the link becomes another one
-then, and it goes on for as long. Time never waits for targets here, as that of a real robot (longest_lag is 0). Needs
-CAP_SYS_ADMIN, CAP_NET_ADMIN and /dev/net/tun. Exit status 1 when the robot fell.
+all other nodes. The robot walks for --seconds of its time; with --then the link becomes another
+one then, and it goes on for as long. Time never waits for targets here, as that of a real robot
+(longest_lag is 0), so that a machine on which others compute is a slow link, too: chrt -r 1 keeps
+them out. Needs CAP_SYS_ADMIN, CAP_NET_ADMIN and /dev/net/tun. Exit status 1 when the robot fell.
 """
 
 from __future__ import annotations
@@ -34,13 +35,12 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.commands.suite_run import ENDED_WITHIN_S
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.nodes.framework.execution import RANGE, make_executor, prepare_middleware
-from dmp_cpg_ros.nodes.framework.health import Durations
 from dmp_cpg_ros.nodes.framework.parameters import BEST_EFFORT, DELIVERIES
-from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, LinkWatch, Timing
+from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, LinkWatch
 from dmp_cpg_ros.studies.lossy_link import Conditions
 from dmp_cpg_ros.studies.network_hosts import TwoHosts
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
-from dmp_cpg_ros.suite_table import COMPOSED, PROCESSES, ROBOT, WALKING_NODES, instances
+from dmp_cpg_ros.suite_table import COMPOSED, PROCESSES, ROBOT, instances
 
 PEERS = 'ROS_STATIC_PEERS'
 
@@ -52,8 +52,8 @@ lead [ms].
 BEGIN_S, END_S = 3.0, 4.0
 """Of the robot's time before its speed counts, and for its stop at the end [s]."""
 
-COLUMNS = ('gait', 'm/s', 'link, each way', 'lead ms', 's', 'fell', 'm/s kept', 'late or lost',
-           'drive', 'body, stop', 'real time')
+COLUMNS = ('gait', 'm/s', 'link, each way', 'lead ms', 's', 'fell', 'm/s kept', 'carried on',
+           'after ms, median / 99 %', 'drive', 'body, stop', 'real time')
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,9 @@ class Phase:
     speed : float
         Mean [m/s].
     late : float
-        Share of ticks whose targets came after the lead, or not at all.
+        Share of ticks at which targets of a leg were late or lost, and former ones carried on.
+    median_ms, most_ms : float
+        From a state to the last of its targets, in the median and of 99 % [ms].
     drive, body, stop, posture : str
         At the end.
     real_time : float
@@ -109,6 +111,8 @@ class Phase:
     fell: bool
     speed: float
     late: float
+    median_ms: float
+    most_ms: float
     drive: str
     body: str
     stop: str
@@ -120,14 +124,6 @@ def lead_for(link: Conditions) -> float:
     """Lead in whole ticks for a link [ms]: there and back, a lost message, and computing."""
     needed = 2.0 * (link.delay_ms + link.jitter_ms) + TICK_MS + COMPUTED_MS
     return min(LONGEST_LEAD_MS, TICK_MS * ceil(needed / TICK_MS))
-
-
-def late_share(before: Timing, after: Timing, lead_ms: float) -> float:
-    """Share of the ticks between two reports whose targets came after the lead, or never."""
-    new = Durations(after.latencies)
-    new.subtract(before.latencies)
-    in_time = sum(count for bin_, count in new.items() if 10.0**(bin_ / 100.0) <= 1e-3 * lead_ms)
-    return 1.0 - min(1.0, in_time / max(1, after.ticks - before.ticks))
 
 
 def walk(two: TwoHosts, setting: Setting, links: Sequence[Conditions], folder: Path, *,
@@ -169,11 +165,14 @@ def _phase(watch: LinkWatch, setting: Setting, link: Conditions) -> Phase:
     wall, begin, timing, first = (
         time.monotonic(), watch.seconds, watch.timing, len(watch.travelled))
     watch.run(setting.seconds)
+    new = watch.timing.since(timing)
+    median_s, most_s = (new.latencies.percentile(percent) for percent in (50.0, 99.0))
     return Phase(
-        str(link), watch.highest_tilt > FALLEN_TILT,
-        fmean(speed for _, speed in watch.travelled[first:]),
-        late_share(timing, watch.timing, setting.lead_ms), watch.drive, watch.body, watch.stop,
-        watch.posture, (watch.seconds - begin) / (time.monotonic() - wall))
+        link=str(link), fell=watch.highest_tilt > FALLEN_TILT,
+        speed=fmean(speed for _, speed in watch.travelled[first:]),
+        late=new.carried / max(1, new.ticks), median_ms=1e3 * median_s, most_ms=1e3 * most_s,
+        drive=watch.drive, body=watch.body, stop=watch.stop, posture=watch.posture,
+        real_time=(watch.seconds - begin) / (time.monotonic() - wall))
 
 
 @contextmanager
@@ -238,7 +237,8 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
     first = Conditions(options.delay_ms, options.jitter_ms, options.loss, not options.peers)
     links = [first]
     if options.then:
-        links.append(Conditions(*options.then, not options.peers))
+        delay_ms, jitter_ms, loss = options.then
+        links.append(Conditions(delay_ms, jitter_ms, loss, first.multicast))
     lead_ms = lead_for(first) if options.lead_ms is None else options.lead_ms
     setting = Setting(options.gait, options.speed, options.seconds, lead_ms, options.processes,
                       options.delivery, tuple(ros.parameters.items()))
@@ -261,10 +261,11 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
 
 
 def _row(setting: Setting, phase: Phase) -> tuple[str, ...]:
-    return (setting.gait, f'{setting.speed:g}', phase.link, f'{setting.lead_ms:g}',
-            f'{setting.seconds:g}', 'yes' if phase.fell else 'no', f'{phase.speed:.2f}',
-            f'{100.0 * phase.late:.1f} %', phase.drive, f'{phase.posture}, {phase.stop}',
-            f'{phase.real_time:.2f}')
+    return (
+        setting.gait, f'{setting.speed:g}', phase.link, f'{setting.lead_ms:g}',
+        f'{setting.seconds:g}', 'yes' if phase.fell else 'no', f'{phase.speed:.2f}',
+        f'{100.0 * phase.late:.1f} %', f'{phase.median_ms:.0f} / {phase.most_ms:.0f}',
+        phase.drive, f'{phase.posture}, {phase.stop}', f'{phase.real_time:.2f}')
 
 
 def _parser() -> argparse.ArgumentParser:
