@@ -13,7 +13,7 @@ from collections import deque
 WINDOW_NS = 1_000_000_000
 """Time over which targets are counted, by their stamps [ns]."""
 
-BORNE, LITTLE = 0.2, 0.15
+BORNE, LITTLE = 0.15, 0.1
 """Share that may be lost, and share at which a robot that has stopped for it follows again."""
 
 

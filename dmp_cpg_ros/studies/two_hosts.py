@@ -33,8 +33,15 @@ from dmp_cpg_ros.commands.fork_server import ForkServer
 from dmp_cpg_ros.commands.processes import ProcessGroup
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.commands.suite_run import ENDED_WITHIN_S
+from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.errors import DmpCpgError
-from dmp_cpg_ros.nodes.framework.execution import RANGE, make_executor, prepare_middleware
+from dmp_cpg_ros.nodes.framework.execution import (
+    PROFILES,
+    RANGE,
+    VARIABLES,
+    make_executor,
+    prepare_middleware,
+)
 from dmp_cpg_ros.nodes.framework.parameters import BEST_EFFORT, DELIVERIES
 from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, LinkWatch
 from dmp_cpg_ros.studies.lossy_link import Conditions
@@ -203,8 +210,7 @@ def _suite(two: TwoHosts, setting: Setting, folder: Path, peers: bool
                 (controllers, robot, _without_robot(PROCESSES[setting.processes])),
                 (robot, controllers, {ROBOT: (ROBOT,)})):
             host.enter()
-            os.environ.update({RANGE: 'SUBNET', PEERS: other.address if peers else ''})
-            prepare_middleware()
+            _reach(other.address if peers else '')
             with ForkServer() as server:
                 groups.append(ProcessGroup(folder, server))
                 for name, nodes in processes.items():
@@ -213,6 +219,15 @@ def _suite(two: TwoHosts, setting: Setting, folder: Path, peers: bool
     finally:
         for group in groups:
             group.stop(ENDED_WITHIN_S)
+
+
+def _reach(peer: str) -> None:
+    """Let nodes that begin from now on look beyond their host, by a peer's address perhaps."""
+    for name in VARIABLES:  # who has started this may keep to this machine
+        if os.environ.get(name) == str(find_config(PROFILES[1])):
+            del os.environ[name]
+    os.environ.update({RANGE: 'SUBNET', PEERS: peer})
+    prepare_middleware()
 
 
 def _command(nodes: Sequence[str], arguments: Sequence[str]) -> list[str]:

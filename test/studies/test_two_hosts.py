@@ -10,14 +10,21 @@ import threading
 from pathlib import Path
 
 import pytest
-from support.ros_processes import Processes, processes, ros_domain
 
+pytest.importorskip('rclpy')
+pytest.importorskip('mujoco')
+
+import ros_processes
+from rclpy.qos import ReliabilityPolicy
+from ros_processes import Processes
+
+from dmp_cpg_ros.nodes.messages.interfaces import EVERY_TICK, TOPICS
 from dmp_cpg_ros.robot.target_loss import WINDOW_NS, TargetLoss
 from dmp_cpg_ros.studies.lossy_link import Conditions, LossyLink
 from dmp_cpg_ros.studies.network_hosts import Host, TwoHosts, may_make_hosts
 from dmp_cpg_ros.studies.two_hosts import lead_for
 
-__all__ = ('processes', 'ros_domain')
+processes, ros_domain = ros_processes.processes, ros_processes.ros_domain
 
 TICK_NS = 4_000_000
 NEEDS_HOSTS = pytest.mark.skipif(
@@ -70,6 +77,14 @@ def test_what_is_lost_is_counted_by_stamps(every: int) -> None:
     assert loss.share == 0.0
 
 
+def test_what_comes_at_every_tick_is_read_as_it_comes_over_a_link_and_nothing_else() -> None:
+    for topic in TOPICS:
+        lossy = topic.lossy_qos.reliability == ReliabilityPolicy.BEST_EFFORT
+        assert lossy == (topic.name in EVERY_TICK), topic.name
+        assert topic.reader_qos.reliability == ReliabilityPolicy.RELIABLE
+    assert {topic.name for topic in TOPICS} >= set(EVERY_TICK)
+
+
 def bound_on(host: Host) -> socket.socket:
     """UDP socket on a host; it stays there."""
     made: list[socket.socket] = []
@@ -107,7 +122,8 @@ def test_a_robot_walks_by_controllers_on_another_host_and_stands_when_the_link_i
     results = tmp_path / 'results.json'
     study = processes.python(
         '-m', 'dmp_cpg_ros.studies.two_hosts', '--seconds', '1.5', '--then', '0', '0', '100',
-        '--peers', '--json', str(results), '--ros-args', '-p', 'longest_lag:=0.024')
+        '--loss', '0', '--delivery', 'reliable', '--peers', '--json', str(results),
+        '--ros-args', '-p', 'longest_lag:=0.024')
     assert study.wait(240.0) == 0, study
     told = json.loads(results.read_text(encoding='utf-8'))
     walked, cut = told['phases']

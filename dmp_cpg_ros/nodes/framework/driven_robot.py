@@ -53,8 +53,8 @@ class DrivenRobot(SuiteNode):
         p = self._drive_options
         self._guard = CommandWatchdog(self._description, round(p.target_timeout * 1e9),
                                       round(p.target_lead * 1e9),
-                                      0 if self.lock_step else self.parameters_of(
-                                          TickParameters).tick_ns)
+                                      self.parameters_of(TickParameters).tick_ns
+                                      if self.lossy else 0)
         self._guard.drives.watches = self.has_drives
 
     @property
