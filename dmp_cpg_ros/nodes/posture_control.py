@@ -97,8 +97,8 @@ class BodyState:
             self._transform = TransformWriter(robot_state.ODOM_FRAME, robot_state.BASE_FRAME)
         else:
             node.get_logger().info(WITHOUT_TF)
-        self._published, self._problem_ns = -1, 0
-        self._problems: dict[str, None] = {}
+        self._published = -1
+        self._problems: dict[str, int] = {}
         self.on_parameters()
 
     def on_parameters(self) -> None:
@@ -152,14 +152,16 @@ class BodyState:
                 'gyro_bias_rad_s': ' '.join(f'{bias:.5f}' for bias in memory.filter.gyro_bias)}
 
     def _tell_problems(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+        """Name what has been missing lately: over a link that loses packets it is another sensor
+        every time.
+        """
+        seen = {**self._problems, **dict.fromkeys(estimate.problems, stamp_ns)}
+        self._problems = problems = {
+            name: at for name, at in seen.items() if at >= stamp_ns - WELL_AGAIN_NS}
         if estimate.problems:
-            self._problem_ns = stamp_ns
-            # Over a link that loses packets it is another one every time.
-            self._problems = dict.fromkeys((*self._problems, *estimate.problems))
             self._node.warn('sensors', 'the estimator does without '
-                            f'{", ".join(self._problems)}: silent, not finite, or impossible')
-        elif stamp_ns > self._problem_ns + WELL_AGAIN_NS:
-            self._problems = {}
+                            f'{", ".join(sorted(problems))}: silent, not finite, or impossible')
+        elif not problems:
             self._node.clear('sensors')
 
 

@@ -131,4 +131,6 @@ def test_a_robot_walks_by_controllers_on_another_host_and_stands_when_the_link_i
     assert walked['speed'] > 0.1  # a machine that lets it wait lets it walk slowly
     assert cut['drive'] == 'stand' and cut['posture'] == 'standing'
     assert not walked['fell'] and not cut['fell']
-    assert any('mujoco_robot: no targets from fl, fr, rl, rr' in text for _, text in told['said'])
+    # which of the two reasons it gives depends on what was late before
+    assert any('mujoco_robot: ' in text and 'looks after itself: it takes up a stand' in text
+               for _, text in told['said']), told['said']
