@@ -157,7 +157,7 @@ class BodyState:
         """
         seen = {**self._problems, **dict.fromkeys(estimate.problems, stamp_ns)}
         self._problems = problems = {
-            name: at for name, at in seen.items() if at >= stamp_ns - WELL_AGAIN_NS}
+            name: at for name, at in seen.items() if stamp_ns - WELL_AGAIN_NS <= at <= stamp_ns}
         if estimate.problems:
             self._node.warn('sensors', 'the estimator does without '
                             f'{", ".join(sorted(problems))}: silent, not finite, or impossible')
