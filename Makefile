@@ -83,7 +83,7 @@ demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ 
 	$(ACTIVATED) walk $(WALK_ARGS)
 
 test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
-	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal $(PYTEST_ARGS)
+	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal --durations=20 --durations-min=8 $(PYTEST_ARGS)
 
 study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, walk, trot (STUDY_ARGS=...)
 	$(ACTIVATED) study_stops $(STUDY_ARGS)

@@ -167,7 +167,8 @@ class WalkingLoop:
             self.stop.state in ('walking', 'free'), self.inbox.take())
         self.stop = self.supervisor.step(
             self.stop, state.time_ns, network, x, x_dot, r, command, self.votes.tally,
-            self.mode.mode, feedback.margins, feedback.progress)
+            self.mode.mode, feedback.margins, feedback.progress,
+            None if self.parameters.gait_choice.auto_gait else canon.wanted)
         self.inhibition = self.supervisor.inhibition(self.stop)
         targets = self._joint_targets(state, x_dot, feedback, dt)
         return Tick(state.time_ns, r, x, x_dot, self.stop, feedback, targets, self.mode, gait)

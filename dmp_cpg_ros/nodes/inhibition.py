@@ -150,7 +150,7 @@ class InhibitionNode(SuiteNode):
             before.state in ('walking', 'free'), self._inbox.take())
         self._state = self._supervisor.step(
             before, stamp_ns, network, self._x, self._x_dot, self._r, self._gate.at(stamp_ns),
-            self._votes.tally, self._barring, margins, progress)
+            self._votes.tally, self._barring, margins, progress, self.certified.wanted)
         self._acting = self._supervisor.inhibition(self._state)
         if self._state.requested != before.requested:
             self._predict()

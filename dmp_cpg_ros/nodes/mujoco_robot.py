@@ -139,7 +139,7 @@ class MujocoRobotNode(DrivenRobot):
     def diagnostic_values(self) -> Mapping[str, Any]:
         """Timing, and whether the robot has fallen or stands by itself."""
         return {**self._timing.values(), 'fell': self._fell, 'time_s': self._state.time_ns * 1e-9,
-                'silent_legs': ' '.join(self._guard.silent(self._state.time_ns)) or 'none'}
+                **self.watchdog_values()}
 
     def check_parameters(self, sets: Sets) -> None:
         """Refuse what is no failure, and every one unless they are allowed."""

@@ -97,7 +97,8 @@ class BodyState:
             self._transform = TransformWriter(robot_state.ODOM_FRAME, robot_state.BASE_FRAME)
         else:
             node.get_logger().info(WITHOUT_TF)
-        self._published, self._problem_ns = -1, 0
+        self._published = -1
+        self._problems: dict[str, int] = {}
         self.on_parameters()
 
     def on_parameters(self) -> None:
@@ -151,11 +152,16 @@ class BodyState:
                 'gyro_bias_rad_s': ' '.join(f'{bias:.5f}' for bias in memory.filter.gyro_bias)}
 
     def _tell_problems(self, stamp_ns: int, estimate: BodyEstimate) -> None:
+        """Name what has been missing lately: over a link that loses packets it is another sensor
+        every time.
+        """
+        seen = {**self._problems, **dict.fromkeys(estimate.problems, stamp_ns)}
+        self._problems = problems = {
+            name: at for name, at in seen.items() if stamp_ns - WELL_AGAIN_NS <= at <= stamp_ns}
         if estimate.problems:
-            self._problem_ns = stamp_ns
             self._node.warn('sensors', 'the estimator does without '
-                            f'{", ".join(estimate.problems)}: silent, not finite, or impossible')
-        elif stamp_ns > self._problem_ns + WELL_AGAIN_NS:
+                            f'{", ".join(sorted(problems))}: silent, not finite, or impossible')
+        elif not problems:
             self._node.clear('sensors')
 
 

@@ -113,7 +113,7 @@ class Ros2ControlDriver(DrivenRobot):
         """Timing, and whether the joints are commanded and follow the legs."""
         return {**self._timing.values(), 'enabled': self._enabled, 'commanding': self._commanding,
                 'drive_mode': self._drive_mode, 'time_s': self._state.time_ns * 1e-9,
-                'silent_legs': ' '.join(self._guard.silent(self._state.time_ns)) or 'none'}
+                **self.watchdog_values()}
 
     # What is measured ----------------------------------------------------------------------------
 

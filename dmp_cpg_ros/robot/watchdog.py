@@ -7,7 +7,7 @@ stands; without a rhythm it puts its feet down at once. A standing robot holds i
 is upright but low (on its way up or down, or on its belly) is lowered onto its belly. So is one
 with a leg that gives no torque, as fast as it would fall: three legs do not carry a body that
 moves, and from its belly nothing falls. The joints of a tilted one are damped. Targets are
-followed again when they rest where the joints are.
+followed again when they rest where the joints are, and act in time.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from dmp_cpg_ros.core.robot_model.state import JOINTS_OF_LEG, LEGS, JointTargets
 from dmp_cpg_ros.robot.drive_watch import DriveWatch
 from dmp_cpg_ros.robot.last_cycle import LastCycle, Rhythm
 from dmp_cpg_ros.robot.start_pose import home_joint_position
+from dmp_cpg_ros.robot.target_loss import BORNE, LITTLE, TargetLoss
 
 CARRIED_NS = 24_000_000
 """Age up to which late targets are carried on by their own velocity [ns]."""
@@ -83,6 +84,8 @@ class CommandWatchdog:
         Age of a leg's targets from which the robot falls back [ns].
     lead_ns : int
         Time after their stamp for which targets were computed [ns].
+    tick_ns : int
+        Time between two targets of a leg [ns]; 0: it does not look at what is lost.
 
     Attributes
     ----------
@@ -92,10 +95,18 @@ class CommandWatchdog:
         ``stand``, ``lie`` or ``damp`` while the robot falls back; else empty.
     drives : DriveWatch
         Which joints do not do what they are told.
+    lateness_ns : int
+        By how much the targets act too late, of the leg for which it is most [ns].
+    ticks, carried : int
+        How often targets were asked for since all legs were known, and how often some were carried
+        on.
     """
 
-    def __init__(self, description: RobotDescription, timeout_ns: int, lead_ns: int = 0) -> None:
+    def __init__(self, description: RobotDescription, timeout_ns: int, lead_ns: int = 0,
+                 tick_ns: int = 0) -> None:
         """Start without targets."""
+        self._losses = [TargetLoss(tick_ns, timeout_ns) for _ in LEGS]
+        self._losing = False
         self._timeout_ns, self._lead_ns, self._targets = timeout_ns, lead_ns, np.zeros((3, 12))
         self.stamps: list[int | None] = [None] * len(LEGS)
         self.fallback = ''
@@ -111,6 +122,7 @@ class CommandWatchdog:
         self._given, self._off = np.zeros(12), np.zeros(12)
         self._begin_ns = self._late_ns = self._uneasy_ns = self._taken_ns = 0
         self._lagged_ns = -1
+        self.lateness_ns = self.ticks = self.carried = 0
         self._start = self._targets
 
     def accept(self, leg: str, stamp_ns: int, targets: JointTargets) -> None:
@@ -120,13 +132,35 @@ class CommandWatchdog:
         if newest is not None and stamp_ns <= newest:
             return
         self.stamps[i] = stamp_ns
+        self._losses[i].accept(stamp_ns)
         self._memory.accept(i, stamp_ns + self._lead_ns, targets)
 
     def silent(self, now_ns: int) -> list[str]:
-        """Legs whose targets are missing or too old; all, where they are late all the time."""
+        """Legs whose targets are missing or too old; all, where they are late all the time, or
+        too many are lost.
+        """
         late = 0 < self._late_ns < now_ns - LATE_NS
+        return list(LEGS) if late or self._losing else self.unheard(now_ns)
+
+    def unheard(self, now_ns: int) -> list[str]:
+        """Legs whose targets are missing or too old."""
         return [leg for leg, stamp in zip(LEGS, self.stamps, strict=True)
-                if late or stamp is None or now_ns - stamp > self._timeout_ns]
+                if stamp is None or now_ns - stamp > self._timeout_ns]
+
+    @property
+    def lost(self) -> float:
+        """Share of the targets that do not come, of the leg that lacks most."""
+        return max(loss.share for loss in self._losses)
+
+    @property
+    def losing(self) -> bool:
+        """Whether the robot falls back because too many targets are lost."""
+        return self._losing
+
+    @property
+    def outrun(self) -> bool:
+        """Whether the robot falls back while targets that come act too late."""
+        return bool(self.fallback) and self.lateness_ns > CARRIED_NS
 
     def age_ns(self, now_ns: int) -> int:
         """Age, beyond the lead, of the oldest targets of the legs that are not silent [ns]; 0
@@ -148,6 +182,12 @@ class CommandWatchdog:
     def _chosen(self, state: RobotState) -> JointTargets:
         now, known = state.time_ns, None not in self.stamps
         ages = self._take_what_acts(now)
+        self.lateness_ns = max(ages, default=0)
+        if known:
+            self.ticks, self.carried = self.ticks + 1, self.carried + (self.lateness_ns > 0)
+        if self.lateness_ns > CARRIED_NS:
+            self._lagged_ns = now
+        self._losing = self.lost > (LITTLE if self._losing else BORNE)
         if self.drives.limp or self.silent(now) or (
                 self.fallback and known and not self._at_ease(now)):
             return self._falling_back(state)
@@ -158,8 +198,6 @@ class CommandWatchdog:
         if any(ages):
             late = np.repeat(ages, len(JOINTS_OF_LEG))
             position += 1e-9 * np.clip(late, 0, CARRIED_NS) * velocity
-            if max(ages) > CARRIED_NS:
-                self._lagged_ns = now
         if self._lagged_ns >= now - (IN_TIME_NS if self._late_ns else 0):
             return JointTargets(*self._going_on(state, np.array((position, velocity, effort))))
         if self._late_ns:
@@ -198,9 +236,12 @@ class CommandWatchdog:
                 and condition.height >= STANDING_HEIGHT * self._stance_height)
 
     def _at_ease(self, now: int) -> bool:
-        """Whether the targets have rested for a while where the joints are held."""
+        """Whether the targets have rested for a while where the joints are held, and in time:
+        a robot that follows what is late would soon have to look after itself again.
+        """
         position, velocity, _ = self._targets
-        if np.abs(velocity).max() > SLOW or np.abs(position - self._given).max() > NEAR:
+        if (np.abs(velocity).max() > SLOW or np.abs(position - self._given).max() > NEAR
+                or self.lateness_ns > CARRIED_NS):
             self._uneasy_ns = now
         return now - self._uneasy_ns >= AT_EASE_NS
 

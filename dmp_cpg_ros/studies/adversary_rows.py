@@ -281,6 +281,20 @@ def _at_rest(loop: Oscillators) -> bool:
     return loop.stop.state == 'at_rest'
 
 
+def _rested(description: RobotDescription, case: Case, row: str, weaken: bool
+            ) -> Oscillators | Judged:
+    """The loop of a case at rest after a walk, or what is to be said of one that has none."""
+    made = _loop(description, case, row, weaken)
+    if made is None:
+        return None
+    loop, _ = made
+    _walk(loop, _SPEED, 2.0)
+    loop.request(True)
+    if _until(loop, lambda: _at_rest(loop), LONGEST_STOP) == math.inf:
+        return 'not at rest after the longest stop', math.inf
+    return loop
+
+
 def _suite(rng: np.random.Generator, parameters: Case, **more: Any) -> Case:
     return {'gait': str(rng.choice(list(GAITS))), 'tick_s': 0.004,
             'parameters': {**_FAST, **parameters}, **more}
@@ -297,14 +311,9 @@ def _draw_posture(rng: np.random.Generator, weaken: bool) -> Case:
 
 def _judge_posture(description: RobotDescription, case: Case, weaken: bool) -> Judged:
     """When rest is declared no foot is off the ground (line 13)."""
-    made = _loop(description, case, 'rest_posture', weaken)
-    if made is None:
-        return None
-    loop, _ = made
-    _walk(loop, _SPEED, 2.0)
-    loop.request(True)
-    if _until(loop, lambda: _at_rest(loop), LONGEST_STOP) == math.inf:
-        return 'not at rest after the longest stop', math.inf
+    loop = _rested(description, case, 'rest_posture', weaken)
+    if not isinstance(loop, Oscillators):
+        return loop
     network, height = loop.network, 0.0
     places = network.gait.cycle_position(np.arctan2(-loop.x[:, 1], loop.x[:, 0]))
     for place, activity in zip(places.tolist(), loop.stop.activity.tolist(), strict=True):
@@ -367,14 +376,9 @@ def _draw_radius(rng: np.random.Generator, weaken: bool) -> Case:
 
 def _judge_radius(description: RobotDescription, case: Case, weaken: bool) -> Judged:
     """At rest no oscillator is so near to the origin that its phase says nothing."""
-    made = _loop(description, case, 'rest_radius', weaken)
-    if made is None:
-        return None
-    loop, _ = made
-    _walk(loop, _SPEED, 2.0)
-    loop.request(True)
-    if _until(loop, lambda: _at_rest(loop), LONGEST_STOP) == math.inf:
-        return 'not at rest after the longest stop', math.inf
+    loop = _rested(description, case, 'rest_radius', weaken)
+    if not isinstance(loop, Oscillators):
+        return loop
     # what is called rest is near the equilibrium, not at it
     least = float(np.hypot(*loop.x.T).min()) / loop.parameters.canonical.radius
     return (f'rests at {least:.3g} r' if least < 0.98 * SMALLEST_RADIUS else ''), (

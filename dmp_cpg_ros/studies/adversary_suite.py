@@ -107,7 +107,8 @@ class Oscillators(WalkingLoop):
         self.stop = self.supervisor.step(
             self.stop, self.now_ns, self.network, canon.x, canon.x_dot, self.r, command,
             self.votes.tally,
-            margins=self._margins if self.now_ns <= self._pushed_until_ns else None)
+            margins=self._margins if self.now_ns <= self._pushed_until_ns else None,
+            wanted=canon.wanted)
         self.inhibition = self.supervisor.inhibition(self.stop)
 
     @property

@@ -9,9 +9,9 @@ starting, changing gait and turning. unpushed: stops that nobody pushes against.
 seeds that cross 5 m of rough ground; rougher, higher: of harder grounds, and of stairs on a robot
 with longer legs. obstacles: steps that are too high. contacts: rough ground with and without the
 feedback of touchdown and the stumbling reflex. delays: targets that arrive late. mismatch: a robot
-that is not as its controllers know it. gaits: every ordered pair of gaits changed while moving.
-robots: other robots, with their files alone; those of the extra `robots` are left out where it is
-not installed.
+that is not as its controllers know it. gaits: every ordered pair of gaits changed while moving;
+fast_gaits: at the highest speeds, forwards and backwards, of other robots too. robots: other
+robots, with their files alone; those of the extra `robots` are left out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """
@@ -476,6 +476,29 @@ def gaits(workers: Workers, seeds: int, phases: int) -> Table:
                  rows, results)
 
 
+def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
+    """Every ordered pair of gaits changed while all is asked for that may be, of all robots."""
+    cases: list[dict[str, Any]] = []
+    for file in filter(_is_there, ROBOTS):
+        most = trials.suite_of(file, 'trot').parameters.reference.max_speed
+        cases += [{'before': before, 'speed': speed, 'phases': max(1, phases // 4), 'robot': file}
+                  for before, speed in product(load_gaits(), (most, -most))]
+    walks = _run(workers, trials.run_changes, cases)
+    results = [(case, one) for case, of in walks for one in of]
+    rows = []
+    for file in dict.fromkeys(str(case['robot']) for case in cases):
+        of = [(case, one) for case, one in results if case['robot'] == file]
+        fallen = [f'{case["before"]} to {one.after}' for case, one in of if one.fell]
+        upright = [one for _, one in of if not one.fell]
+        rows.append((Path(file).stem, str(len(of)), str(len(fallen)),
+                     ', '.join(dict.fromkeys(fallen)) or '-',
+                     f'{max(one.duration for one in upright):.1f}',
+                     f'{max(one.sway for one in upright):.0f}'))
+    return Table('Gaits changed at the highest speeds, forwards and backwards',
+                 ('robot', 'changes', 'fell', 'these', 'longest s',
+                  'largest roll or pitch deg'), rows, results)
+
+
 def run_robot(file: str, phases: int) -> dict[str, Any]:
     """Walk, trot faster and faster, stop, start, and be pushed.
 
@@ -550,7 +573,7 @@ def _is_there(file: str) -> bool:
 
 TABLES = {make.__name__: make for make in (
     speeds, pushes, timing, manoeuvres, unpushed, rough, rougher, higher, obstacles, contacts,
-    delays, mismatch, gaits, robots)}
+    delays, mismatch, gaits, fast_gaits, robots)}
 """What can be measured."""
 
 

@@ -560,11 +560,12 @@ class ChangeOutcome:
     sway: float = nan
 
 
-def run_changes(before: str, speed: float, phases: int) -> list[ChangeOutcome]:
+def run_changes(before: str, speed: float, phases: int, robot: str | None = None
+                ) -> list[ChangeOutcome]:
     """Walk at a speed [m/s] once, and change to every other gait at some phases, evenly over a
     cycle, in copies of the walk.
     """
-    run, outcomes = Walk(before), []
+    run, outcomes = Walk(before, robot), []
     upright = run.settle((speed, 0.0, 0.0))
     step = run.period() / phases
     for k in range(phases):

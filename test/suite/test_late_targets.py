@@ -122,6 +122,37 @@ def test_a_robot_whose_targets_come_only_now_and_then_looks_after_itself(
     assert not any(alone[:begun]) and alone[begun + 1]
 
 
+def test_a_robot_that_looks_after_itself_does_not_follow_what_is_late(
+        standing: PerfectTrackingRobot) -> None:
+    """Only once targets act in time again; until then it says that they come and are late."""
+    state, guard, alone, late = standing.reset(), make_guard(standing.description), [], 10
+    held = JointTargets(state.joint_position, np.zeros(12), np.zeros(12))
+    for tick in range(1000):
+        late = 0 if tick >= 800 else late
+        accept(guard, (tick - late) * TICK_NS, held)
+        guard.targets(replace(state, time_ns=tick * TICK_NS))
+        alone.append(bool(guard.fallback))
+        assert guard.outrun == (alone[-1] and late > 0) and not guard.unheard(tick * TICK_NS)
+    begun = alone.index(True)
+    assert LATE_NS // TICK_NS < begun < 1.2 * LATE_NS / TICK_NS
+    assert all(alone[begun:800]) and not alone[-1]
+
+
+def test_a_robot_that_loses_too_many_targets_looks_after_itself(
+        standing: PerfectTrackingRobot) -> None:
+    state = standing.reset()
+    guard = CommandWatchdog(standing.description, 200_000_000, 0, TICK_NS)
+    held, losing = JointTargets(state.joint_position, np.zeros(12), np.zeros(12)), []
+    for tick in range(2000):
+        every = 10 if tick < 500 else 3 if tick < 1000 else 50  # one of so many is lost
+        if tick % every:
+            accept(guard, tick * TICK_NS, held)
+        guard.targets(replace(state, time_ns=tick * TICK_NS))
+        losing.append(guard.losing)
+        assert bool(guard.fallback) or not guard.losing
+    assert not any(losing[:500]) and losing[999] and not losing[-1] and not guard.fallback
+
+
 def arrivals(ticks: int, seed: int) -> list[int]:
     """Tick whose targets act at each tick: they come late, in bursts, by 24 ms at most."""
     random, newest, stalled, acting = np.random.default_rng(seed), 0, 0, []

@@ -41,7 +41,12 @@ from dmp_cpg_ros.core.gait import contact_feedback as contacts
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
 from dmp_cpg_ros.core.gait.network import AT_REST, CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.gait.transition import (
+    BlendedGait,
+    GaitChangeParameters,
+    GaitInForce,
+    changing_speed,
+)
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import replace_unchecked
@@ -138,9 +143,8 @@ the cadence would be a jump of the feet.
 """
 
 HASTE = 1.1
-"""Share of a gait's highest speed at which a change into it begins. Commands are within the limit
-of the gait that is wanted already, so the reference comes down to it; the blend's own limit is for
-what is left.
+"""Share of the highest speed for a change of gait at which it begins. Commands are within that
+already, so the reference comes down to it; the blend's own limit is for what is left.
 """
 
 
@@ -316,7 +320,8 @@ class RunningGait:
             return network, x
         v_x, v_y, gamma = r.tolist()
         speed = self.scale.foot_speed(v_x, v_y, gamma, wanted.apart)
-        if speed > HASTE * self.scale.speed(wanted.highest_speed):
+        most = wanted.highest_speed if self.choice.auto_gait else changing_speed(gait, wanted)
+        if speed > HASTE * self.scale.speed(most):
             return network, x
         transition = self.gaits.transition(self.gaits.named(gait.name), wanted)
         return self.network(transition.at(0.0, 0.0).scaled(gait.cadence_scale)), x

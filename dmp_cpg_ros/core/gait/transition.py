@@ -23,6 +23,10 @@ cycles for which no leg's frequency differs from ω by more than the fraction ``
 While a stop is requested ṡ goes to 0 and the blend stays as it is; at rest the new gait takes
 force at once (:mod:`~dmp_cpg_ros.core.gait.running`).
 
+**How fast.** A change that is asked for begins when the reference has come down to
+:func:`changing_speed`, to which commands are shortened until it is done. One that ``auto_gait``
+chooses is made at the speed at which it was chosen.
+
 **The arcs.** Leg i is at the position o_i = rest − lag_i of its cycle when oscillator fl has phase
 0. From one gait to another it moves by the arc a_i ≡ o_i' − o_i (mod 1). Only differences matter:
 a common arc is a faster or slower cycle for all. The rule, in this order:
@@ -38,7 +42,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from itertools import product
-from math import exp
+from math import exp, inf
 
 import numpy as np
 
@@ -58,6 +62,11 @@ SHORTEST = 1.0
 
 SETTLING_RATE = 12.0
 """Rate of the filter through which a transition starts, pauses and goes on [1/s]."""
+
+CHANGING = 0.5
+"""Share of the highest speed of the slower of two gaits at which one becomes the other: a blend of
+both is neither, and has less to give than each of them at its limit.
+"""
 
 ROUNDING = 1e-9
 """Differences of the costs of arcs below this are ties."""
@@ -255,6 +264,17 @@ class BlendedGait(CycleOfLegs):
 
 GaitInForce = Gait | BlendedGait
 """What phases are read in."""
+
+
+def changing_speed(gait: GaitInForce, wanted: Gait) -> float:
+    """Largest foot speed while a gait changes into the one that is wanted, in the form of
+    ``highest_speed``; infinite when it is in force, or no gait has a limit.
+    """
+    if gait.name == wanted.name:
+        return inf
+    ends = (gait.transition.before, gait.transition.after) if isinstance(
+        gait, BlendedGait) else (gait,)
+    return CHANGING * min(each.highest_speed for each in (*ends, wanted))
 
 
 def arcs_between(places: Array, new_places: Array, duty: float, new_duty: float) -> Array:

@@ -13,7 +13,8 @@ that speed takes, so the reference is given only the share
 
 of the command. It falls at once and grows by ``REGAIN`` again. q is 1 where feet of both sides
 carry most of the time, and falls to ``NARROW`` for gaits that stand on one side, whose body sways
-by itself. In a stop and while a start is under way s is 1: their predictions depend on nothing of
+by itself. While a gait changes into one that was asked for, no more than :func:`changing_share` is
+followed. In a stop and while a start is under way s is 1: their predictions depend on nothing of
 the body.
 """
 
@@ -21,6 +22,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from dmp_cpg_ros.core.gait.gait import Gait
+from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.transition import changing_speed
 from dmp_cpg_ros.core.inhibition.push_recovery import PUSHED
 
 DISTURBED, EASY = PUSHED, 2.0 * PUSHED
@@ -70,3 +74,21 @@ def followed_share(share: float, left: float | None, dt: float, most: float = 1.
     if left is None:
         return regained
     return min(regained, max(least, (left - DISTURBED) / (EASY - DISTURBED)))
+
+
+def changing_share(network: GaitNetwork, wanted: Gait, command: tuple[float, float, float]
+                   ) -> float:
+    """Share of a command at which the gait in force becomes the one that is wanted; 1 when it is.
+
+    Parameters
+    ----------
+    network : GaitNetwork
+        With the gait in force.
+    wanted : Gait
+        That was asked for.
+    command : tuple of float
+        v_x, v_y [m/s], γ [rad/s].
+    """
+    most = network.scale.speed(changing_speed(network.gait, wanted))
+    speed = network.scale.foot_speed(*command, wanted.apart)
+    return 1.0 if speed <= most else most / speed

@@ -25,9 +25,16 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import scalar_phase_rates
+from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.blocked import NO_BLOCK, Progress, block_step
-from dmp_cpg_ros.core.inhibition.caution import CLIMBING, LEAST, followed_share, room
+from dmp_cpg_ros.core.inhibition.caution import (
+    CLIMBING,
+    LEAST,
+    changing_share,
+    followed_share,
+    room,
+)
 from dmp_cpg_ros.core.inhibition.entry import in_places, next_leg
 from dmp_cpg_ros.core.inhibition.push_recovery import NO_PUSH, push_step
 from dmp_cpg_ros.core.inhibition.step_timing import quickened
@@ -123,7 +130,7 @@ class GaitSupervisor:
              x_dot: Array, r: Array, command: tuple[float, float, float],
              tally: Tally | None = None, body_mode: str = 'standing',
              margins: Sequence[float] | None = None,
-             progress: Progress | None = None) -> SupervisorState:
+             progress: Progress | None = None, wanted: Gait | None = None) -> SupervisorState:
         """Advance by one tick.
 
         Parameters
@@ -146,6 +153,8 @@ class GaitSupervisor:
             Of the capture point in the support polygon, where they are known [m].
         progress : Progress, optional
             Of the body, where it is known.
+        wanted : Gait, optional
+            Gait that was asked for, into which the one that acts changes at a lower speed.
         """
         dt = max(0.0, (time_ns - state.time_ns) * 1e-9)
         gait, rates = network.gait, scalar_phase_rates(x, x_dot)
@@ -162,23 +171,27 @@ class GaitSupervisor:
         state = self._voted(state, tally or state.tally, network)
         state = self._pushed(state, network, x, margins, body_mode)
         rough = progress is not None and progress.rough > 0.0
-        quick, state = state.quickness > 1.0, self._balancing(state, margins, network, rough, dt)
+        most = 1.0 if wanted is None else changing_share(network, wanted, command)
+        quick = state.quickness > 1.0
+        state = self._balancing(state, margins, network, rough, most, dt)
         if state.requested:
             return (replace_unchecked(state, armed=False, state='waiting') if quick
                     else self._stopping(state, network, x, rates, speed))
         return self._running(state, network.phase_errors(x), speed)
 
     def _balancing(self, state: SupervisorState, margins: Sequence[float] | None,
-                   network: GaitNetwork, rough: bool, dt: float) -> SupervisorState:
-        """Follow less of the command, and step faster, while the body is disturbed; on rough
-        ground feet need their time to be lifted over it.
+                   network: GaitNetwork, rough: bool, most: float, dt: float) -> SupervisorState:
+        """Follow less of the command, and step faster, while the body is disturbed; follow at most
+        a share of it while the gait changes. On rough ground feet need their time to be lifted
+        over it.
         """
         p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.two_sided)
         predicted = state.requested or state.state == 'releasing'
-        cautious = p.caution and not (predicted or state.push.acts)
-        share = followed_share(
-            state.share, left, dt, state.block.most, CLIMBING if rough else LEAST
-        ) if cautious else 1.0
+        share = 1.0
+        if not (predicted or state.push.acts):
+            share = (followed_share(state.share, left, dt, min(most, state.block.most),
+                                    CLIMBING if rough else LEAST)
+                     if p.caution else followed_share(state.share, None, dt, most))
         free = p.step_timing and (state.push.acts or not predicted) and not rough
         quickness = quickened(state.quickness, left if free else None, dt)
         same = (share, quickness) == (state.share, state.quickness)

@@ -342,6 +342,14 @@ class Certified:
             self._node.parameters_of(ReferenceParameters), self._scale.hip_radius,
             Governor(self._limiting_gaits(), self._scale))
 
+    @property
+    def wanted(self) -> Gait | None:
+        """Gait that is asked for; None where it is chosen."""
+        of = self._node.parameters_of
+        if of(GaitChoiceParameters).auto_gait:
+            return None
+        return self.gaits.named(of(suite.GaitParameters).gait)
+
     def _limiting_gaits(self) -> tuple[Gait, ...]:
         of = self._node.parameters_of
         return limiting_gaits(

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from std_msgs.msg import String
@@ -11,14 +12,15 @@ from std_msgs.msg import String
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
-from dmp_cpg_ros.core.suite_parameters import DriveParameters
+from dmp_cpg_ros.core.suite_parameters import DriveParameters, TickParameters
 from dmp_cpg_ros.nodes.framework import known_stop
 from dmp_cpg_ros.nodes.framework.health import RobotTiming
 from dmp_cpg_ros.nodes.framework.known_stop import KnownStop
 from dmp_cpg_ros.nodes.framework.suite_node import SuiteNode
 from dmp_cpg_ros.nodes.messages import conversions
 from dmp_cpg_ros.nodes.messages.values import header_ns
-from dmp_cpg_ros.robot.watchdog import CommandWatchdog
+from dmp_cpg_ros.robot.target_loss import BORNE
+from dmp_cpg_ros.robot.watchdog import CARRIED_NS, CommandWatchdog
 
 INCIDENT_NS = 1_000_000_000
 """Time that all legs must have been heard for until their silence counts as over [ns]."""
@@ -41,7 +43,7 @@ class DrivenRobot(SuiteNode):
         self._timing, self._reader = (
             RobotTiming(), conversions.JointTargetsReader(description.joint_names))
         self._drive_mode, self._drive_publisher = '', self.publisher('drive_mode')
-        self._silent_ns = -1
+        self._silent_ns = {'silent': -1, 'late': -1, 'lost': -1}
         kept = KnownStop(self, 'kept_gains')
         known_stop.listen(self, ('acting_gains',), lambda _, *known: kept.learn(*known))
         self.forget_targets()
@@ -50,13 +52,22 @@ class DrivenRobot(SuiteNode):
         """Begin with a new watchdog."""
         p = self._drive_options
         self._guard = CommandWatchdog(self._description, round(p.target_timeout * 1e9),
-                                      round(p.target_lead * 1e9))
+                                      round(p.target_lead * 1e9),
+                                      self.parameters_of(TickParameters).tick_ns
+                                      if self.lossy else 0)
         self._guard.drives.watches = self.has_drives
 
     @property
     def has_drives(self) -> bool:
         """Whether something moves the joints whose torques tell how it does."""
         return True
+
+    def watchdog_values(self) -> dict[str, Any]:
+        """What ``/diagnostics`` tells of the watchdog."""
+        guard = self._guard
+        return {'silent_legs': ' '.join(guard.silent(self._state.time_ns)) or 'none',
+                'guarded_ticks': guard.ticks, 'carried_ticks': guard.carried,
+                'lateness_ms': 1e-6 * guard.lateness_ns, 'lost_share': guard.lost}
 
     def leg_of(self, joint: str) -> str:
         """Leg of a joint by the robot's names."""
@@ -72,19 +83,34 @@ class DrivenRobot(SuiteNode):
         return leg, stamp, targets
 
     def watch_silence(self, now: int) -> None:
-        """Tell once that legs are silent, until all have been heard for a while."""
-        silent = self._guard.silent(now)
-        if any(self._guard.stamps):
-            self.tell_drive(self._guard.fallback)
-        if not silent:
-            if now - self._silent_ns > INCIDENT_NS:
-                self.clear('silent')
-        elif any(self._guard.stamps):
-            self._silent_ns = now
-            if not self.health.has_problem('silent'):
-                self.warn('silent', f'no targets from {", ".join(silent)} for '
-                          f'{self._drive_options.target_timeout} s: the robot looks after itself: '
+        """Tell once that legs are silent, late all the time, or lose too much, until that has been
+        over for a while.
+        """
+        guard = self._guard
+        silent, heard = guard.unheard(now), any(guard.stamps)
+        if heard:
+            self.tell_drive(guard.fallback)
+        self._tell_silence('silent', now, heard and bool(silent),
+                           lambda: f'no targets from {", ".join(silent)} for '
+                           f'{self._drive_options.target_timeout} s')
+        self._tell_silence('late', now, not silent and guard.outrun, self._lateness)
+        self._tell_silence('lost', now, guard.losing, lambda: (
+            f'{guard.lost:.0%} of the targets are lost, and {BORNE:.0%} are borne'))
+
+    def _tell_silence(self, key: str, now: int, true: bool, what: Callable[[], str]) -> None:
+        if true:
+            self._silent_ns[key] = now
+            if not self.health.has_problem(key):
+                self.warn(key, f'{what()}: the robot looks after itself: '
                           f'{RETREATS[self._guard.fallback]}', error=True)
+        elif now - self._silent_ns[key] > INCIDENT_NS:
+            self.clear(key)
+
+    def _lateness(self) -> str:
+        lead_ns, late_ns = round(1e9 * self._drive_options.target_lead), self._guard.lateness_ns
+        return (f'targets act {1e-6 * late_ns:.0f} ms late, and {1e-6 * CARRIED_NS:.0f} ms are '
+                f'borne: they come {1e-6 * (lead_ns + late_ns):.0f} ms after their states, and '
+                f'target_lead is {1e-6 * lead_ns:.0f} ms')
 
     def watch_joints(self) -> None:
         """Name joints that do not do what they are told, until they have for a while."""

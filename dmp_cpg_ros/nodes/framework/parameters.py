@@ -36,6 +36,12 @@ FOREIGN_PREFIXES = ('use_sim_time', 'qos_overrides.', 'start_type_description_se
 """Parameters that rclpy itself declares."""
 
 
+RELIABLE, BEST_EFFORT = 'reliable', 'best_effort'
+
+DELIVERIES = (RELIABLE, BEST_EFFORT)
+"""Values of the parameter ``delivery``."""
+
+
 @dataclass(frozen=True)
 class NodeParameters(Parameters):
     """Parameters of every node."""
@@ -48,6 +54,10 @@ class NodeParameters(Parameters):
     scheduling: str = parameter(
         BATCH, 'policy of the Linux scheduler; batch keeps a reader from interrupting its writer',
         choices=POLICIES)
+    delivery: str = parameter(
+        RELIABLE, 'how the node reads what comes at every tick; best_effort, for links that lose '
+        'packets: nothing waits for what was lost. In lock-step, and by the recorder, it is read '
+        'reliably all the same', choices=DELIVERIES)
     expected_nodes: tuple[str, ...] = parameter(
         tuple(kind.name for kind in WALKING),
         'kinds of nodes that must be connected before ~/ready says yes', choices=tuple(KINDS))

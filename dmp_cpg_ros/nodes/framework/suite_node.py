@@ -330,8 +330,9 @@ class SuiteNode(GuardedLifecycleNode):
             receive = self._counted(topic.name, take)
         elif watched:
             receive = self.writers.only(topic, callback, read)
+        usual = topic.lossy_qos if self.lossy else topic.reader_qos
         subscription = self.create_subscription(
-            topic.type, topic.name, receive, qos or topic.reader_qos, raw=True)
+            topic.type, topic.name, receive, qos or usual, raw=True)
         if informed:
             subscription._callback_type = type(subscription).CallbackType.WithMessageInfo
         self._undo.append(partial(self.destroy_subscription, subscription))
@@ -341,6 +342,12 @@ class SuiteNode(GuardedLifecycleNode):
         if not wakes:
             self._not_waking[topic.name] = subscription
         return subscription
+
+    @property
+    def lossy(self) -> bool:
+        """Whether messages come over a link that loses some, and in any order."""
+        delivery = self.parameters_of(parameters.NodeParameters).delivery
+        return delivery == parameters.BEST_EFFORT and not self.lock_step
 
     @property
     def subscriptions(self) -> Iterator[Subscription]:
@@ -411,7 +418,7 @@ class SuiteNode(GuardedLifecycleNode):
         """Run :meth:`on_tick` for every tick with what readers make of the messages of topics.
 
         A node is woken by the message that comes last of those of a tick, and by delayed ones:
-        every waking costs more than the message that it is for.
+        every waking costs more than the message that it is for. Over a link any may be the last.
 
         Parameters
         ----------
@@ -445,7 +452,8 @@ class SuiteNode(GuardedLifecycleNode):
             return feed
 
         for name, read in {**readers, **delayed}.items():
-            self.listen(name, feeding(name, read), wakes=name == last or name in delayed)
+            self.listen(name, feeding(name, read),
+                        wakes=name == last or name in delayed or self.lossy)
         if self._not_waking:
             self.look_every(LOOK_AFTER_S)
 

@@ -149,6 +149,16 @@ class Interface:
         return _qos(1 if self.latched else depth, latched=self.latched)
 
     @property
+    def lossy_qos(self) -> QoSProfile:
+        """Profile with which the suite's nodes read over a link that loses packets: what comes
+        anew at every tick is not worth being waited for.
+        """
+        qos = self.reader_qos
+        if self.name in EVERY_TICK:
+            qos.reliability = ReliabilityPolicy.BEST_EFFORT
+        return qos
+
+    @property
     def recorder_qos(self) -> QoSProfile:
         """Profile with which the recorder reads: compatible with what is offered, and deep."""
         return _qos(RECORDER_DEPTH, latched=self.latched)
@@ -280,6 +290,10 @@ SILENT_NS = 500_000_000
 REPEATED = ('reference', 'canonical_state', 'posture_feedback', 'joint_targets',
             'inhibition_gains')
 """What nodes publish again in lock-step when they hear the trigger of their last tick again."""
+
+EVERY_TICK = ('joint_states', 'imu', 'ground_truth', 'foot_contacts', '/clock', 'reference',
+              'canonical_state', 'posture_feedback', 'joint_targets')
+"""What comes anew at every tick, or nearly so."""
 
 RECORDED = tuple(topic for topic in TOPICS if topic.recorded)
 """Topics that a bag can have."""

@@ -20,7 +20,13 @@ from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, limiting_gaits
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit
-from dmp_cpg_ros.core.gait.transition import GaitTransition
+from dmp_cpg_ros.core.gait.transition import (
+    CHANGING,
+    BlendedGait,
+    GaitTransition,
+    changing_speed,
+)
+from dmp_cpg_ros.core.inhibition.caution import changing_share
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
 from dmp_cpg_ros.core.transformation.leg import (
@@ -174,9 +180,48 @@ def test_a_change_to_a_slower_gait_slows_down_first_and_does_not_fall(speed: flo
         before = SCALE.foot_speed(*run.loop.r.tolist())
         assert run.walk(0.004)
     assert run.loop.network.gait.name == 'trot>walk'
-    assert inf > before > GAITS['walk'].highest_speed * ROOT  # or it would have waited too long
-    assert SCALE.foot_speed(*run.loop.r.tolist()) <= HASTE * GAITS['walk'].highest_speed * ROOT
-    assert run.walk(3.0)
+    most = HASTE * changing_speed(GAITS['trot'], GAITS['walk']) * ROOT
+    assert inf > before > most  # or it would have waited too long
+    assert SCALE.foot_speed(*run.loop.r.tolist()) <= most
+    assert run.walk(4.0)
     assert run.loop.network.gait.name == 'walk'
     mean = np.mean([state.base_velocity_in_base[0] for state in run.states[-250:]])
     assert mean == pytest.approx(GAITS['walk'].highest_speed * ROOT, rel=0.05)
+
+
+@pytest.mark.parametrize(('before', 'after', 'speed'), [
+    ('trot', 'pronk', -2.6), ('bound', 'amble', 1.5), ('amble', 'trot', 1.6)])
+def test_gaits_change_at_a_speed_that_is_neithers_limit_and_walk_on(
+        before: str, after: str, speed: float) -> None:
+    """The first of them fell when gaits changed at the limit of the slower one."""
+    run = Walk(before)
+    assert run.reach((speed, 0.0, 0.0)) and run.walk(3.0)
+    assert not run.loop.change_gait(after)
+    most, fastest = changing_speed(GAITS[before], GAITS[after]) * ROOT, 0.0
+    for _ in range(1500):
+        assert run.walk(0.004)
+        if isinstance(run.loop.network.gait, BlendedGait):
+            fastest = max(fastest, SCALE.foot_speed(*run.loop.r.tolist()))
+    assert 0.9 * most < fastest <= HASTE * most
+    assert run.loop.network.gait.name == after and run.loop.stop.share > 0.9
+    reached = np.mean([state.base_velocity_in_base[0] for state in run.states[-250:]])
+    wanted = min(abs(speed), GAITS[after].highest_speed * ROOT)
+    assert 0.75 * wanted < abs(reached) < 1.05 * wanted  # a pronk backwards is slow
+
+
+def test_who_has_the_gait_that_is_wanted_follows_all_of_the_command() -> None:
+    trot, walk = GAITS['trot'], GAITS['walk']
+    assert changing_speed(trot, trot) == inf
+    assert changing_speed(trot, walk) == changing_speed(walk, trot) == (
+        CHANGING * walk.highest_speed)
+    way = GaitTransition(trot, walk).at(0.5, 0.1)
+    for wanted in (trot, walk):  # it is on its way there, or back again
+        assert changing_speed(way, wanted) == CHANGING * walk.highest_speed
+    network = Walk('trot').loop.network
+    command = (2.0, 0.1, -0.3)
+    assert changing_share(network, network.gait, command) == 1.0
+    share = changing_share(network, walk, command)
+    shortened = tuple(share * value for value in command)
+    assert network.scale.foot_speed(*shortened, walk.apart) == pytest.approx(
+        network.scale.speed(CHANGING * walk.highest_speed))
+    assert changing_share(network, walk, (0.0, 0.0, 0.0)) == 1.0
