@@ -173,8 +173,8 @@ class BodyEstimator:
         Parameters
         ----------
         memory : EstimatorState or None
-            State after the last tick; None at the first, which takes a robot whose
-            joints rest to be at rest.
+            State after the last tick; None at the first, which takes a robot whose joints
+            rest to be at rest.
         readings : SensorReadings
             A stamp that is not later than the last one means that the robot began anew.
 
