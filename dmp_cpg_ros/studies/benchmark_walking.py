@@ -10,7 +10,8 @@ seeds that cross 5 m of rough ground; rougher, higher: of harder grounds, and of
 with longer legs. obstacles: steps that are too high. contacts: rough ground with and without the
 feedback of touchdown and the stumbling reflex. delays: targets that arrive late. mismatch: a robot
 that is not as its controllers know it. gaits: every ordered pair of gaits changed while moving;
-fast_gaits: at the highest speeds, forwards and backwards, of other robots too. robots: other
+fast_gaits: at the highest speeds, forwards and backwards, of other robots too. restarts: posture
+control that forgets all in the middle of a stride, as a node that is started again. robots: other
 robots, with their files alone; those of the extra `robots` are left out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
@@ -112,6 +113,10 @@ ROBOTS = tuple(f'robots/{name}.yaml' for name in (
     'mini_quadruped', 'mini_cheetah', 'go1', 'go2', 'aliengo', 'a2', 'spot', 'pegasus', 'b2',
     'hyqreal1', 'hyqreal2'))
 """Robots by their files; all but the first need the extra ``robots``."""
+
+RESTARTED = (('amble', 0.5), ('trot', 1.0), ('trot', 2.0), ('pace', 0.5), ('bound', 0.5),
+             ('pronk', 0.6))
+"""Walks whose posture control begins anew."""
 
 TIMED: tuple[dict[str, Any], ...] = (
     *({'gait': gait, 'speed': speed} for gait, speed in (
@@ -499,6 +504,18 @@ def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
                   'largest roll or pitch deg'), rows, results)
 
 
+def restarts(workers: Workers, seeds: int, phases: int) -> Table:
+    """Posture control that begins anew in the middle of a stride."""
+    walks = _run(workers, trials.run_restarts, [
+        {'gait': gait, 'speed': speed, 'phases': phases} for gait, speed in RESTARTED])
+    results = [(case, one) for case, of in walks for one in of]
+    return Table('Posture control begins anew', (
+        'gait, m/s', 'restarts', 'fell', 'largest tilt deg, median', 'worst'), [
+            (f'{case["gait"]} {case["speed"]:g}', str(len(of)), str(sum(one.fell for one in of)),
+             f'{np.median([one.tilt for one in of]):.0f}', f'{max(one.tilt for one in of):.0f}')
+            for case, of in walks], results)
+
+
 def run_robot(file: str, phases: int) -> dict[str, Any]:
     """Walk, trot faster and faster, stop, start, and be pushed.
 
@@ -573,7 +590,8 @@ def _is_there(file: str) -> bool:
 
 TABLES = {make.__name__: make for make in (
     speeds, pushes, timing, manoeuvres, unpushed, rough, rougher, higher, obstacles, contacts,
-    delays, mismatch, gaits, fast_gaits, robots)}
+    delays, mismatch, gaits, fast_gaits, restarts,
+    robots)}
 """What can be measured."""
 
 

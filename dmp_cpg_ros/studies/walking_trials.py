@@ -19,10 +19,12 @@ import numpy as np
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport, cost_without_losses
-from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
+from dmp_cpg_ros.analysis.motion import roll_pitch_yaw, tilt
+from dmp_cpg_ros.core.estimation.estimator import estimated_state
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
 from dmp_cpg_ros.core.maths.roots import last_that_holds
+from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
 from dmp_cpg_ros.core.robot_model.world import WORLDS, Steps, World
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
@@ -596,3 +598,39 @@ def _changed(run: Walk, fell: ChangeOutcome) -> ChangeOutcome:
     return replace(fell, fell=False, duration=duration, cycles=duration / period,
                    phase_error=max(errors), sway=sway,
                    in_time=bool(settled) and max(settled) < LOCKED_PHASE_ERROR)
+
+
+@dataclass(frozen=True)
+class RestartOutcome:
+    """What became of a walk whose posture control began anew: whether it fell, and its largest
+    tilt afterwards [deg].
+    """
+
+    fell: bool
+    tilt: float
+
+
+def run_restarts(gait: str, speed: float, phases: int) -> list[RestartOutcome]:
+    """Walk at a speed [m/s], and let posture control and estimator forget all at some phases,
+    evenly over a cycle, as a node that is started again has.
+    """
+    run, outcomes = Walk(gait, seed=1), []
+    upright = run.settle((speed, 0.0, 0.0))
+    step = run.period() / phases
+    for _ in range(phases):
+        outcomes.append(_restarted(deepcopy(run)) if upright else RestartOutcome(True, nan))
+        upright = run.walk(step)
+    return outcomes
+
+
+def _restarted(run: Walk) -> RestartOutcome:
+    loop = run.loop
+    run.states.clear()
+    if loop.estimator is None:
+        raise RuntimeError('state_source must be estimate')
+    loop.estimator_state, estimate = loop.estimator.step(None, readings_of(run.state))
+    loop.posture = loop.body.picked_up(
+        loop.body.initial_state(), estimated_state(readings_of(run.state), estimate))
+    upright = run.walk(WATCHED)
+    return RestartOutcome(not upright, float(np.rad2deg(tilt(
+        np.array([state.base_quaternion for state in run.states])).max())))

@@ -22,7 +22,7 @@ from math import exp, isfinite
 import numpy as np
 
 from dmp_cpg_ros.core.clock import LONGEST_GAP_S
-from dmp_cpg_ros.core.estimation import frozen, leg_odometry, velocity_filter
+from dmp_cpg_ros.core.estimation import frozen, leg_odometry, mid_stride, velocity_filter
 from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion, TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.velocity_filter import FilterState
@@ -102,8 +102,8 @@ INITIAL_DEVIATION = (0.05, 0.1, 0.005, 0.1)
 UNTRUSTED_SHARE = 0.2
 """Share of the force of full trust below which a foot is not trusted at all."""
 
-STILL_JOINT, STILL_TURN = 0.15, 0.03
-"""Velocities of joints and body below which a robot on all four feet stands still [rad/s]."""
+STILL_TURN = 0.03
+"""Turn rate below which a robot on all four feet whose joints rest stands still [rad/s]."""
 
 STILL_TIME = 0.3
 """Time after which a robot that seems to stand still does so [s]; it sways out before."""
@@ -173,7 +173,8 @@ class BodyEstimator:
         Parameters
         ----------
         memory : EstimatorState or None
-            State after the last tick; None at the first, which takes the robot to be at rest.
+            State after the last tick; None at the first, which takes a robot whose joints
+            rest to be at rest.
         readings : SensorReadings
             A stamp that is not later than the last one means that the robot began anew.
 
@@ -216,25 +217,33 @@ class BodyEstimator:
         return EstimatorState(state, terrain, estimate, rate, blind, still, watch), estimate
 
     def _begin(self, readings: SensorReadings) -> tuple[EstimatorState, BodyEstimate]:
-        """Start at rest: the accelerometer tells the vertical, the feet the ground."""
-        seeing = readings.imu_is_usable
+        """Start at rest: the accelerometer tells the vertical, the feet the ground. Where joints
+        move, standing feet alone do, and how fast the body is.
+        """
+        seeing, moving = readings.imu_is_usable, mid_stride.moves(readings)
         up = readings.specific_force_in_base if seeing else np.array((0.0, 0.0, 1.0))
-        zero = np.zeros(3)
+        up, zero = mid_stride.steadied(up) if moving else up, np.zeros(3)
         covariance = np.diag(np.repeat(np.square(INITIAL_DEVIATION), 3))
         state = FilterState(levelled(up), zero, zero, zero, covariance)
         R = vec3.rotation(state.quaternion.tolist())
         flat = TerrainState(((0.0, 0.0, 0.0),) * len(LEGS), (0.0, 0.0))
         motion, normal = self._motion(flat, state, readings)
         trust, legs = self._trust(readings, motion, normal), readings.usable_legs
-        contact = [vec3.times(R, place) for place in motion.contact_in_base]
-        depths = [z for (_, _, z), usable in zip(contact, legs, strict=True) if usable]
-        height = -sum(depths) / len(depths) if depths else 0.0
         rate = readings.rate_in_base if seeing else zero
+        stands = [t > 0.0 for t in trust] if moving and any(trust) else legs
+        if moving and any(trust):
+            state = replace_unchecked(
+                state, velocity_in_base=mid_stride.velocity_of_feet(motion, rate, trust))
+        contact = [vec3.times(R, place) for place in motion.contact_in_base]
+        depths = [z for (_, _, z), stand in zip(contact, stands, strict=True) if stand]
+        height = -sum(depths) / len(depths) if depths else 0.0
         estimate = BodyEstimate(
-            readings.time_ns, np.array((0.0, 0.0, height)), state.quaternion, zero, rate, height,
+            readings.time_ns, np.array((0.0, 0.0, height)), state.quaternion,
+            state.velocity_in_base, rate, height,
             np.array(normal_in_world(flat.slope)), np.array(trust), covariance.diagonal()[3:6],
             _problems(readings))
-        feet = tuple((x, y, z + height) for x, y, z in contact)
+        feet = tuple((x, y, z + height if stand else 0.0)
+                     for (x, y, z), stand in zip(contact, stands, strict=True))
         terrain = TerrainState(feet, leg_odometry.fitted_slope(feet)) if all(legs) else flat
         watch = frozen.first_watch(readings)
         if estimate.problems:
@@ -314,7 +323,7 @@ def _is_still(readings: SensorReadings, state: FilterState) -> bool:
     """Whether neither joints nor body move."""
     x, y, z = (readings.rate_in_base - state.gyro_bias).tolist()
     return (x * x + y * y + z * z < STILL_TURN**2
-            and float(np.abs(readings.joint_velocity).max()) < STILL_JOINT)
+            and float(np.abs(readings.joint_velocity).max()) < mid_stride.MOVING_JOINT)
 
 
 def _problems(readings: SensorReadings) -> tuple[str, ...]:
