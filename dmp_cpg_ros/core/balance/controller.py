@@ -247,11 +247,12 @@ class PostureController:
         R_world_base = vec3.rotation(state.base_quaternion.tolist())
         place = vec3.triple(state.base_position_in_world.tolist())
         normal = state.ground_normal_in_world
+        n = UP if normal is None else vec3.triple(normal.tolist())
         return terrain.felt(
             place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot in feet_in_base],
-            UP if normal is None else vec3.triple(normal.tolist()), swung,
+            n, swung,
             [force > self._touch_force for force in believed(state.foot_force).tolist()],
-            self.scale.leg_length)
+            self.scale.leg_length, vec3.dot(n, vec3.times(R_world_base, UP)))
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
                  under: Pair, error: Pair) -> tuple[float, ...]:

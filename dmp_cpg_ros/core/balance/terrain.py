@@ -16,9 +16,10 @@ over that plane, and is left there: its path has its stance at e_i − ``RAISED`
 A foot that is to stand and touches nothing goes on down, by ``SEARCHED`` l.
 
 **Rough.** ρ is the height of what the feet are to be lifted over. It is 0 until one foothold is
-higher than the median of all by more than ``STEP`` l, l the length of the leg. A lower one tells
-nothing: the foot may as well hang in a gap, and to look for the ground there, or to count on it,
-overturns the robot. From there on ρ grows to
+higher than the median of all by more than ``STEP`` l, l the length of the leg, under a body that
+does not roll: after a push it feels steps where there are none. A lower one tells nothing: the
+foot may as well hang in a gap, and to look for the ground there, or to count on it, overturns the
+robot. From there on ρ grows to
 
 - max e − min e, where this is more than ``UNEVEN`` l: feet stand on steps, up or down;
 - h + ``MARGIN`` l for a foot that touches something in the middle of its swing, at h over the mean
@@ -45,6 +46,9 @@ STEP = 0.25
 """By how much a foothold is higher than the median that tells the first step, in lengths of the
 leg; the edge of a gap, into which a foot slips or the body leans, tells less.
 """
+
+CALM = 0.985
+"""Cosine of the body's angle to its ground, 10 degrees, up to which it may tell the first step."""
 
 SCUFFING = (0.25, 0.8)
 """Shares of the swing between which a foot that touches something has met an obstacle."""
@@ -98,8 +102,8 @@ class Terrain(NamedTuple):
     place: Triple = (0.0, 0.0, 0.0)
 
     def felt(self, place: Triple, feet: Sequence[Triple], normal: Triple,
-             swung: Sequence[float], touches: Sequence[bool], leg_length: float
-             ) -> tuple[Terrain, tuple[float, ...]]:
+             swung: Sequence[float], touches: Sequence[bool], leg_length: float,
+             upright: float = 1.0) -> tuple[Terrain, tuple[float, ...]]:
         """Advance by one tick.
 
         Parameters
@@ -117,6 +121,8 @@ class Terrain(NamedTuple):
             Whether a foot touches something, as far as its sensor tells.
         leg_length : float
             l [m].
+        upright : float
+            Cosine of the angle between the body and the normal.
 
         Returns
         -------
@@ -134,8 +140,8 @@ class Terrain(NamedTuple):
         mean = sum(heights) / len(heights)
         low, lower, higher, high = sorted(heights)
         rough = 0.0 if anew else self.rough * exp(-way / (FADES * leg_length))
-        if high - 0.5 * (lower + higher) > STEP * leg_length or (
-                rough and high - low > UNEVEN * leg_length):
+        found = upright > CALM and high - 0.5 * (lower + higher) > STEP * leg_length
+        if found or (rough and high - low > UNEVEN * leg_length):
             rough = max(rough, high - low)
         for foot, share, touch in zip(feet, swung, touches, strict=True):
             if rough and touch and SCUFFING[0] < share < SCUFFING[1]:

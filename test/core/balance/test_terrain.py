@@ -65,6 +65,15 @@ def test_foot_that_hangs_in_a_gap_tells_nothing(z: tuple[float, ...]) -> None:
     assert (terrain.rough, level) == (0.0, LEVEL)
 
 
+@pytest.mark.parametrize(('degrees', 'believed'), [(0.0, True), (9.0, True), (11.0, False)])
+def test_body_that_is_thrown_over_feels_no_first_step(degrees: float, believed: bool) -> None:
+    """On what is known to be rough it goes on to feel: bodies tilt there."""
+    feet: list[Triple] = [(a, b, up) for (a, b), up in zip(PLACES, (0.1, 0, 0, 0), strict=True)]
+    said = (UP, (STANDING,) * 4, (True,) * 4, LENGTH, float(np.cos(np.deg2rad(degrees))))
+    assert (NOTHING.felt((0.0, 0.0, 0.3), feet, *said)[0].rough > 0.0) == believed
+    assert KNOWN.felt((0.0, 0.0, 0.3), feet, *said)[0].rough == pytest.approx(0.1)
+
+
 @given(heights)
 def test_feet_stand_where_the_ground_is(z: list[float]) -> None:
     terrain, level = felt(z, KNOWN)
