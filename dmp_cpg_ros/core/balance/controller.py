@@ -25,11 +25,10 @@ from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, 
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.progress import feet_behind
-from dmp_cpg_ros.core.balance.terrain import Terrain
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
-from dmp_cpg_ros.core.gait.contact_feedback import LOADED, believed, quarter_weight
+from dmp_cpg_ros.core.gait.contact_feedback import believed
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.inhibition.blocked import Progress
 from dmp_cpg_ros.core.maths import Array, vec3
@@ -42,8 +41,6 @@ from dmp_cpg_ros.core.transformation.foot_path import activities_step
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
 
 __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'PostureState']
-
-UP = (0.0, 0.0, 1.0)
 
 LARGEST_LOAD = 2.0
 """Largest normal force of a fully loaded foot, in weights of the robot."""
@@ -72,9 +69,7 @@ class PostureFeedback:
     margins : tuple of float
         Of the capture point to the edges of the support polygon [m]; ``WIDE`` while nobody asks.
     progress : Progress or None
-        Whether the body comes ahead, where it balances, and how rough its ground is.
-    level : ndarray (4,)
-        How far over the plane that the body follows the feet are to stand [m].
+        Whether the body comes ahead, where it balances.
     """
 
     torque: Array
@@ -86,14 +81,12 @@ class PostureFeedback:
     foot_force: Array = field(default_factory=lambda: np.zeros(4))
     margins: tuple[float, ...] = WIDE
     progress: Progress | None = None
-    level: Array = field(default_factory=lambda: np.zeros(4))
 
     def of_leg(self, i: int) -> LegFeedback:
         """What the path of leg ``i`` takes of it."""
         return LegFeedback(
             self.measured[3 * i : 3 * i + 3], self.shift_in_base[i], self.drift_in_base[i],
-            self.correction, float(self.foot_force[i]),
-            float(self.level[i]), self.progress.rough if self.progress else 0.0)
+            self.correction, float(self.foot_force[i]))
 
 
 class PostureState(NamedTuple):
@@ -109,15 +102,12 @@ class PostureState(NamedTuple):
         What the reference has the body do.
     offset : MassOffset
         Where the centre of mass is found to be.
-    terrain : Terrain
-        What the feet have felt of the ground.
     """
 
     activity: Array
     integral: VelocityCorrection = VelocityCorrection()
     plan: MotionPlan = MotionPlan()
     offset: MassOffset = MassOffset()
-    terrain: Terrain = Terrain()
 
 
 class PostureController:
@@ -147,7 +137,6 @@ class PostureController:
         self._footholds = [
             vec3.triple(foot) for foot in (footholds - description.com_in_base).tolist()]
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
-        self._touch_force = LOADED * quarter_weight(description)
         self._com_in_base = vec3.triple(description.com_in_base.tolist())
         self._torque_limit = [vec3.triple(leg.torque_limit.tolist()) for leg in description.legs]
         inertia = description.base_inertia.diagonal()
@@ -226,10 +215,7 @@ class PostureController:
         body = BodyMotion(R_ground_base, upward, velocity, rate, self._height(feet, load))
         bounce = self._bounce(gait, positions, duty, omega, moving)
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
-        terrain, level = self._felt(
-            memory.terrain, state, [foot for foot, _ in legs],
-            [position / (1.0 - duty) + 0.5 for position in positions])
-        return PostureState(activity, integral, plan, offset, terrain), PostureFeedback(
+        return PostureState(activity, integral, plan, offset), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, acceleration),
             np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
             np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
@@ -238,21 +224,7 @@ class PostureController:
                 measured[0] - (planned[0] - lasting[0]),
                 measured[1] - (planned[1] - lasting[1]))),
             Progress((measured[0], measured[1]), feet_behind(
-                plan.expected, beside, feet, self._footholds, positions, duty, omega),
-                terrain.rough), np.array(level))
-
-    def _felt(self, terrain: Terrain, state: RobotState, feet_in_base: Sequence[Triple],
-              swung: Sequence[float]) -> tuple[Terrain, tuple[float, ...]]:
-        """Memory of the ground, and heights of the feet over its plane."""
-        R_world_base = vec3.rotation(state.base_quaternion.tolist())
-        place = vec3.triple(state.base_position_in_world.tolist())
-        normal = state.ground_normal_in_world
-        n = UP if normal is None else vec3.triple(normal.tolist())
-        return terrain.felt(
-            place, [vec3.plus(place, vec3.times(R_world_base, foot)) for foot in feet_in_base],
-            n, swung,
-            [force > self._touch_force for force in believed(state.foot_force).tolist()],
-            self.scale.leg_length, vec3.dot(n, vec3.times(R_world_base, UP)))
+                plan.expected, beside, feet, self._footholds, positions, duty, omega)))
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
                  under: Pair, error: Pair) -> tuple[float, ...]:

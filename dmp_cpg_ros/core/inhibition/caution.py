@@ -35,11 +35,6 @@ bear, and twice that.
 LEAST = 0.1
 """Least share: with none a robot that is held, or wrong about its speed, would not move again."""
 
-CLIMBING = 0.8
-"""Least share on ground that is known to be rough: on steps the feet stand where the ground lets
-them, the margins are small by that, and a body that does not go on falls back from them.
-"""
-
 NARROW, WIDE_STANCE = 0.5, 0.75
 """q of a gait that stands on one side only, and the share of stance on both from which it is 1."""
 
@@ -65,15 +60,14 @@ def room(margins: Sequence[float] | None, leg_length: float, two_sided: float) -
     return min(margins) / (q * leg_length)
 
 
-def followed_share(share: float, left: float | None, dt: float, most: float = 1.0,
-                   least: float = LEAST) -> float:
+def followed_share(share: float, left: float | None, dt: float, most: float = 1.0) -> float:
     """Share of the command after a tick of dt [s], in [LEAST, 1], from the one before,
-    :func:`room`, and the most that may be followed and least that it leaves.
+    :func:`room`, and the most that may be followed.
     """
     regained = min(most, share + REGAIN * dt)
     if left is None:
         return regained
-    return min(regained, max(least, (left - DISTURBED) / (EASY - DISTURBED)))
+    return min(regained, max(LEAST, (left - DISTURBED) / (EASY - DISTURBED)))
 
 
 def changing_share(network: GaitNetwork, wanted: Gait, command: tuple[float, float, float]

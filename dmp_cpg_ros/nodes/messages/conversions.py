@@ -50,8 +50,7 @@ _FEET = slice(_JOINTS.stop, _JOINTS.stop + len(layouts.SHIFT_ROWS))
 _BASE = slice(_FEET.stop, _FEET.stop + len(layouts.CORRECTION_ROWS))
 _MARGINS = slice(_BASE.stop, _BASE.stop + len(layouts.MARGIN_ROWS))
 _PROGRESS = slice(_MARGINS.stop, _MARGINS.stop + len(layouts.PROGRESS_ROWS))
-_GROUND = slice(_PROGRESS.stop, _PROGRESS.stop + len(layouts.GROUND_ROWS))
-_COMMAND = slice(_GROUND.stop, None)
+_COMMAND = slice(_PROGRESS.stop, None)
 
 
 def read_twist(message: Twist) -> tuple[float, float, float]:
@@ -271,9 +270,8 @@ class PostureFeedbackWriter:
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
         self._position[_MARGINS] = feedback.margins
-        velocity, behind, rough = feedback.progress or Progress()
-        self._position[_PROGRESS] = (*velocity, behind, rough)
-        self._position[_GROUND] = feedback.level
+        velocity, behind = feedback.progress or Progress()
+        self._position[_PROGRESS] = (*velocity, behind)
         self._effort[_JOINTS] = feedback.torque
         self._effort[_FEET].reshape(len(LEGS), 3)[:, 2] = feedback.foot_force
         self._position[_COMMAND], self._velocity[_COMMAND] = layouts.command_rows(feedback.command)
@@ -295,12 +293,12 @@ class PostureFeedbackReader:
             velocity[_FEET].reshape(len(LEGS), 3)[:, :2], velocity[_BASE],
             self._command.of(position[_COMMAND], velocity[_COMMAND]), position[_JOINTS],
             effort[_FEET].reshape(len(LEGS), 3)[:, 2], tuple(position[_MARGINS].tolist()),
-            _progress(position[_PROGRESS]), position[_GROUND])
+            _progress(position[_PROGRESS]))
 
 
 def _progress(row: Array) -> Progress:
-    x, y, behind, rough = row.tolist()
-    return Progress((x, y), behind, rough)
+    x, y, behind = row.tolist()
+    return Progress((x, y), behind)
 
 
 class CommandReader:
