@@ -22,6 +22,9 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass
+from math import inf
+
+from dmp_cpg_ros.core.errors import ParameterError
 
 LONGEST_PACKET = 65536
 """Of IP [bytes]."""
@@ -42,12 +45,24 @@ class Conditions:
         Share of packets that are lost [%].
     multicast : bool
         Whether multicast crosses it.
+
+    Raises
+    ------
+    ParameterError
+        If one of these numbers is impossible.
     """
 
     delay_ms: float = 0.0
     jitter_ms: float = 0.0
     loss: float = 0.0
     multicast: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.jitter_ms <= self.delay_ms < inf:
+            raise ParameterError(f'a link takes delay ± jitter, finite and with 0 <= jitter <= '
+                                 f'delay, not {self.delay_ms:g} ± {self.jitter_ms:g} ms')
+        if not 0.0 <= self.loss <= 100.0:
+            raise ParameterError(f'a link loses 0 to 100 % of its packets, not {self.loss:g} %')
 
     def __str__(self) -> str:
         return f'{self.delay_ms:g} ± {self.jitter_ms:g} ms, {self.loss:g} %'
@@ -101,7 +116,7 @@ class LossyLink:
             return
         delay_ms = its.delay_ms + its.jitter_ms * self._random.uniform(-1.0, 1.0)
         heapq.heappush(self._under_way,
-                       (now_s + 1e-3 * max(0.0, delay_ms), self.packets, to, packet))
+                       (now_s + 1e-3 * delay_ms, self.packets, to, packet))
 
     def due(self, now_s: float) -> list[tuple[int, bytes]]:
         """Descriptors and packets that arrive now, in the order of their times."""

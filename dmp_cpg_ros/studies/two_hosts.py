@@ -46,15 +46,14 @@ from dmp_cpg_ros.nodes.framework.parameters import BEST_EFFORT, DELIVERIES
 from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, LinkWatch
 from dmp_cpg_ros.studies.lossy_link import Conditions
 from dmp_cpg_ros.studies.network_hosts import TwoHosts
-from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, positive, write_results
+from dmp_cpg_ros.suite import load_suite
 from dmp_cpg_ros.suite_table import COMPOSED, PROCESSES, ROBOT, instances
 
 PEERS = 'ROS_STATIC_PEERS'
 
-TICK_MS, COMPUTED_MS, LONGEST_LEAD_MS = 4.0, 8.0, 60.0
-"""Of the suite, its share of a lead: the tick that a lost message costs, and computing; longest
-lead [ms].
-"""
+COMPUTED_MS, LONGEST_LEAD_MS = 8.0, 60.0
+"""Share of computing in a lead; the longest lead [ms]."""
 
 BEGIN_S, END_S = 3.0, 4.0
 """Of the robot's time before its speed counts, and for its stop at the end [s]."""
@@ -129,8 +128,9 @@ class Phase:
 
 def lead_for(link: Conditions) -> float:
     """Lead in whole ticks for a link [ms]: there and back, a lost message, and computing."""
-    needed = 2.0 * (link.delay_ms + link.jitter_ms) + TICK_MS + COMPUTED_MS
-    return min(LONGEST_LEAD_MS, TICK_MS * ceil(needed / TICK_MS))
+    tick_ms = 1e-6 * load_suite().tick_ns
+    needed = 2.0 * (link.delay_ms + link.jitter_ms) + tick_ms + COMPUTED_MS
+    return min(LONGEST_LEAD_MS, tick_ms * ceil(needed / tick_ms))
 
 
 def walk(two: TwoHosts, setting: Setting, links: Sequence[Conditions], folder: Path, *,
@@ -285,16 +285,16 @@ def _row(setting: Setting, phase: Phase) -> tuple[str, ...]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = parser_of('two_hosts', __doc__, 'what happened', jobs=False)
-    for name, default, text in (
-            ('delay-ms', 5.0, 'delay of the link each way'),
-            ('jitter-ms', 2.0, 'by how much it varies to either side, uniform'),
-            ('loss', 1.0, 'share of packets that are lost, in percent'),
-            ('seconds', 60.0, "of the robot's time at its speed"),
-            ('speed', 0.5, 'forward, m/s')):
-        parser.add_argument(f'--{name}', type=float, default=default, metavar='X',
+    for name, kind, default, text in (
+            ('delay-ms', float, 5.0, 'delay of the link each way'),
+            ('jitter-ms', float, 2.0, 'by how much it varies to either side, uniform'),
+            ('loss', float, 1.0, 'share of packets that are lost, in percent'),
+            ('seconds', positive, 60.0, "of the robot's time at its speed"),
+            ('speed', positive, 0.5, 'forward, m/s')):
+        parser.add_argument(f'--{name}', type=kind, default=default, metavar='X',
                             help=f'{text} (default: {default:g})')
     parser.add_argument('--gait', default='amble', help='(default: amble)')
-    parser.add_argument('--lead-ms', type=float, metavar='X',
+    parser.add_argument('--lead-ms', type=positive, metavar='X',
                         help='target_lead, whole ticks (default: what the link needs)')
     parser.add_argument('--then', type=float, nargs=3, metavar=('DELAY', 'JITTER', 'LOSS'),
                         help='what the link becomes after that, for as long again')

@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import socket
 import threading
+from math import inf, nan
 from pathlib import Path
 
 import pytest
@@ -18,8 +19,10 @@ import ros_processes
 from rclpy.qos import ReliabilityPolicy
 from ros_processes import Processes
 
+from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.nodes.messages.interfaces import EVERY_TICK, TOPICS
 from dmp_cpg_ros.robot.target_loss import WINDOW_NS, TargetLoss
+from dmp_cpg_ros.studies import two_hosts
 from dmp_cpg_ros.studies.lossy_link import Conditions, LossyLink
 from dmp_cpg_ros.studies.network_hosts import Host, TwoHosts, may_make_hosts
 from dmp_cpg_ros.studies.two_hosts import lead_for
@@ -64,6 +67,27 @@ def test_a_link_without_multicast_hands_over_the_rest_in_order() -> None:
 def test_a_lead_covers_the_way_there_and_back() -> None:
     assert lead_for(Conditions(delay_ms=5.0, jitter_ms=2.0)) == 28.0
     assert lead_for(Conditions(delay_ms=50.0)) == 60.0
+
+
+@pytest.mark.parametrize('numbers', [
+    {'delay_ms': -1.0}, {'delay_ms': nan}, {'delay_ms': inf}, {'delay_ms': 2.0, 'jitter_ms': 3.0},
+    {'delay_ms': 2.0, 'jitter_ms': -1.0}, {'loss': -1.0}, {'loss': 101.0}, {'loss': nan}])
+def test_no_link_does_the_impossible(numbers: dict[str, float]) -> None:
+    with pytest.raises(ParameterError, match='a link (takes|loses)'):
+        Conditions(**numbers)
+
+
+@pytest.mark.parametrize('option', [
+    ['--delay-ms', '-5'], ['--loss', 'nan'], ['--seconds', 'nan'], ['--speed', '-1'],
+    ['--then', '5', '9', '0']])
+def test_two_hosts_refuses_impossible_numbers(
+        option: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        raise SystemExit(two_hosts.main(option))
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert 'not' in said or 'must be' in said
+    assert 'Traceback' not in said
 
 
 @pytest.mark.parametrize('every', [1, 2, 5])
