@@ -265,6 +265,35 @@ def test_parameter_requests_without_end_are_not_all_looked_at(ros: Ros, follower
     assert follower.health.rejected['set_parameters'] > len(reasons)
 
 
+def test_who_may_have_sent_what_names_no_sender_is_told(ros: Ros, follower: Any) -> None:
+    """Of requests and events, by the graph; the suite's own nodes are no suspects."""
+    own = Node('inhibition', context=ros.context)
+    own.create_client(SetParameters, 'follower/set_parameters')
+    own.create_publisher(ParameterEvent, '/parameter_events', qos_profile_parameter_events)
+
+    def told(what: str) -> str:
+        message: str = follower.health.status('', {}, periodic=True).status[0].message
+        assert what in message
+        return message
+
+    stranger = f'/{ros.node.get_name()}'
+    ros.call(SetParameters, 'follower/set_parameters', SetParameters.Request(
+        parameters=[Parameter('max_speed', value=1.0).to_parameter_msg()] * 1000))
+    assert told('too many changes').endswith(f'; asked by {stranger}')
+    ros.call(ChangeState, 'follower/change_state',
+             ChangeState.Request(transition=Transition(id=99)))
+    assert told('transition 99').endswith(f'; asked by {stranger}')
+    publisher = ros.node.create_publisher(
+        ParameterEvent, '/parameter_events', qos_profile_parameter_events)
+    ros.spin_until(lambda: publisher.get_subscription_count() > 0)
+    publisher.publish(ParameterEvent(node='/canonical_oscillators', changed_parameters=[
+        ParameterMessage(name='gait', value=ParameterValue(type=77))]))
+    ros.spin_until(lambda: '/parameter_events' in follower.health.rejected)
+    said = told('cannot be read')
+    assert f'may come from {stranger}' in said and '/inhibition' not in said
+    own.destroy_node()
+
+
 def test_a_topic_has_one_writer(ros: Ros, follower: Any) -> None:
     """The robot is heard, a second writer is refused and named, and a new robot takes over."""
     topic = interface('joint_states')

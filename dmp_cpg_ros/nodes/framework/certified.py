@@ -140,7 +140,8 @@ class ParameterFollower:
         if not self._node.follow(told) and any(
                 told[name] != value for name, value in claimed.items()):
             self._node.drop('/parameter_events', DataError(
-                f'{dict(claimed)} is said to be changed by {owner}, which has not'))
+                f'{dict(claimed)} is said to be changed by {owner}, which has not'),
+                self._node.strangers.publishing('/parameter_events'))
 
 
 class Acting(NamedTuple):

@@ -13,6 +13,7 @@ import contextlib
 import time
 import traceback
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar
 
 from rcl_interfaces.msg import SetParametersResult
@@ -26,6 +27,7 @@ from rclpy.timer import Timer
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.nodes.framework.health import NodeHealth
+from dmp_cpg_ros.nodes.framework.strangers import Strangers
 
 CHANGES, CHANGES_HZ = 20.0, 2.0
 """Requests to change parameters that are heard at once, and in the long run [1/s]: to judge one
@@ -53,6 +55,8 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         What ends the process all the same, because the node has no work without it.
     health : NodeHealth
         Ticks, stamp, what was dropped, problems.
+    strangers : Strangers
+        Who may have sent what is dropped.
     active : bool
         Whether the node is in the state ``active``.
     configured : bool
@@ -69,6 +73,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         """Create the node, unconfigured."""
         self._traced: set[tuple[str, type[Exception]]] = set()
         self._changes = CHANGES, time.monotonic()
+        self.strangers = Strangers(self)
         self.active = self.configured = False
         self.state_label = 'unconfigured'
         self.failure: Exception | None = None
@@ -190,7 +195,8 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
 
     # Callbacks ---------------------------------------------------------------------------------
 
-    def guarded(self, name: str, callback: Callable[..., Any]) -> Callable[..., Any]:
+    def guarded(self, name: str, callback: Callable[..., Any],
+                who: Callable[[], str] = str) -> Callable[..., Any]:
         """Return a callback that drops what it cannot use instead of raising.
 
         Parameters
@@ -200,6 +206,8 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         callback : callable
             A service's response says by its ``success`` and ``message``, where it has them, that
             its request was dropped.
+        who : callable () → str, optional
+            Names those from whom it may have come, as :class:`Strangers` does.
         """
         def call(*arguments: Any) -> Any:
             try:
@@ -207,7 +215,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
             except self.ENDS_WITH:
                 raise
             except Exception as error:  # noqa: BLE001 - whatever it is, the node goes on
-                text = self.drop(name, error)
+                text = self.drop(name, error, who())
                 answer: Any = arguments[-1] if arguments else None
                 if hasattr(answer, 'success'):
                     answer.success = False
@@ -220,18 +228,20 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
     def create_subscription(self, msg_type: Any, topic: str, callback: Callable[..., Any],
                             *arguments: Any, **options: Any) -> Subscription:
         """Create a subscription with a guarded callback."""
+        who = partial(self.strangers.publishing, topic)
         return super().create_subscription(
-            msg_type, topic, self.guarded(topic, callback), *arguments, **options)
+            msg_type, topic, self.guarded(topic, callback, who), *arguments, **options)
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable[..., Any],
                        *arguments: Any, **options: Any) -> Service:
         """Create a service with a guarded callback; one of parameters is not asked too often."""
         if srv_type in (SetParameters, SetParametersAtomically):
-            callback = self._limited(callback)
+            callback = self._limited(srv_name, callback)
+        who = partial(self.strangers.asking, srv_name)
         return super().create_service(
-            srv_type, srv_name, self.guarded(srv_name, callback), *arguments, **options)
+            srv_type, srv_name, self.guarded(srv_name, callback, who), *arguments, **options)
 
-    def _limited(self, callback: Callable[..., Any]) -> Callable[..., Any]:
+    def _limited(self, service: str, callback: Callable[..., Any]) -> Callable[..., Any]:
         """Refuse changes of parameters that come so often that ticks would starve."""
         def answer(request: Any, response: Any) -> Any:
             left, then = self._changes
@@ -243,7 +253,9 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
                 return callback(request, response)
             refusal = SetParametersResult(successful=False, reason=(
                 'too many changes of parameters; ask again in a few seconds'))
-            self.health.reject('set_parameters', refusal.reason)
+            if self.health.reject('set_parameters',
+                                  refusal.reason + self.strangers.asking(service)):
+                self.report()
             if hasattr(response, 'results'):
                 response.results = [refusal] * min(len(request.parameters), MOST_CHANGES)
             else:
@@ -278,19 +290,20 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
                     f'{self._state_machine.current_state[1]}; valid are {valid or "none"}'
                 ) from None
 
-        service.callback = self.guarded('change_state', answer)
+        service.callback = self.guarded(
+            'change_state', answer, partial(self.strangers.asking, '~/change_state'))
 
-    def drop(self, name: str, error: Exception) -> str:
-        """Count, log now and then, and report; returns the reason."""
+    def drop(self, name: str, error: Exception, who: str = '') -> str:
+        """Count, log now and then, and report, with whom it may come from; returns the reason."""
         expected, kind = isinstance(error, DmpCpgError), (name, type(error))
         reason = str(error) if expected else f'{type(error).__name__}: {error}'
-        told = self.health.reject(name, reason, error=not expected)
+        told = self.health.reject(name, reason + who, error=not expected)
         if not expected and kind not in self._traced:
             self._traced.add(kind)
             self.get_logger().error(f'{name}: {traceback.format_exc()}')
         elif told:
             count = self.health.rejected[name]
-            self.get_logger().warning(f'{name}: dropped: {reason} ({count} dropped so far)')
+            self.get_logger().warning(f'{name}: dropped: {reason}{who} ({count} dropped so far)')
         else:
             return reason
         with contextlib.suppress(Exception):  # the report itself may be what failed

@@ -1,0 +1,77 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who in the ROS graph may have sent what says nothing of its sender: requests, parameter events.
+
+rclpy hands over neither the client of a request nor the publisher of an event. The graph knows
+which nodes have a client of that service or publish that topic; those that are none of the
+suite's are told, a maintainer's tool as well as an intruder.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from math import inf
+
+from rclpy.exceptions import NotInitializedException
+from rclpy.node import Node, NodeNameNonExistentError
+
+from dmp_cpg_ros.suite_table import KINDS
+
+LOOK_EVERY_S = 0.5
+"""Period in which the graph is asked once at most, however much is dropped [s]."""
+
+OWN = frozenset(name for kind in KINDS.values() for name in kind.instances)
+"""Names of the suite's nodes."""
+
+
+class Strangers:
+    """Names of nodes that are not the suite's, looked up in the graph of one of its nodes.
+
+    Parameters
+    ----------
+    node : Node
+        Whose graph and namespace these are.
+    """
+
+    def __init__(self, node: Node) -> None:
+        """Know nobody yet."""
+        self._node = node
+        self._known: dict[str, tuple[float, str]] = {}
+
+    def asking(self, service: str) -> str:
+        """Text that names who has a client of a service; empty for nobody."""
+        def names() -> Iterable[str]:
+            full = self._node.resolve_service_name(service)
+            for name, space in self._node.get_node_names_and_namespaces():
+                with suppress(NodeNameNonExistentError):  # it has just gone
+                    clients = self._node.get_client_names_and_types_by_node(name, space)
+                    if any(full == client for client, _ in clients):
+                        yield self._stranger(name, space)
+
+        return self._told(f'service {service}', 'asked by', names)
+
+    def publishing(self, topic: str) -> str:
+        """Text that names who publishes a topic; empty for nobody."""
+        def names() -> Iterable[str]:
+            for end in self._node.get_publishers_info_by_topic(
+                    self._node.resolve_topic_name(topic)):
+                yield self._stranger(end.node_name, end.node_namespace)
+
+        return self._told(f'topic {topic}', 'may come from', names)
+
+    def _stranger(self, name: str, space: str) -> str:
+        """Full name of a node, empty if it is the suite's own."""
+        own = (name in OWN or name == self._node.get_name()) and (
+            space == self._node.get_namespace())
+        return '' if own else f'{space.rstrip("/")}/{name}'
+
+    def _told(self, key: str, verb: str, names: Callable[[], Iterable[str]]) -> str:
+        now_s, (then_s, text) = time.monotonic(), self._known.get(key, (-inf, ''))
+        if now_s >= then_s + LOOK_EVERY_S:
+            with suppress(NotInitializedException):  # the node ends
+                who = ', '.join(sorted(set(filter(None, names()))))
+                text = f'; {verb} {who}' if who else ''
+            self._known[key] = now_s, text
+        return text
