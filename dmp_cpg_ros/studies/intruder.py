@@ -26,9 +26,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from math import nan
+from math import atan2, cos, nan, remainder, sin, tau
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import rclpy
@@ -80,8 +80,8 @@ ATTACK_S = 2.0
 PATIENCE_S = 120.0
 """Time of this machine in which the suite walks, and recovers [s]."""
 
-SLOWEST, FASTEST, LOWEST = 0.35, 0.65, 0.15
-"""Speeds [m/s] and the height of the base [m] of a robot that walks on."""
+SLOWEST, FASTEST, LOWEST, MOST_TURNED = 0.35, 0.65, 0.15, 0.2
+"""Speeds [m/s], height of the base [m] and turn by an attack [rad] of a robot that walks on."""
 
 OWN = tuple(topic for topic in TOPICS if topic.publishers != ('user',) and topic.recorded
             and topic.name not in ('/clock', '/diagnostics', 'joint_work', 'odom', '/tf'))
@@ -90,6 +90,16 @@ OWN = tuple(topic for topic in TOPICS if topic.publishers != ('user',) and topic
 TICKED = ('joint_states', 'imu', 'foot_contacts', 'reference', 'canonical_state',
           'posture_feedback', 'joint_targets')
 """Topics with a message at every tick."""
+
+
+class Pose(NamedTuple):
+    """Place of the base in the world [m] and its heading [rad] at a time of the robot [s]."""
+
+    time_s: float
+    x: float
+    y: float
+    z: float
+    yaw: float
 
 
 class Intruder(Node):  # type: ignore[misc]
@@ -101,8 +111,8 @@ class Intruder(Node):  # type: ignore[misc]
 
     Attributes
     ----------
-    named : float
-        When a report of the suite first named it during the attack [s]; NaN before.
+    begin, named : float
+        When the attack began, and when a report of the suite first named it since [s]; NaN before.
     fell : bool
         Whether the robot has told a fall.
     sent : int
@@ -116,8 +126,8 @@ class Intruder(Node):  # type: ignore[misc]
         self.executor_.add_node(self)
         self.draw = random.Random(seed)
         self.last: dict[str, bytes] = {}
-        self.poses: list[tuple[float, float, float]] = []
-        self.named, self.fell, self.sent = nan, False, 0
+        self.poses: list[Pose] = []
+        self.begin, self.named, self.fell, self.sent = nan, nan, False, 0
         self._writers: dict[str, Any] = {}
         self._readers: dict[str, Any] = {}
         place = interface('ground_truth')
@@ -138,10 +148,13 @@ class Intruder(Node):  # type: ignore[misc]
     def _on_place(self, data: bytes) -> None:
         with suppress(rclpy_implementation.RMWError):  # its own garbage comes back
             odom = deserialize_message(data, Odometry)
-            place, stamp = odom.pose.pose.position, odom.header.stamp
+            place, stamp, q = (odom.pose.pose.position, odom.header.stamp,
+                               odom.pose.pose.orientation)
             if place.x == 0.0 == place.z:
                 return
-            self.poses.append((stamp.sec + 1e-9 * stamp.nanosec, place.x, place.z))
+            yaw = 2.0 * atan2(q.z, q.w)  # of a body that is hardly tilted
+            self.poses.append(Pose(stamp.sec + 1e-9 * stamp.nanosec, place.x, place.y, place.z,
+                                   yaw))
             if len(self.poses) > 1000:
                 del self.poses[:500]
 
@@ -159,12 +172,15 @@ class Intruder(Node):  # type: ignore[misc]
             self.executor_.spin_once(timeout_sec=max(0.0, end - time.monotonic()))
 
     def speed(self, seconds: float = 1.5) -> float:
-        """Mean speed along x over the last seconds of the robot's clock [m/s]."""
+        """Mean speed ahead over the last seconds of the robot's clock [m/s]."""
         if not self.poses:
             return nan
-        end, x, _ = self.poses[-1]
-        then, before = next((t, p) for t, p, _ in self.poses if t >= end - seconds)
-        return (x - before) / (end - then) if end > then else nan
+        end = self.poses[-1]
+        begin = next(pose for pose in self.poses if pose.time_s >= end.time_s - seconds)
+        passed_s = end.time_s - begin.time_s
+        heading = begin.yaw + 0.5 * remainder(end.yaw - begin.yaw, tau)
+        ahead = cos(heading) * (end.x - begin.x) + sin(heading) * (end.y - begin.y)
+        return ahead / passed_s if passed_s > 0.0 else nan
 
     def publish(self, name: str, message: Any) -> None:
         """Publish a message, or its bytes, with the suite's own quality of service."""
@@ -211,7 +227,7 @@ class Intruder(Node):  # type: ignore[misc]
 
     def stamp_ns(self) -> int:
         """Stamp of the last pose [ns]."""
-        return round(self.poses[-1][0] * 1e9) if self.poses else 0
+        return round(self.poses[-1].time_s * 1e9) if self.poses else 0
 
     def stamped(self, name: str, stamp_ns: int) -> None:
         """Publish the last message of a topic with another stamp."""
@@ -377,6 +393,10 @@ def _parameters(owner: str, name: str) -> Callable[[Intruder], None]:
 def _second_robot(node: Intruder) -> None:
     robot = subprocess.Popen([sys.executable, '-m', 'dmp_cpg_ros', ROBOT, '--ros-args', '-r',
                               f'__node:={NAME}'], stderr=subprocess.DEVNULL)
+    end = time.monotonic() + PATIENCE_S
+    while node.count_publishers('joint_states') < 2 and time.monotonic() < end:
+        node.spin(0.02)
+    node.begin = time.monotonic()  # so far it has only started
     node.spin(5.0)
     robot.send_signal(signal.SIGINT)
     robot.wait(10.0)
@@ -421,12 +441,14 @@ class Outcome:
     messages: int
     fell: bool
     speed: float
+    turned: float
     named_s: float
 
     @property
     def walked_on(self) -> bool:
         """Whether the robot walked on as commanded."""
-        return not self.fell and SLOWEST <= self.speed <= FASTEST
+        return (not self.fell and SLOWEST <= self.speed <= FASTEST
+                and abs(self.turned) <= MOST_TURNED)
 
 
 class Suite:
@@ -454,7 +476,7 @@ class Suite:
              '--no-report', '--out', str(out), *self._options],
             stdout=(self._folder / f'walk{self._runs}.log').open('wb'), stderr=subprocess.STDOUT)
         end = time.monotonic() + PATIENCE_S
-        while not (node.poses and node.poses[-1][0] > STEADY_S):
+        while not (node.poses and node.poses[-1].time_s > STEADY_S):
             node.spin(0.2)
             if time.monotonic() > end or self._process.poll() is not None:
                 said = (self._folder / f'walk{self._runs}.log').read_text(encoding='utf-8')
@@ -486,15 +508,17 @@ class Suite:
 
 def attacked(node: Intruder, suite: Suite, name: str) -> Outcome:
     """Attack and look what comes of it."""
-    node.named, begin, sent = nan, time.monotonic(), node.sent
+    node.named, node.begin, sent = nan, time.monotonic(), node.sent
+    heading = node.poses[-1].yaw
     ATTACKS[name](node)
     named = node.named
     node.leave()
-    end_s, deadline = node.poses[-1][0] + RECOVERY_S, time.monotonic() + PATIENCE_S
-    while suite.running() and node.poses[-1][0] < end_s and time.monotonic() < deadline:
+    end_s, deadline = node.poses[-1].time_s + RECOVERY_S, time.monotonic() + PATIENCE_S
+    while suite.running() and node.poses[-1].time_s < end_s and time.monotonic() < deadline:
         node.spin(0.1)
-    fell = node.fell or not suite.running() or node.poses[-1][2] < LOWEST
-    return Outcome(name, node.sent - sent, fell, node.speed(), named - begin)
+    fell = node.fell or not suite.running() or node.poses[-1].z < LOWEST
+    return Outcome(name, node.sent - sent, fell, node.speed(),
+                   remainder(node.poses[-1].yaw - heading, tau), max(named - node.begin, 0.0))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -550,9 +574,10 @@ def table(outcomes: Sequence[Outcome]) -> str:
             rows.append((name, str(len(of)), f'{sum(outcome.messages for outcome in of):,}',
                          str(sum(outcome.fell for outcome in of)),
                          str(sum(not outcome.walked_on for outcome in of)),
+                         f'{max(abs(outcome.turned) for outcome in of):.2f} rad',
                          '-' if late != late else f'{late:.1f} s'))
-    return markdown_table(
-        ('attack', 'times', 'messages', 'falls', 'did not walk on', 'named within'), rows)
+    return markdown_table(('attack', 'times', 'messages', 'falls', 'did not walk on', 'turned',
+                           'named within'), rows)
 
 
 if __name__ == '__main__':

@@ -16,5 +16,5 @@ def test_forged_targets_do_not_keep_the_robot_from_walking(processes: Processes)
                              'joint_targets times 3')
     assert study.wait(4 * ros_processes.DEADLINE_S) == 0, str(study)
     outcome = study.wait_for_output(r"Outcome\(attack='joint_targets times 3', messages=(\d+), "
-                                    r'fell=False, speed=0.\d+, named_s=(\d)')
+                                    r'fell=False, speed=0.\d+, turned=\S+, named_s=(\d)')
     assert int(outcome[1]) > 100
