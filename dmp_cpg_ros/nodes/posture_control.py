@@ -83,8 +83,8 @@ class BodyState:
             self.readers['ground_truth'] = robot_state.read_odom
             return
         self.optional = BODY_TOPICS[ESTIMATE]
-        self.readers |= {'joint_states': stamped(robot_state.JointsReader(
-                             description.joint_names, strict=False).read),
+        self.readers |= {'joint_states': robot_state.JointsReader(
+                             description.joint_names, strict=False).read,
                          'imu': stamped(robot_state.read_imu),
                          'foot_contacts': stamped(robot_state.FootContactsReader().read)}
         self._estimator = BodyEstimator(
@@ -167,8 +167,8 @@ class BodyState:
 
 def sensor_readings(stamp_ns: int, values: Mapping[str, Any]) -> SensorReadings:
     """Readings of one tick; what bears another stamp is missing (NaN)."""
-    nothing, no_contacts, no_joints = (np.full(size, np.nan) for size in (3, len(LEGS), 12))
-    position, velocity, effort = told_at(stamp_ns, values['joint_states'], (no_joints,) * 3)
+    position, velocity, effort = values['joint_states']
+    nothing, no_contacts = np.full(3, np.nan), np.full(len(LEGS), np.nan)
     rate, force = told_at(stamp_ns, values['imu'], (nothing, nothing))
     contacts = told_at(stamp_ns, values['foot_contacts'], no_contacts)
     return SensorReadings(stamp_ns, position, velocity, effort, rate, force, contacts)
