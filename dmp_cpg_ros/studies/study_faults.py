@@ -17,11 +17,13 @@ import json
 import os
 import random
 import re
+import shutil
 import signal
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from itertools import cycle, islice
 from math import inf, nan
@@ -241,13 +243,27 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
                         wanted = list(islice(cycle(nodes), options.kills))
                     else:
                         wanted = [rng.choice(nodes)]
-                    with tempfile.TemporaryDirectory() as folder:
-                        outcomes.append(
-                            run(gait, speed, lock_step, respawn, wanted, rng, Path(folder)))
+                    with _folder(options.logs, f'{len(outcomes):03}_{gait}') as folder:
+                        outcomes.append(run(gait, speed, lock_step, respawn, wanted, rng, folder))
                     print(f'round {round_}: {json.dumps(asdict(outcomes[-1]))}', flush=True)
                     write_results(options.json, [asdict(one) for one in outcomes])
     print(markdown_table(COLUMNS, list(rows(outcomes))))
     return int(any(one.fell for one in outcomes))
+
+
+@contextmanager
+def _folder(logs: Path | None, name: str) -> Iterator[Path]:
+    """A folder for a walk, which keeps what its processes said where logs are wanted."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            yield Path(folder)
+        finally:
+            if logs is not None:
+                kept = logs / name
+                kept.mkdir(parents=True, exist_ok=True)
+                for log in (Path(folder) / 'said.txt', *Path(folder).glob('run/logs/*.log')):
+                    if log.is_file():
+                        shutil.copy(log, kept)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -260,6 +276,7 @@ def _parser() -> argparse.ArgumentParser:
     add('--nodes', nargs='+', choices=(*VICTIMS, RECORDER), default=VICTIMS,
         metavar='NODE', help=f'that are killed: {RECORDER}, or (default: all of them) '
         f'{", ".join(VICTIMS)}')
+    add('--logs', type=Path, metavar='FOLDER', help='where to keep what the processes say')
     add('--seed', type=int, default=0, help='of nodes and times (default: 0)')
     return parser
 
