@@ -145,8 +145,7 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
         ready = walk.said(READY, begin)
         told = [re.search(rf'^ *([\d.]+) s .*{FOLLOWS}', line) for line in walk.lines[begin:]]
         kill.back_s = min([ready, *(float(found[1]) for found in told if found)])
-        walks_on = lock_step or node == RECORDER or walk.said('walking', begin) < inf
-        if ready == inf or not walks_on:
+        if ready == inf or not (lock_step or node == RECORDER or walk.walks()):
             break
     if respawn:
         time.sleep(rng.uniform(4.0, 6.0))

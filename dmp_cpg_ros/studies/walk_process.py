@@ -15,8 +15,13 @@ from collections.abc import Sequence
 from math import inf
 from pathlib import Path
 
+from dmp_cpg_ros.core.inhibition.supervisor import STATES
+
 WITHIN_S = 120.0
 """How long the suite may take to be ready, at first and again, before a walk is given up [s]."""
+
+GAIT_STATE = rf'^ *[\d.]+ s  ({"|".join(STATES).replace("_", " ")})$'
+"""Line that tells a new state of the gait."""
 
 
 class WalkProcess:
@@ -58,6 +63,16 @@ class WalkProcess:
                     return float(found[1])
             time.sleep(0.05)
         return inf
+
+    def walks(self) -> bool:
+        """Wait until its last words of the gait are that it walks; whether they are."""
+        deadline = time.monotonic() + WITHIN_S
+        while time.monotonic() < deadline and self.process.poll() is None:
+            states = (re.search(GAIT_STATE, line) for line in reversed(self.lines))
+            if (last := next(filter(None, states), None)) and last[1] == 'walking':
+                return True
+            time.sleep(0.05)
+        return False
 
     def pid_of(self, nodes: Sequence[str]) -> int:
         """Process of some nodes; 0 when there is none."""
