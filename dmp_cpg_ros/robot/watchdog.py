@@ -53,11 +53,16 @@ LONGEST_STOP_S = 1.6
 NEAR, SLOW = 0.3, 0.3
 """Distance [rad] and speed [rad/s] within which targets are at rest where the joints are held."""
 
+STEPPED = 0.7
+"""That distance for a robot that stands: its legs may rest on footholds a step away [rad]."""
+
 AT_EASE_NS = 100_000_000
 """Time for which targets must have been at rest until they are followed again [ns]."""
 
 TAKEN_UP_S = 0.3
-"""Time in which the joints go over to targets that are followed again [s]."""
+"""Time in which the joints go over to targets that are followed again, as long for each ``NEAR``
+by which they are away [s].
+"""
 
 SLOWER = (('stand', 'stand'), ('lie', 'lie'))
 """What a robot does by itself, and the way of it, that gives way to lying down at once."""
@@ -121,6 +126,7 @@ class CommandWatchdog:
         self._rhythm: Rhythm | None = None
         self._given, self._off = np.zeros(12), np.zeros(12)
         self._begin_ns = self._late_ns = self._uneasy_ns = self._taken_ns = 0
+        self._taking_s = TAKEN_UP_S
         self._lagged_ns = -1
         self.lateness_ns = self.ticks = self.carried = 0
         self._start = self._targets
@@ -194,6 +200,7 @@ class CommandWatchdog:
         if self.fallback:
             self._taken_ns, self.fallback = now, ''
             self._off = self._given - self._targets[0]
+            self._taking_s = TAKEN_UP_S * max(1.0, float(np.abs(self._off).max()) / NEAR)
         position, velocity, effort = self._targets.copy()
         if any(ages):
             late = np.repeat(ages, len(JOINTS_OF_LEG))
@@ -202,8 +209,9 @@ class CommandWatchdog:
             return JointTargets(*self._going_on(state, np.array((position, velocity, effort))))
         if self._late_ns:
             self._late_ns, self._taken_ns, self._off = 0, now, self._given - position
-        if self._taken_ns and now - self._taken_ns < TAKEN_UP_S * 1e9:
-            position += (1.0 - _share(now - self._taken_ns, TAKEN_UP_S)) * self._off
+            self._taking_s = TAKEN_UP_S
+        if self._taken_ns and now - self._taken_ns < self._taking_s * 1e9:
+            position += (1.0 - _share(now - self._taken_ns, self._taking_s)) * self._off
         return JointTargets(position, velocity, effort)
 
     def _take_what_acts(self, now: int) -> list[int]:
@@ -240,7 +248,8 @@ class CommandWatchdog:
         a robot that follows what is late would soon have to look after itself again.
         """
         position, velocity, _ = self._targets
-        if (np.abs(velocity).max() > SLOW or np.abs(position - self._given).max() > NEAR
+        near = STEPPED if self.fallback == 'stand' else NEAR
+        if (np.abs(velocity).max() > SLOW or np.abs(position - self._given).max() > near
                 or self.lateness_ns > CARRIED_NS):
             self._uneasy_ns = now
         return now - self._uneasy_ns >= AT_EASE_NS

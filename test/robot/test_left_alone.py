@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from copy import deepcopy
+from itertools import product
 from math import pi, tau
 
 import numpy as np
@@ -13,8 +14,11 @@ import pytest
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.loop import WalkingLoop
+from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.transformation.leg import nominal_foothold
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.robot.start_pose import home_joint_position
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
@@ -106,3 +110,24 @@ def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
     walk.go(500)
     assert not walk.guard.fallback and not walk.robot.fallen
     assert walk.state.base_velocity_in_base[0] == pytest.approx(0.5, rel=0.3)
+
+
+def test_it_follows_legs_that_rest_on_footholds_a_step_away() -> None:
+    """Inhibited legs stay on their footholds, and the robot stands on others by itself."""
+    walk = Walk('amble', 0.5).go(750).go(200, silent='fl')
+    assert walk.guard.fallback == 'stand'
+    description = walk.robot.description
+    for leg, shift in product(LEGS, ((0.1, 0.0), (-0.1, 0.0), (0.05, 0.05), (0.05, -0.05))):
+        robot, guard, state = deepcopy(
+            (walk.robot, walk.guard, walk.state), {id(walk.robot.model): walk.robot.model})
+        place, q = LEGS.index(leg), home_joint_position(description)
+        q[3 * place:3 * place + 3] = LegKinematics(description.legs[place]).inverse(
+            nominal_foothold(description, leg) + (*shift, 0.0))
+        for _ in range(250):
+            for i, each in enumerate(LEGS):
+                guard.accept(each, state.time_ns, JointTargets(
+                    q[3 * i:3 * i + 3], np.zeros(3), np.zeros(3)))
+            state = robot.step(guard.targets(state))
+        assert not guard.fallback and not robot.fallen, (leg, shift)
+        assert np.linalg.norm(state.base_velocity_in_base) < 0.05
+        assert np.abs(state.joint_position - q).max() < 0.1
