@@ -28,6 +28,9 @@ from dmp_cpg_ros.robot.target_loss import BORNE, LITTLE, TargetLoss
 CARRIED_NS = 24_000_000
 """Age up to which late targets are carried on by their own velocity [ns]."""
 
+HELD_NS = 100_000_000
+"""Age up to which late targets are held that have no rhythm with which to go on [ns]."""
+
 IN_TIME_NS = 60_000_000
 """Time for which targets must have been in time again until they are followed again [ns]: those
 that come now and then only tell what was, and to follow them each time tears at the feet.
@@ -194,7 +197,7 @@ class CommandWatchdog:
         if self.lateness_ns > CARRIED_NS:
             self._lagged_ns = now
         self._losing = self.lost > (LITTLE if self._losing else BORNE)
-        if self.drives.limp or self.silent(now) or (
+        if self.drives.limp or self.silent(now) or self._astray() or (
                 self.fallback and known and not self._at_ease(now)):
             return self._falling_back(state)
         if self.fallback:
@@ -214,6 +217,13 @@ class CommandWatchdog:
             position += (1.0 - _share(now - self._taken_ns, self._taking_s)) * self._off
         return JointTargets(position, velocity, effort)
 
+    def _astray(self) -> bool:
+        """Whether moving legs are late that have no rhythm with which to go on: a robot that took
+        up a stand until they are in time again would be torn out of it into their stride.
+        """
+        return bool(self._late_ns and self._rhythm is None and self.lateness_ns > HELD_NS
+                    and np.abs(self._targets[1]).max() > SLOW)
+
     def _take_what_acts(self, now: int) -> list[int]:
         """Take of each leg the newest targets whose time has come; return their ages [ns]."""
         ages = []
@@ -232,11 +242,7 @@ class CommandWatchdog:
         now = state.time_ns
         if not self._late_ns:
             self._late_ns, self._start, self._rhythm = now, last, self._memory.rhythm()
-        if self._rhythm is not None:
-            return self._rhythm.at(now)
-        if not self._stands(state):
-            return last
-        return self._taking_up('stand', now - self._late_ns, state)
+        return last if self._rhythm is None else self._rhythm.at(now)
 
     def _stands(self, state: RobotState) -> bool:
         condition = self._sense.condition(state)

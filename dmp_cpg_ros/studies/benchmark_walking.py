@@ -8,11 +8,12 @@ on blocks too, with and without quicker steps. manoeuvres: falls by pushes at re
 starting, changing gait and turning. unpushed: stops that nobody pushes against. rough: share of
 seeds that cross 5 m of rough ground; rougher, higher: of harder grounds, and of stairs on a robot
 with longer legs. obstacles: steps that are too high. contacts: rough ground with and without the
-feedback of touchdown and the stumbling reflex. delays: targets that arrive late. mismatch: a robot
-that is not as its controllers know it. gaits: every ordered pair of gaits changed while moving;
-fast_gaits: at the highest speeds, forwards and backwards, of other robots too. restarts: posture
-control that forgets all in the middle of a stride, as a node that is started again. robots: other
-robots, with their files alone; those of the extra `robots` are left out where it is not installed.
+feedback of touchdown and the stumbling reflex. delays: targets that arrive late. starved: those of
+controllers that do not get to run. mismatch: a robot that is not as its controllers know it.
+gaits: every ordered pair of gaits changed while moving; fast_gaits: at the highest speeds,
+forwards and backwards, of other robots too. restarts: posture control that forgets all in the
+middle of a stride, as a node that is started again. robots: other robots, with their files alone;
+those of the extra `robots` are left out where it is not installed.
 
 The robot is the MuJoCo one in the plain loop, which is identical to the nodes in lock-step.
 """
@@ -35,7 +36,7 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.errors import MissingFileError
 from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies import output
+from dmp_cpg_ros.studies import late_walks, output
 from dmp_cpg_ros.studies import walking_trials as trials
 from dmp_cpg_ros.studies.loop_recording import StopSummary
 from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
@@ -159,6 +160,13 @@ LATE_WALKS = (('amble', 0.5), ('amble', 1.2), ('trot', 1.0), ('trot', 2.0))
 DELAYS_MS = ((0.0, 0.0), (16.0, 16.0), (20.0, 20.0), (24.0, 24.0), (40.0, 40.0), (5.0, 30.0),
              (5.0, 50.0))
 """Least and longest delays of their targets [ms]."""
+
+STARVED = (late_walks.Stalls(300.0, 150.0), late_walks.Stalls(150.0, 200.0),
+           late_walks.Stalls(300.0, 250.0, 0.2, 0.3))
+"""Stalls of walks whose controllers starve."""
+
+STARVED_WALKS = (('amble', 0.5), ('trot', 1.0))
+"""Gaits and speeds of those."""
 
 WEAK = 0.4
 """Share of its torque that a weak drive has."""
@@ -425,7 +433,7 @@ def delays(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls and speed by the delay of the targets, without a lead and with one that covers it."""
     cells = [(gait, speed, delay, lead) for (gait, speed), delay in product(LATE_WALKS, DELAYS_MS)
              for lead in sorted({0, 4 * ceil(delay[1] / 4)})]
-    results = _run(workers, trials.late, [
+    results = _run(workers, late_walks.late, [
         {'gait': gait, 'speed': speed, 'delay_ms': delay, 'lead_ms': lead, 'seed': seed + 1}
         for gait, speed, delay, lead in cells for seed in range(seeds)])
     rows = []
@@ -438,6 +446,21 @@ def delays(workers: Workers, seeds: int, phases: int) -> Table:
                      str(lead), f'{len(of) - len(upright)}/{seeds}', *means))
     return Table('Targets that arrive late', ('gait, m/s', 'delay ms', 'target_lead ms', 'fell',
                                               'reached m/s', 'tilt rms deg'), rows, results)
+
+
+def starved(workers: Workers, seeds: int, phases: int) -> Table:
+    """Falls by how long and how often the controllers do not get to run."""
+    cells = list(product(STARVED_WALKS, STARVED))
+    results = _run(workers, late_walks.starved, [
+        {'gait': gait, 'speed': speed, 'stalls': stalls, 'seed': seed + 1}
+        for (gait, speed), stalls in cells for seed in range(seeds)])
+    rows = []
+    for k, ((gait, speed), stalls) in enumerate(cells):
+        of = [outcome for _, outcome in results[k * seeds:(k + 1) * seeds]]
+        rows.append((f'{gait} {speed:g}', str(stalls), f'{sum(one.fell for one in of)}/{seeds}',
+                     f'{np.mean([one.stood for one in of]):.1f}'))
+    return Table('Controllers that starve', (
+        'gait, m/s', 'stalls', 'fell', 'looked after itself, per walk'), rows, results)
 
 
 def mismatch(workers: Workers, seeds: int, phases: int) -> Table:
@@ -590,7 +613,7 @@ def _is_there(file: str) -> bool:
 
 TABLES = {make.__name__: make for make in (
     speeds, pushes, timing, manoeuvres, unpushed, rough, rougher, higher, obstacles, contacts,
-    delays, mismatch, gaits, fast_gaits, restarts,
+    delays, starved, mismatch, gaits, fast_gaits, restarts,
     robots)}
 """What can be measured."""
 

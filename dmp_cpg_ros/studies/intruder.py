@@ -71,8 +71,10 @@ STEADY_S = 4.0
 HEAR_S = 2.0
 """Time after which a topic has nothing to say [s]."""
 
-RECOVERY_S = 3.0
-"""Time of the robot after an attack after which it must walk as before [s]."""
+RECOVERY_S, LATEST_S = 3.0, 8.0
+"""Times of the robot after an attack from and until which it is looked whether it walks as before
+[s]: whoever took up a stand by himself at its end has to come to rest and to start.
+"""
 
 ATTACK_S = 2.0
 """Length of an attack [s]."""
@@ -80,7 +82,7 @@ ATTACK_S = 2.0
 PATIENCE_S = 120.0
 """Time of this machine in which the suite walks, and recovers [s]."""
 
-SLOWEST, FASTEST, LOWEST, MOST_TURNED = 0.35, 0.65, 0.15, 0.2
+SLOWEST, FASTEST, LOWEST, MOST_TURNED = 0.35, 0.65, 0.15, 0.5
 """Speeds [m/s], height of the base [m] and turn by an attack [rad] of a robot that walks on."""
 
 OWN = tuple(topic for topic in TOPICS if topic.publishers != ('user',) and topic.recorded
@@ -513,8 +515,12 @@ def attacked(node: Intruder, suite: Suite, name: str) -> Outcome:
     ATTACKS[name](node)
     named = node.named
     node.leave()
-    end_s, deadline = node.poses[-1].time_s + RECOVERY_S, time.monotonic() + PATIENCE_S
-    while suite.running() and node.poses[-1].time_s < end_s and time.monotonic() < deadline:
+    ended_s, deadline = node.poses[-1].time_s, time.monotonic() + PATIENCE_S
+    while suite.running() and time.monotonic() < deadline:
+        passed_s = node.poses[-1].time_s - ended_s
+        if passed_s >= LATEST_S or (
+                passed_s >= RECOVERY_S and SLOWEST <= node.speed() <= FASTEST):
+            break
         node.spin(0.1)
     fell = node.fell or not suite.running() or node.poses[-1].z < LOWEST
     return Outcome(name, node.sent - sent, fell, node.speed(),

@@ -22,14 +22,12 @@ from dmp_cpg_ros.analysis.metrics.robot import cost_of_transport, cost_without_l
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw, tilt
 from dmp_cpg_ros.core.estimation.estimator import estimated_state
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
-from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
+from dmp_cpg_ros.core.loop import Array, WalkingLoop
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
-from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world import WORLDS, Steps, World
-from dmp_cpg_ros.core.suite_parameters import RobotParameters
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.robot.watchdog import CommandWatchdog
 from dmp_cpg_ros.studies.loop_recording import PUSH_DURATION, LoopRun, Velocity, recording_of
 from dmp_cpg_ros.suite import Suite, load_gaits, load_suite
 
@@ -42,11 +40,6 @@ MEASURED, MEASURED_WAY = 5.0, 2.0
 """Least time [s] and, where it goes somewhere, least way [m] over which a steady velocity and the
 heading are averaged: over half a metre the sway of single steps would be taken for drift.
 """
-
-LATE_S = 6.0
-"""Time for which a robot whose targets arrive late is watched at its speed [s]."""
-
-TARGET_TIMEOUT_NS = round(1e9 * RobotParameters().target_timeout)
 
 RECOVERY = 3.0
 """Time for which the robot must stay on its feet after a push [s]."""
@@ -117,46 +110,6 @@ class Walk(LoopRun[WalkingLoop]):
         self.loop.request(True)
 
 
-class LateWalk(Walk):
-    """A walk whose targets arrive late: those of each leg in order, from the second on after times
-    drawn evenly from a range.
-
-    Parameters
-    ----------
-    gait : str
-        Name of the gait.
-    delay_ms : tuple of float
-        Least and longest [ms].
-    lead_ms : int
-        ``target_lead`` [ms].
-    seed : int
-        Of the delays and, as for :class:`Walk`, of the start.
-    """
-
-    def __init__(self, gait: str, delay_ms: tuple[float, float], lead_ms: int, seed: int) -> None:
-        self._delay_ms, self._lead_ms = delay_ms, lead_ms
-        self._random = np.random.default_rng(seed)
-        self._guard: CommandWatchdog | None = None
-        self._on_the_way: list[list[tuple[int, int, JointTargets]]] = [[] for _ in LEGS]
-        self._arrival_ns = [0] * len(LEGS)
-        super().__init__(gait, seed=seed, values=(('target_lead', 1e-3 * lead_ms),))
-
-    def acting(self, tick: Tick) -> JointTargets:
-        """Send what the legs want, and take of it what the robot's watchdog gives out."""
-        if self._guard is None:
-            self._guard = CommandWatchdog(
-                self.robot.description, TARGET_TIMEOUT_NS, self._lead_ms * 1_000_000)
-        sent = np.split(np.array(tuple(vars(tick.targets).values())), len(LEGS), axis=1)
-        for i, (leg, of_leg) in enumerate(zip(LEGS, sent, strict=True)):
-            delay_ms = self._random.uniform(*self._delay_ms) * (self._guard.stamps[i] is not None)
-            self._arrival_ns[i] = max(self._arrival_ns[i], tick.time_ns + round(1e6 * delay_ms))
-            queue = self._on_the_way[i]
-            queue.append((self._arrival_ns[i], tick.time_ns, JointTargets(*of_leg)))
-            while queue and queue[0][0] <= tick.time_ns:
-                self._guard.accept(leg, *queue.pop(0)[1:])
-        return self._guard.targets(self.state)
-
-
 @dataclass(frozen=True)
 class SteadyOutcome:
     """A velocity that was held.
@@ -203,35 +156,12 @@ def held(run: LoopRun[Any], velocity: Velocity) -> SteadyOutcome:
     if way <= 0.1 or velocity[2] != 0.0:
         return outcome
     # a straight line through all samples, which the swaying of a cycle does not turn
-    yaw = np.unwrap(_attitude(states)[:, 2])
+    yaw = np.unwrap(attitude(states)[:, 2])
     gained = np.polyfit(np.linspace(0.0, 1.0, len(yaw)), yaw, 1)[0]
     of = recording_of(states), RunContext(robot=run.robot.description), way
     cost, _ = cost_of_transport(*of)
     return replace(outcome, yaw_drift=abs(float(np.rad2deg(gained))) * 10.0 / way,
                    cost_of_transport=cost or nan, without_losses=cost_without_losses(*of) or nan)
-
-
-@dataclass(frozen=True)
-class LateOutcome:
-    """Whether a walk with late targets fell, its mean speed [m/s], and the root mean square of its
-    roll and pitch [deg].
-    """
-
-    fell: bool
-    reached: float = nan
-    tilt: float = nan
-
-
-def late(gait: str, speed: float, delay_ms: tuple[float, float], lead_ms: int, seed: int
-         ) -> LateOutcome:
-    """Ramp to a speed [m/s] and hold it for ``LATE_S``; see :class:`LateWalk`."""
-    run = LateWalk(gait, delay_ms, lead_ms, seed)
-    if not (run.settle((speed, 0.0, 0.0)) and run.walk(LATE_S)):
-        return LateOutcome(True)
-    states = run.states[-round(LATE_S / run.tick_s):]
-    tilt = np.rad2deg(np.sqrt(np.mean(np.sum(_attitude(states)[:, :2] ** 2, axis=1))))
-    return LateOutcome(
-        False, float(np.mean([state.base_velocity_in_base[0] for state in states])), float(tilt))
 
 
 def relative_error(outcome: SteadyOutcome, velocity: Velocity) -> float:
@@ -290,7 +220,7 @@ def survives(run: LoopRun[Any], angle: float, speed_change: float) -> bool:
     the base frame [rad] that would change the free body's speed by so much [m/s].
     """
     after = deepcopy(run)
-    yaw = float(_attitude([run.state])[0, 2]) + angle
+    yaw = float(attitude([run.state])[0, 2]) + angle
     impulse = after.robot.description.mass * speed_change
     after.push(np.array((impulse * cos(yaw), impulse * sin(yaw), 0.0)))
     return after.walk(RECOVERY)
@@ -367,7 +297,7 @@ def pushed(manoeuvre: str, speed_change: float, case: int, cases: int, drawn: bo
         run.walk(case / cases * run.period())
     then(run.loop)
     run.walk(draw.uniform(0.0, window))
-    angle += float(_attitude([run.state])[0, 2])
+    angle += float(attitude([run.state])[0, 2])
     force = run.robot.description.mass * speed_change / duration
     run.robot.apply_push(force * np.array((cos(angle), sin(angle), 0.0)), round(duration * 1e9))
     releases, reference = 0, 0.0
@@ -397,7 +327,7 @@ def caught(gait: str, speed: float, speed_change: float, case: int, quick: bool 
     run, angle = deepcopy(_steady(gait, speed, robot, ground, quick)), draw.uniform(0.0, 2.0 * pi)
     duration = round(draw.uniform(*PUSH_DURATIONS), 3)
     run.walk(draw.uniform(0.0, run.period()))
-    angle += float(_attitude([run.state])[0, 2])
+    angle += float(attitude([run.state])[0, 2])
     force = run.robot.description.mass * speed_change / duration
     run.robot.apply_push(force * np.array((cos(angle), sin(angle), 0.0)), round(duration * 1e9))
     return run.walk(RECOVERY + duration)
@@ -467,7 +397,7 @@ def cross(gait: str, kind: str, numbers: Mapping[str, float], seed: int, speed: 
         time = (run.state.time_ns - begin) * 1e-9
         if not upright or run.loop.stop.block.acts:
             break
-        tilt.append(float(np.mean(np.sum(_attitude(run.states)[:, :2] ** 2, axis=1))))
+        tilt.append(float(np.mean(np.sum(attitude(run.states)[:, :2] ** 2, axis=1))))
     return CrossingOutcome(distance >= FINISH and not run.fell(), run.fell(), distance, time,
                            float(np.rad2deg(np.sqrt(np.mean(tilt)))) if tilt else nan,
                            run.loop.stop.block.acts)
@@ -522,7 +452,7 @@ def obstacle(gait: str, height: float, seed: int, speed: float = 0.5, robot: str
                            float(place - run.state.base_position_in_world[0]))
 
 
-def _attitude(states: Sequence[RobotState]) -> Array:
+def attitude(states: Sequence[RobotState]) -> Array:
     """Roll, pitch and yaw (n, 3) [rad]."""
     return roll_pitch_yaw(np.array([state.base_quaternion for state in states]))
 
@@ -594,7 +524,7 @@ def _changed(run: Walk, fell: ChangeOutcome) -> ChangeOutcome:
             duration = (k + 1) * run.tick_s
     period = run.period()
     settled = errors[round((duration + CYCLES_AFTER * period) / run.tick_s):]
-    sway = float(np.abs(np.rad2deg(_attitude(run.states)[:, :2])).max())
+    sway = float(np.abs(np.rad2deg(attitude(run.states)[:, :2])).max())
     return replace(fell, fell=False, duration=duration, cycles=duration / period,
                    phase_error=max(errors), sway=sway,
                    in_time=bool(settled) and max(settled) < LOCKED_PHASE_ERROR)

@@ -17,13 +17,13 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
 from dmp_cpg_ros.core.suite_parameters import RobotParameters
 from dmp_cpg_ros.robot.perfect_tracking import PerfectTrackingRobot
-from dmp_cpg_ros.robot.watchdog import CARRIED_NS, IN_TIME_NS, LATE_NS, CommandWatchdog
+from dmp_cpg_ros.robot.watchdog import CARRIED_NS, HELD_NS, IN_TIME_NS, LATE_NS, CommandWatchdog
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.walking_trials import late
+from dmp_cpg_ros.studies.late_walks import Stalls, late, starved
 
 TICK_NS = 4_000_000
 LONGEST = CARRIED_NS // TICK_NS
@@ -93,21 +93,52 @@ def test_what_comes_within_the_lead_acts_at_its_end_however_it_came(
 @given(seed=st.integers(0, 2**32))
 def test_what_comes_now_and_then_is_not_followed_until_it_is_in_time_for_a_while(
         standing: PerfectTrackingRobot, seed: int) -> None:
-    """What the robot does by itself while targets are late is the same with one in between."""
+    """What the robot does by itself while targets are late is the same with one in between, where
+    there is a rhythm with which to go on.
+    """
     random, state = np.random.default_rng(seed), standing.reset()
-    first, other = (JointTargets(*random.normal(size=(3, 12))) for _ in range(2))
-    never, once, again = (make_guard(standing.description) for _ in range(3))
-    for guard in (never, once, again):
-        accept(guard, 0, first)
-    late, settled = LONGEST + 5, LONGEST + 5 + IN_TIME_NS // TICK_NS
-    for tick in range(40):
+    stride, other = random.normal(size=12), JointTargets(*random.normal(size=(3, 12)))
+    never, once, again = guards = [make_guard(standing.description) for _ in range(3)]
+    begin = 250
+    for tick in range(begin + 1):
+        phase = 2.0 * np.pi * tick / 100
+        for guard in guards:
+            accept(guard, tick * TICK_NS, JointTargets(
+                np.sin(phase) * stride, np.cos(phase) * stride, np.zeros(12)))
+            guard.targets(replace(state, time_ns=tick * TICK_NS))
+    late, settled = begin + LONGEST + 5, begin + LONGEST + 5 + IN_TIME_NS // TICK_NS
+    for tick in range(begin + 1, begin + 40):
         stamp = tick * TICK_NS
         for guard in [once] * (tick == late) + [again] * (tick >= late):
             accept(guard, stamp, other)
-        each = [guard.targets(replace(state, time_ns=stamp)).position
-                for guard in (never, once, again)]
+        each = [guard.targets(replace(state, time_ns=stamp)).position for guard in guards]
         assert np.array_equal(each[0], each[1])
         assert np.array_equal(each[0], each[2]) == (tick < settled)
+
+
+def test_moving_legs_that_are_late_without_a_rhythm_are_held_and_then_left(
+        standing: PerfectTrackingRobot) -> None:
+    """Until then whatever comes is followed at once: the joints are still where it left off."""
+    state, guard = standing.reset(), make_guard(standing.description)
+    moving = JointTargets(state.joint_position, np.ones(12), np.zeros(12))
+    held = HELD_NS // TICK_NS
+    for tick in range(3 * held):
+        if tick % held == 0 and tick <= held:
+            accept(guard, tick * TICK_NS, moving)
+        given_out = guard.targets(replace(state, time_ns=tick * TICK_NS))
+        age = min(tick, tick - held if tick >= held else tick)
+        if age <= held:
+            assert not guard.fallback
+            assert np.allclose(given_out.position, moving.position + min(
+                age, LONGEST) * TICK_NS * 1e-9, atol=1e-12)
+        else:
+            assert guard.fallback == 'stand'
+
+
+@pytest.mark.parametrize(('gait', 'speed'), [('amble', 0.5), ('trot', 1.0)])
+def test_a_robot_whose_controllers_starve_does_not_fall(gait: str, speed: float) -> None:
+    outcome = starved(gait, speed, Stalls(150.0, 200.0), seed=1)
+    assert not outcome.fell and outcome.stood
 
 
 def test_a_robot_whose_targets_come_only_now_and_then_looks_after_itself(

@@ -1,0 +1,200 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Walks whose targets arrive late: after a delay, or in bursts from controllers that starve.
+
+In the plain loop with the robot's command watchdog between the legs and the robot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import nan
+from typing import NamedTuple
+
+import numpy as np
+
+from dmp_cpg_ros.core.loop import Tick
+from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.suite_parameters import RobotParameters
+from dmp_cpg_ros.robot.watchdog import CommandWatchdog
+from dmp_cpg_ros.studies.walking_trials import Walk, attitude
+
+LATE_S = 6.0
+"""Time for which a robot whose targets arrive late is watched at its speed [s]."""
+
+STARVED_S = 15.0
+"""Time for which one is whose controllers starve [s]."""
+
+SOUND_NS = 4_000_000_000
+"""Time of a walk from which on they do [ns]."""
+
+TARGET_TIMEOUT_NS = round(1e9 * RobotParameters().target_timeout)
+
+
+class LateWalk(Walk):
+    """A walk whose targets arrive late: those of each leg in order, from the second on after times
+    drawn evenly from a range.
+
+    Parameters
+    ----------
+    gait : str
+        Name of the gait.
+    delay_ms : tuple of float
+        Least and longest [ms].
+    lead_ms : int
+        ``target_lead`` [ms].
+    seed : int
+        Of the delays and, as for :class:`Walk`, of the start.
+    """
+
+    def __init__(self, gait: str, delay_ms: tuple[float, float], lead_ms: int, seed: int) -> None:
+        self._delay_ms, self._lead_ms = delay_ms, lead_ms
+        self._random = np.random.default_rng(seed)
+        self._guard: CommandWatchdog | None = None
+        self._on_the_way: list[list[tuple[int, int, JointTargets]]] = [[] for _ in LEGS]
+        self._arrival_ns = [0] * len(LEGS)
+        super().__init__(gait, seed=seed, values=(('target_lead', 1e-3 * lead_ms),))
+
+    def acting(self, tick: Tick) -> JointTargets:
+        """Send what the legs want, and take of it what the robot's watchdog gives out."""
+        if self._guard is None:
+            self._guard = CommandWatchdog(
+                self.robot.description, TARGET_TIMEOUT_NS, self._lead_ms * 1_000_000)
+        sent = np.split(np.array(tuple(vars(tick.targets).values())), len(LEGS), axis=1)
+        for i, (leg, of_leg) in enumerate(zip(LEGS, sent, strict=True)):
+            queue, at_ns = self._on_the_way[i], self.arrives_ns(
+                i, tick.time_ns, self._guard.stamps[i] is None)
+            if at_ns is not None:
+                self._arrival_ns[i] = max(self._arrival_ns[i], at_ns)
+                queue.append((self._arrival_ns[i], tick.time_ns, JointTargets(*of_leg)))
+            while queue and queue[0][0] <= tick.time_ns:
+                self._guard.accept(leg, *queue.pop(0)[1:])
+        return self._guard.targets(self.state)
+
+    def arrives_ns(self, i: int, now_ns: int, first: bool) -> int | None:
+        """When what a leg sends now arrives [ns]; None: never."""
+        return now_ns + round(1e6 * self._random.uniform(*self._delay_ms) * (not first))
+
+
+@dataclass(frozen=True)
+class LateOutcome:
+    """Whether a walk with late targets fell, its mean speed [m/s], and the root mean square of its
+    roll and pitch [deg].
+    """
+
+    fell: bool
+    reached: float = nan
+    tilt: float = nan
+
+
+def late(gait: str, speed: float, delay_ms: tuple[float, float], lead_ms: int, seed: int
+         ) -> LateOutcome:
+    """Ramp to a speed [m/s] and hold it for ``LATE_S``; see :class:`LateWalk`."""
+    run = LateWalk(gait, delay_ms, lead_ms, seed)
+    if not (run.settle((speed, 0.0, 0.0)) and run.walk(LATE_S)):
+        return LateOutcome(True)
+    states = run.states[-round(LATE_S / run.tick_s):]
+    tilt = np.rad2deg(np.sqrt(np.mean(np.sum(attitude(states)[:, :2] ** 2, axis=1))))
+    return LateOutcome(
+        False, float(np.mean([state.base_velocity_in_base[0] for state in states])), float(tilt))
+
+
+class Stalls(NamedTuple):
+    """How legs' messages are held up, all of them at the end of a stall.
+
+    Attributes
+    ----------
+    every_ms : float
+        Mean time from the end of one to the begin of the next, drawn from an exponential
+        distribution [ms].
+    longest_ms : float
+        They last from ``SHORTEST_MS`` to so long, drawn evenly [ms].
+    together : float
+        Share of those that hold up all four legs.
+    lost : float
+        Share of what is sent meanwhile that never arrives.
+    """
+
+    every_ms: float
+    longest_ms: float
+    together: float = 0.5
+    lost: float = 0.5
+
+    def __str__(self) -> str:
+        return f'every {self.every_ms:g} ms, up to {self.longest_ms:g} ms'
+
+
+SHORTEST_MS, USUAL_MS = 20.0, 8.0
+"""Shortest stall; longest delay between two [ms]."""
+
+
+class StarvedWalk(LateWalk):
+    """A walk whose controllers starve now and then, as on a machine that is too full.
+
+    The gait is told to stop while the robot looks after itself, as ``inhibition`` is by its node.
+
+    Parameters
+    ----------
+    gait : str
+        Name of the gait.
+    stalls : Stalls
+        How.
+    seed : int
+        Of the stalls and of the start.
+
+    Attributes
+    ----------
+    stood : int
+        How often the robot has looked after itself.
+    """
+
+    def __init__(self, gait: str, stalls: Stalls, seed: int) -> None:
+        self._stalls, self._draw = stalls, np.random.default_rng((seed, 1))
+        self._until_ns, self._next_ns = [0] * len(LEGS), [SOUND_NS] * len(LEGS)
+        self.stood, self._alone = 0, False
+        super().__init__(gait, (0.0, USUAL_MS), 0, seed)
+
+    def acting(self, tick: Tick) -> JointTargets:
+        """As :class:`LateWalk`; the gait hears of the robot's fallback."""
+        if tick.time_ns >= self._next_ns[0] and self._draw.random() < self._stalls.together:
+            until_ns = self._stalled_ns(tick.time_ns)
+            for i in range(len(LEGS)):
+                self._stall(i, until_ns)
+        for i in range(len(LEGS)):
+            if tick.time_ns >= self._next_ns[i]:
+                self._stall(i, self._stalled_ns(tick.time_ns))
+        targets = super().acting(tick)
+        alone = self._guard is not None and bool(self._guard.fallback)
+        if alone != self._alone:
+            self._alone, self.stood = alone, self.stood + alone
+            self.loop.request(alone)
+        return targets
+
+    def arrives_ns(self, i: int, now_ns: int, first: bool) -> int | None:
+        """When what a leg sends now arrives [ns]; None: never."""
+        if now_ns < self._until_ns[i] and self._draw.random() < self._stalls.lost:
+            return None
+        return max(self._until_ns[i], super().arrives_ns(i, now_ns, first) or 0)
+
+    def _stalled_ns(self, now_ns: int) -> int:
+        return now_ns + round(1e6 * self._draw.uniform(SHORTEST_MS, self._stalls.longest_ms))
+
+    def _stall(self, i: int, until_ns: int) -> None:
+        self._until_ns[i] = max(self._until_ns[i], until_ns)
+        self._next_ns[i] = self._until_ns[i] + round(
+            1e6 * self._draw.exponential(self._stalls.every_ms))
+
+
+@dataclass(frozen=True)
+class StarvedOutcome:
+    """Whether a walk with stalls fell, and how often the robot looked after itself."""
+
+    fell: bool
+    stood: int
+
+
+def starved(gait: str, speed: float, stalls: Stalls, seed: int) -> StarvedOutcome:
+    """Ramp to a speed [m/s] and walk on for ``STARVED_S``; see :class:`StarvedWalk`."""
+    run = StarvedWalk(gait, stalls, seed)
+    upright = run.settle((speed, 0.0, 0.0)) and run.walk(STARVED_S)
+    return StarvedOutcome(not upright, run.stood)
