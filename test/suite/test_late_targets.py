@@ -90,7 +90,7 @@ def test_what_comes_within_the_lead_acts_at_its_end_however_it_came(
         assert guard.age_ns(now * TICK_NS) == 0
 
 
-@given(seed=st.integers(0, 2**32))
+@pytest.mark.parametrize('seed', range(5))
 def test_what_comes_now_and_then_is_not_followed_until_it_is_in_time_for_a_while(
         standing: PerfectTrackingRobot, seed: int) -> None:
     """What the robot does by itself while targets are late is the same with one in between, where
@@ -99,9 +99,9 @@ def test_what_comes_now_and_then_is_not_followed_until_it_is_in_time_for_a_while
     random, state = np.random.default_rng(seed), standing.reset()
     stride, other = random.normal(size=12), JointTargets(*random.normal(size=(3, 12)))
     never, once, again = guards = [make_guard(standing.description) for _ in range(3)]
-    begin = 250
+    begin = 150
     for tick in range(begin + 1):
-        phase = 2.0 * np.pi * tick / 100
+        phase = 2.0 * np.pi * tick / 60
         for guard in guards:
             accept(guard, tick * TICK_NS, JointTargets(
                 np.sin(phase) * stride, np.cos(phase) * stride, np.zeros(12)))
