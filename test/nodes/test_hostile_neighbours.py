@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import random
 import signal
 import time
@@ -34,10 +35,11 @@ from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import qos_profile_parameter_events
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_parameter_events
 from rclpy.serialization import serialize_message
 from ros_processes import DEADLINE_S, SHARED_HZ, NodeProcess, Processes, Ros
 from rosgraph_msgs.msg import Clock
@@ -292,6 +294,30 @@ def test_who_may_have_sent_what_names_no_sender_is_told(ros: Ros, follower: Any)
     said = told('cannot be read')
     assert f'may come from {stranger}' in said and '/inhibition' not in said
     own.destroy_node()
+
+
+def test_huge_messages_leave_no_memory_behind(
+        processes: Processes, ros: Ros, tmp_path: Path) -> None:
+    """Of each message its reader would keep the room otherwise."""
+    process = started(processes, tmp_path, 'reference_filter')
+    process.wait_for_output('active')
+    huge = b'\x00\x01\x00\x00' + bytes(10_000_000)
+    publisher = ros.node.create_publisher(
+        JointState, 'joint_states', QoSProfile(depth=50, reliability=ReliabilityPolicy.RELIABLE))
+    ros.spin_until(lambda: publisher.get_subscription_count() > 0)
+
+    def resident_mb() -> float:
+        pages = int(Path(f'/proc/{process.pid}/statm').read_text().split()[1])
+        return 1e-6 * pages * os.sysconf('SC_PAGE_SIZE')
+
+    before = resident_mb()
+    for _ in range(15):
+        for data in (*[huge[:300]] * 20, huge, *[huge[:300]] * 20):
+            publisher.publish(data)
+        assert publisher.wait_for_all_acked(Duration(seconds=DEADLINE_S))
+    process.wait_for_output('joint_states.*dropped')
+    assert resident_mb() < before + 80.0
+    ended(process)
 
 
 def test_a_topic_has_one_writer(ros: Ros, follower: Any) -> None:

@@ -61,6 +61,9 @@ means ``LOCALHOST`` for the first.
 VARIABLES = ('FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE')
 """Environment variables that name a profile: of Fast DDS 2 (Jazzy has it) and of 3."""
 
+FROM_PROFILE = 'RMW_FASTRTPS_USE_QOS_FROM_XML'
+"""Environment variable that lets a profile say how a reader keeps its messages."""
+
 _IN_WORKING_FOLDER = ('DEFAULT_FASTRTPS_PROFILES.xml', 'DEFAULT_FASTDDS_PROFILES.xml')
 
 
@@ -76,6 +79,7 @@ def prepare_middleware() -> None:
         return
     if not get_rmw_implementation_identifier().startswith('rmw_fastrtps'):
         return
+    os.environ.setdefault(FROM_PROFILE, '1')
     if os.environ.get(LOCALHOST_ONLY) == '1' or os.environ.get(RANGE) == 'LOCALHOST':
         os.environ.pop(LOCALHOST_ONLY, None)
         os.environ.update({RANGE: 'SUBNET', **dict.fromkeys(VARIABLES, local)})
