@@ -113,14 +113,14 @@ def test_who_knows_of_a_stop_is_not_all_in_one_process() -> None:
 
 
 @pytest.mark.parametrize('way', [
-    ('--lock-step', '--processes', 'each'), ('--lock-step', '--processes', 'blocks'),
-    ('--rate', str(SHARED_HZ))])
+    ('--lock-step', '--processes', 'each'), ('--lock-step', '--processes', 'blocks'), ()])
 def test_a_stop_of_the_service_outlives_inhibition_and_oscillators(
         processes: Processes, tmp_path: Path, way: tuple[str, ...]) -> None:
     """Under a command that never ends; afterwards the service can start the gait."""
-    resumed_s = 12.0 if '--lock-step' in way else 24.0
-    process = walk(processes, tmp_path, resumed_s + 2.0, *way, '--respawn', events=[
-        {'at': 1.5, 'inhibit': True}, {'at': resumed_s, 'inhibit': False}])
+    resumed_s = 8.0 if '--lock-step' in way else 24.0
+    process = walk(processes, tmp_path, resumed_s + 2.0, *way, '--rate', str(SHARED_HZ),
+                   '--respawn', events=[{'at': 1.5, 'inhibit': True},
+                                        {'at': resumed_s, 'inhibit': False}])
     process.wait_for_output(r'(?s)> inhibit.*s +at rest', RUN_S)
     dead = ('gait', 'supervision') if 'blocks' in way else (CANONICAL, INHIBITION)
     for node in (CANONICAL, INHIBITION):
