@@ -158,6 +158,11 @@ class ForkServer:
         self.close()
 
 
+def end_with_parent(number: int) -> None:
+    """Get a signal when the thread that is the parent of this process ends."""
+    _prctl(PR_SET_PDEATHSIG, number)
+
+
 def _prctl(option: int, value: int | bytes) -> None:
     ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
@@ -262,7 +267,7 @@ def _become(parent: int, files: Sequence[int], command: Sequence[str],
     for number, descriptor in enumerate(files, 1):
         os.dup2(descriptor, number)
         os.close(descriptor)
-    _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    end_with_parent(signal.SIGTERM)
     if os.getppid() != parent:
         os.kill(os.getpid(), signal.SIGTERM)
     os.environ.clear()

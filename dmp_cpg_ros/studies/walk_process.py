@@ -12,9 +12,11 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from functools import partial
 from math import inf
 from pathlib import Path
 
+from dmp_cpg_ros.commands.fork_server import end_with_parent
 from dmp_cpg_ros.core.inhibition.supervisor import STATES
 
 WITHIN_S = 120.0
@@ -25,7 +27,7 @@ GAIT_STATE = rf'^ *[\d.]+ s  ({"|".join(STATES).replace("_", " ")})$'
 
 
 class WalkProcess:
-    """A running ``walk`` with what it says.
+    """A running ``walk`` with what it says; it ends with this process.
 
     Parameters
     ----------
@@ -45,7 +47,8 @@ class WalkProcess:
         self.process = subprocess.Popen(
             [sys.executable, '-m', 'dmp_cpg_ros', 'walk', *arguments],
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-            env={**os.environ, 'PYTHONUNBUFFERED': '1'})
+            env={**os.environ, 'PYTHONUNBUFFERED': '1'},
+            preexec_fn=partial(end_with_parent, signal.SIGINT))
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self) -> None:
