@@ -3,11 +3,12 @@
 """Command watchdog: the newest joint targets, or a safe stop when a leg sends none.
 
 A walking robot goes on with the rhythm of its last cycle, in steps that become smaller until it
-stands; without a rhythm it puts its feet down at once. A standing robot holds its stance. One that
-is upright but low (on its way up or down, or on its belly) is lowered onto its belly. So is one
-with a leg that gives no torque, as fast as it would fall: three legs do not carry a body that
-moves, and from its belly nothing falls. The joints of a tilted one are damped. Targets are
-followed again when they rest where the joints are, and act in time.
+stands; without a rhythm it holds its joints for 0.1 s and puts its feet down. A standing robot
+holds its stance. One that is upright but low (on its way up or down, or on its belly) is lowered
+onto its belly. So is one with a leg that gives no torque, as fast as it would fall: three legs do
+not carry a body that moves, and from its belly nothing falls. The joints of a tilted one are
+damped. Targets are followed again when they rest where the joints are, or a step away where the
+robot stands, and act in time.
 """
 
 from __future__ import annotations
@@ -209,7 +210,7 @@ class CommandWatchdog:
             late = np.repeat(ages, len(JOINTS_OF_LEG))
             position += 1e-9 * np.clip(late, 0, CARRIED_NS) * velocity
         if self._lagged_ns >= now - (IN_TIME_NS if self._late_ns else 0):
-            return JointTargets(*self._going_on(state, np.array((position, velocity, effort))))
+            return JointTargets(*self._going_on(now, np.array((position, velocity, effort))))
         if self._late_ns:
             self._late_ns, self._taken_ns, self._off = 0, now, self._given - position
             self._taking_s = TAKEN_UP_S
@@ -235,13 +236,12 @@ class CommandWatchdog:
                 ages.append(now - holds_ns)
         return ages
 
-    def _going_on(self, state: RobotState, last: Array) -> Array:
+    def _going_on(self, now: int, last: Array) -> Array:
         """Targets (3, 12) while a leg is late, but not yet silent, after the last ones. All legs
         go on together: those that are in time know nothing of the one that is not.
         """
-        now = state.time_ns
         if not self._late_ns:
-            self._late_ns, self._start, self._rhythm = now, last, self._memory.rhythm()
+            self._late_ns, self._rhythm = now, self._memory.rhythm()
         return last if self._rhythm is None else self._rhythm.at(now)
 
     def _stands(self, state: RobotState) -> bool:
@@ -285,7 +285,7 @@ class CommandWatchdog:
         known = None not in self.stamps
         start = np.array((self._given if known else state.joint_position, *np.zeros((2, 12))))
         if known and not self._late_ns and not limp:
-            self._going_on(state, start)
+            self._going_on(now, start)
         self._begin_ns, self._late_ns, self._start = now, 0, start
         self._off = self._given - self._rhythm.at(now)[0] if self._rhythm else np.zeros(12)
 
