@@ -46,6 +46,12 @@ def usage(pid: int) -> Usage:
                  {name: 1e-9 * ran for name, ran in threads.items()})
 
 
+def private_mb(pid: int) -> float:
+    """Memory that a process shares with no other [MB]."""
+    rollup = Path(f'/proc/{pid}/smaps_rollup').read_text()
+    return sum(map(int, re.findall(r'^Private_\w+:\s*(\d+)', rollup, re.MULTILINE))) / 1024
+
+
 def between(first: Usage, last: Usage) -> Usage:
     """What was used from one reading to another; memory is what there was at the end."""
     return Usage(last.cpu_s - first.cpu_s, last.waited_s - first.waited_s,
