@@ -43,7 +43,7 @@ reference, leg, posture, tick."""
 
 @dataclass(frozen=True)
 class Case:
-    """One setting of the grid with its certificate and what naive checks would say."""
+    """One setting of the grid, what its certificate requires, and what naive checks would say."""
 
     arguments: Arguments
     setting: Setting
@@ -82,7 +82,7 @@ def grid_case(graph: str, gait: str, gain: float, share: float, region: float, l
         inhibited_legs=(leg,), region_radius=region * radius,
         inhibition_gain=share * len(LEGS) * omega * radius / (region * radius))
     arguments = network, inhibition, reference, LEG, POSTURE, TICK
-    certificate = certify(*arguments)
+    certificate = certify(*arguments, required_only=True)
     gains = inhibition.armed_gains
     free = synchronisation(network.system.graph, rho)
     omegas = omega * (1.0 - _own_frequencies(network.system, omega, gains, free, inhibition, rng))

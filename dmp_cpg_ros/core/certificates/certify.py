@@ -140,7 +140,7 @@ class Certificate:
 def certify(network: GaitNetwork, inhibition: InhibitionParameters,
             reference: ReferenceParameters, leg: LegParameters, posture: PostureParameters,
             tick_s: float, span: OperatingRange | None = None,
-            voting: VotingParameters | None = None) -> Certificate:
+            voting: VotingParameters | None = None, required_only: bool = False) -> Certificate:
     """Compute the certificate of running parameters.
 
     Parameters
@@ -159,6 +159,8 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
         Cadences to hold for, when they are not those of the gait.
     voting : VotingParameters, optional
         Stopping by vote; without, nothing is certified about it.
+    required_only : bool
+        Whether inequalities that are not required are left out, which are most of the work.
 
     Returns
     -------
@@ -171,20 +173,21 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     """
     parts = SuiteParameters(reference=reference, inhibition=inhibition, leg=leg, posture=posture,
                             voting=voting or VotingParameters())
-    return certificate_of(Setting.of(network, parts, tick_s, span))
+    return certificate_of(Setting.of(network, parts, tick_s, span), required_only=required_only)
 
 
-def certificate_of(s: Setting, legs: Collection[int] = ()) -> Certificate:
+def certificate_of(s: Setting, legs: Collection[int] = (), *,
+                   required_only: bool = False) -> Certificate:
     """Compute the certificate of a setting. Where the leg is chosen, of each inequality the worst
     over those that may be: some that are given, or the eligible ones.
     """
     p = s.parameters.inhibition
     if not p.auto:
-        return _certificate(s)
+        return _certificate(s, required_only)
     legs = legs or eligible_legs(s.network, p)
     number = degrees(s.network.parameters.coupling_graph, len(LEGS))
     found = [_certificate(replace(s, parameters=replace(
-        s.parameters, inhibition=replace(p, inhibited_legs=(LEGS[leg],)))))
+        s.parameters, inhibition=replace(p, inhibited_legs=(LEGS[leg],)))), required_only)
         for leg in {number[leg]: leg for leg in legs}.values()]   # others are alike
     rows = [min(same, key=lambda row: (row.holds, row.margin))
             for same in zip(*(each.inequalities for each in found), strict=True)]
@@ -199,7 +202,7 @@ def certificate_of(s: Setting, legs: Collection[int] = ()) -> Certificate:
         legs=tuple(LEGS[leg] for leg in sorted(legs)))
 
 
-def _certificate(s: Setting) -> Certificate:
+def _certificate(s: Setting, required_only: bool) -> Certificate:
     p, network = s.network.parameters, s.network
     analysis = of_network.analyse_network(network, s.parameters.inhibition, s.span)
     found, contraction, rest = analysis.found, analysis.contraction, analysis.rest
@@ -207,9 +210,13 @@ def _certificate(s: Setting) -> Certificate:
     slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
     stop = time_to_rest(s, analysis.capture, rest)
     start = time_to_walking(s, found, rest)
-    *rows, mismatch = of_network.network_inequalities(s, analysis)
+    rows = of_network.network_inequalities(s, analysis)
+    if not required_only:
+        rows.append(of_network.capture_anywhere(s, analysis))
     rows += [*step_inequalities(s, slowest), *hierarchy_inequalities(s, found),
-             *rest_inequalities(s, rest), mismatch]
+             *rest_inequalities(s, rest)]
+    if not required_only:
+        rows.append(of_network.mismatch_inequality(s, found))
     contact = None
     if p.contact_feedback:
         contact, row = of_network.contact_limits(s, found, start)
@@ -219,8 +226,9 @@ def _certificate(s: Setting) -> Certificate:
         rows.append(row)
     reference = s.parameters.reference
     fastest = math.hypot(reference.max_speed, reference.max_lateral_speed)
+    if not required_only:
+        rows += delay_inequalities(of_network.armed_capture(s, analysis, contact), s.tick_s)
     rows += [
-        *delay_inequalities(of_network.armed_capture(s, analysis, contact), s.tick_s),
         Inequality('time_to_rest', stop, LONGEST_STOP, 's', 'bound', 'longest stop', PROVED,
                    'from a request at any phase of the locked gait, at any speed, to rest'),
         Inequality('time_to_walking', start, LONGEST_STOP, 's', 'bound', 'longest start', PROVED,

@@ -81,9 +81,16 @@ class Running:
         """Compute the certificate, or take it from the last that were; the way of the feet has no
         part in it.
         """
-        return _certificate(replace(
-            self, parameters=replace(self.parameters, motion=None),
-            acting_cadence=self.acting_cadence if self.moving else None))
+        return _certificate(self._of_certificate)
+
+    def holds(self) -> bool:
+        """Whether the certificate holds, from the inequalities that are required."""
+        return _certificate(self._of_certificate, required_only=True).holds
+
+    @property
+    def _of_certificate(self) -> Running:
+        return replace(self, parameters=replace(self.parameters, motion=None),
+                       acting_cadence=self.acting_cadence if self.moving else None)
 
     @property
     def moving(self) -> bool:
@@ -204,12 +211,13 @@ class Running:
 
 
 @lru_cache(maxsize=16)
-def _certificate(of: Running) -> Certificate:
+def _certificate(of: Running, required_only: bool = False) -> Certificate:
     if of.others or of.moving:
-        return certify_changes(
-            of.parameters, (of.gait, *of.others), of.scale, of.tick_s, of.acting_cadence)
+        return certify_changes(of.parameters, (of.gait, *of.others), of.scale, of.tick_s,
+                               of.acting_cadence, required_only=required_only)
     network = GaitNetwork(of.parameters.canonical, of.gait, of.scale)
-    return certificate_of(Setting.of(network, of.parameters, of.tick_s))
+    return certificate_of(Setting.of(network, of.parameters, of.tick_s),
+                          required_only=required_only)
 
 
 @dataclass(frozen=True)
@@ -302,7 +310,7 @@ class CertificateGate:
     def _holds(self, running: Running) -> bool:
         self.pause()
         try:
-            return running.certificate().holds
+            return running.holds()
         except DmpCpgError:
             return False
 

@@ -127,21 +127,26 @@ def analyse_network(network: GaitNetwork, inhibition: InhibitionParameters,
 
 
 def network_inequalities(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
-    """Inequalities (a), (b), (c) and (g) of a setting."""
-    found, p, span = analysis.found, s.network.parameters, s.span
-    margin = mismatch_margin(s.network.system.graph, found, p.rho, p.radius,
-                             LOCKED_PHASE_ERROR)
+    """Required inequalities of the oscillators: (a), (b) and (c)."""
+    found = analysis.found
     return [
         Inequality('synchronisation', found.growth, found.connectivity, '1/s', 'rho r^2',
                    'connectivity of L_K', PROVED,
                    f'from every state the legs find their places, at {found.rate:.4g} 1/s '
                    f'({found.method} bound)'),
         _contraction(analysis.contraction),
-        *_capture(s, analysis),
-        Inequality('frequency_mismatch', EXPECTED_MISMATCH * span.omega[1], margin, 'rad/s',
-                   f'{EXPECTED_MISMATCH:.0%} of omega_max', 'tolerated mismatch', PROVED,
-                   f'legs whose own frequencies differ stay within {LOCKED_PHASE_ERROR:g} rad of '
-                   'their places', required=False)]
+        *_capture(s, analysis)]
+
+
+def mismatch_inequality(s: Setting, found: Synchronisation) -> Inequality:
+    """Inequality (g) of a setting."""
+    p = s.network.parameters
+    margin = mismatch_margin(s.network.system.graph, found, p.rho, p.radius,
+                             LOCKED_PHASE_ERROR)
+    return Inequality('frequency_mismatch', EXPECTED_MISMATCH * s.span.omega[1], margin, 'rad/s',
+                      f'{EXPECTED_MISMATCH:.0%} of omega_max', 'tolerated mismatch', PROVED,
+                      f'legs whose own frequencies differ stay within {LOCKED_PHASE_ERROR:g} rad '
+                      'of their places', required=False)
 
 
 def armed_capture(s: Setting, analysis: NetworkAnalysis, contact: ContactLimits | None) -> Capture:
@@ -166,28 +171,35 @@ def _contraction(found: InhibitedContraction) -> Inequality:
 
 
 def _capture(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
-    """Inequalities (c): C is not left again, by those in their places and by anyone."""
-    p, span, network = s.parameters.inhibition, s.span, s.network
+    """Inequalities (c): C is not left again by those in their places."""
+    p, span = s.parameters.inhibition, s.span
     held, gain, r0 = analysis.capture.gains > 0.0, p.inhibition_gain, p.region_radius
     needed = float(analysis.capture.needed_gain[held].max())
     rest = analysis.rest_at_speed
     distance = float('inf') if rest is None or not rest.slowest_rate > 0.0 else float(
         rest.distance[held].max())
-    # The legs' oscillators are alike: only how many act on them makes a difference.
-    heard = np.bincount([node for node, _ in network.system.graph.edges], minlength=len(held))
-    different = np.flatnonzero(held)[np.unique(heard[held], return_index=True)[1]]
-    anywhere = max(needed_gain_anywhere(network.system, span.omega[1], int(node), r0)
-                   for node in different)
     exists = '' if np.isfinite(distance) else '; there is none, the other legs break free'
     cadence = f'at the highest cadence, {span.omega[1]:.4g} rad/s'
     return [
         Inequality('capture', needed, gain, '1/s', 'N omega r/r0 made exact', 'k_inh', PROVED,
                    f'legs that enter C in their places cannot leave it again, {cadence}'),
         Inequality('rest_in_region', distance, r0, '', '|x_1* - x_d|', 'r0', PROVED,
-                   f'the inhibited equilibrium lies inside C, {cadence}{exists}'),
-        Inequality('capture_anywhere', anywhere, gain, '1/s', 'gain for any |x_j| <= r', 'k_inh',
-                   PROVED, 'C cannot be left even while the other legs are out of place',
-                   required=False)]
+                   f'the inhibited equilibrium lies inside C, {cadence}{exists}')]
+
+
+def capture_anywhere(s: Setting, analysis: NetworkAnalysis) -> Inequality:
+    """Inequality (c) for legs that are out of their places: C is not left again by anyone."""
+    p, system = s.parameters.inhibition, s.network.system
+    held = analysis.capture.gains > 0.0
+    # The legs' oscillators are alike: only how many act on them makes a difference.
+    heard = np.bincount([node for node, _ in system.graph.edges], minlength=len(held))
+    different = np.flatnonzero(held)[np.unique(heard[held], return_index=True)[1]]
+    needed = max(needed_gain_anywhere(system, s.span.omega[1], int(node), p.region_radius)
+                 for node in different)
+    return Inequality('capture_anywhere', needed, p.inhibition_gain, '1/s',
+                      'gain for any |x_j| <= r', 'k_inh', PROVED,
+                      'C cannot be left even while the other legs are out of place',
+                      required=False)
 
 
 def contact_margin(s: Setting, found: Synchronisation) -> float:

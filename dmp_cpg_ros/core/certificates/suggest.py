@@ -61,10 +61,11 @@ def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
         The present gains when they hold; None when an inequality fails that gains cannot mend, or
         no gains within the parameters' ranges are enough.
     """
-    def at(k: float, k_inh: float, voting: VotingParameters | None = None) -> Certificate:
+    def at(k: float, k_inh: float, voting: VotingParameters | None = None,
+           required_only: bool = False) -> Certificate:
         return certify(network.with_parameters(replace(network.parameters, coupling_gain=k)),
                        replace(inhibition, inhibition_gain=k_inh), reference, leg, posture,
-                       tick_s, voting=voting)
+                       tick_s, voting=voting, required_only=required_only)
 
     k0, k_inh0 = network.parameters.coupling_gain, inhibition.inhibition_gain
     present, k = at(k0, k_inh0, voting), k0
@@ -73,7 +74,7 @@ def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
     while k <= _LARGEST_COUPLING:
         k_inh = k_inh0
         while k_inh <= _LARGEST_INHIBITION:
-            found = at(k, k_inh)
+            found = at(k, k_inh, required_only=True)
             if found.holds and (k == k0 or all(
                     MARGIN * found[name].left <= found[name].right
                     for name in ('synchronisation', 'contraction'))):  # those of the coupling

@@ -16,6 +16,7 @@ import pytest
 from checkout import ROOT
 from contraction_batches import Batch, Setting, locked
 
+from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound
 from dmp_cpg_ros.core.contraction.synchronisation import synchronisation_complement
 from dmp_cpg_ros.studies.certificate_settings import GRAPHS, TICK, Case, grid
@@ -87,6 +88,16 @@ def test_the_grid_has_every_kind_of_setting_certified_and_not() -> None:
     unequal = sum(np.ptp(case.setting.omega) > 0.01 * case.setting.omega.max()
                   for case in cases if case.certificate.holds)
     assert unequal > 200
+
+
+def test_what_is_required_is_the_same_without_the_rest() -> None:
+    for case in grid()[::64]:
+        whole = certify(*case.arguments)
+        required = tuple(row for row in whole.inequalities if row.required)
+        assert str(required) == str(tuple(
+            row for row in case.certificate.inequalities if row.required))
+        assert len(case.certificate.inequalities) < len(whole.inequalities)
+        assert case.certificate.holds == whole.holds
 
 
 def test_the_readme_states_how_many_are_certified() -> None:
