@@ -32,9 +32,14 @@ pytestmark = pytest.mark.skipif(
 PATIENCE_S = 600.0
 """How long a loaded machine may take [s]."""
 
-LIGHT = ('--rate', str(SHARED_HZ))
-"""Option with which walks are typed but those of the README, which are at the usual rate: the
-machine has less to do, and what they show is the same.
+SHORT = ('--no-report',)
+"""Option with which walks are typed, for they are ended as soon as they walk: that a walk leaves a
+report is seen in ``make demo``.
+"""
+
+LIGHT = (*SHORT, '--rate', str(SHARED_HZ))
+"""Options of all but those of the README, which are at the usual rate: the machine has less to do,
+and what they show is the same.
 """
 
 CLIENTS = ('robot_client', 'live_view')
@@ -109,7 +114,7 @@ class Reader:
         return process
 
     def finish(self) -> None:
-        """Press Ctrl-C in all terminals: clients end, suites lie down and report."""
+        """Press Ctrl-C in all terminals: clients end, suites lie down."""
         for processes, statuses in ((self.beside, (0, 1, 130)), (self.suites, (130,))):
             for process in processes:
                 process.interrupt()
@@ -202,7 +207,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def reader(name: str, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Reader]:
     with reserved_domain() as domain:
         started = Reader(domain, tmp_path, lambda: request.getfixturevalue('recorded'),
-                         () if name.startswith('README') else LIGHT)
+                         SHORT if name.startswith('README') else LIGHT)
         try:
             yield started
         finally:
