@@ -7,14 +7,9 @@ from __future__ import annotations
 import argparse
 import importlib
 import math
-import os
-import re
-import select
 import signal
 import sys
-import termios
 import time
-import tty
 from collections.abc import Sequence
 from typing import Any
 
@@ -23,7 +18,6 @@ import yaml
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, get_parameter_value, parameter_value_to_python
-from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
 from dmp_cpg_ros.commands.suite_client import (
@@ -34,35 +28,18 @@ from dmp_cpg_ros.commands.suite_client import (
     prepared,
     velocity_command,
 )
+from dmp_cpg_ros.commands.teleop import AXES, HELD, drive, steer
 from dmp_cpg_ros.core.errors import DmpCpgError, ParameterError
 from dmp_cpg_ros.core.modes.requests import REQUESTS
 from dmp_cpg_ros.nodes.framework.parameters import plain
-from dmp_cpg_ros.nodes.messages.cdr import unless_refused
-from dmp_cpg_ros.nodes.messages.conversions import InhibitionGainsReader, read_state_word
 from dmp_cpg_ros.nodes.messages.interfaces import INTERFACES, TOPICS, interface
 from dmp_cpg_ros.suite_table import RECORDER, WALKING_NODES
 
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 """Exit statuses: done, refused or nobody there, bad input, Ctrl-C."""
 
-ENDLESS = ('cmd_vel', 'teleop', 'echo')
+ENDLESS = ('cmd_vel', 'teleop', 'joystick', 'echo')
 """Commands that Ctrl-C ends as it should."""
-
-STILL = (0.0, 0.0, 0.0)
-
-STEPS = {'w': (0.1, 0.0), 's': (-0.1, 0.0), 'a': (0.0, 0.2), 'd': (0.0, -0.2)}
-"""Change of v_x [m/s] and of the yaw rate [rad/s] by one press of a key."""
-
-ARROWS = {'A': 'w', 'B': 's', 'D': 'a', 'C': 'd'}
-"""Last letter of what an arrow key sends, and the key that does the same."""
-
-SERVICES = {' ': 'inhibit', 'u': 'stand_up', 'l': 'lie_down', 'r': 'recover'}
-"""Keys that call a service; the first stops the gait or starts it again."""
-
-HELP = """\
-w/s or up/down: faster, slower; a/d or left/right: turn; x: no velocity
-space: inhibit or resume; u: stand up, l: lie down, r: recover; q: quit
-"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -187,108 +164,6 @@ def echo(client: SuiteClient, options: argparse.Namespace) -> None:
         messages.clear()
 
 
-class Teleop:
-    """What the keys do.
-
-    Parameters
-    ----------
-    client : SuiteClient
-        The suite.
-
-    Attributes
-    ----------
-    velocity : tuple of 3 floats
-        Commanded v_x, v_y [m/s] and yaw rate [rad/s].
-    """
-
-    def __init__(self, client: SuiteClient) -> None:
-        """Create clients, and listen to the state of the stop."""
-        node, gains = client.node, InhibitionGainsReader()
-
-        def on_state(message: Any) -> None:
-            self._word = read_state_word(message)
-
-        def on_gains(message: Any) -> None:
-            self._requested = gains.read(message).requested
-
-        self.velocity = STILL
-        self._word, self._requested, self._shown = '', False, ''
-        services = {key: interface(name) for key, name in SERVICES.items()}
-        self._clients = {key: node.create_client(service.type, service.name)
-                         for key, service in services.items()}
-        for name, callback in (('inhibition_state', on_state), ('inhibition_gains', on_gains)):
-            topic = interface(name)
-            node.create_subscription(topic.type, topic.name, unless_refused(topic.type, callback),
-                                     topic.reader_qos, raw=True)
-        kinds = {kind for service in services.values() for kind in service.publishers}
-        client.meet(sorted(kinds), *self._clients.values())
-
-    def press(self, key: str) -> None:
-        """Take a key; unknown ones do nothing."""
-        v_x, _, yaw_rate = self.velocity
-        if key in STEPS:
-            faster, further = STEPS[key]
-            self.velocity = (round(v_x + faster, 3), 0.0, round(yaw_rate + further, 3))
-        elif key == 'x':
-            self.velocity = STILL
-        elif key in self._clients:
-            client = self._clients[key]
-            request = client.srv_type.Request()
-            if key == ' ':
-                request.data = not self._requested
-            client.call_async(request).add_done_callback(self._answered)
-
-    def show(self) -> None:
-        """Rewrite the last line of the terminal where it has changed."""
-        v_x, _, yaw_rate = self.velocity
-        line = f'{v_x:+.1f} m/s, {yaw_rate:+.1f} rad/s, {self._word.replace("_", " ")}'
-        if line != self._shown:
-            self._shown = line
-            print(f'\r\x1b[K{line}', end='', flush=True)
-
-    def _answered(self, future: Future) -> None:
-        answer = future.result()
-        print(f'\r\x1b[K{"" if answer.success else "refused: "}{answer.message}')
-        self._shown = ''
-
-
-def drive(client: SuiteClient, options: argparse.Namespace) -> None:
-    """Drive by keyboard until q, Ctrl-C or the end of the input; the last command is zero."""
-    terminal = sys.stdin.fileno()
-    if not os.isatty(terminal):
-        raise ClientError('teleop reads keys from a terminal, and this input is none')
-    with velocity_command(client, stamped=options.stamped) as send:
-        teleop = Teleop(client)
-        print(HELP, end='')
-        former = termios.tcgetattr(terminal)
-        try:
-            tty.setcbreak(terminal)  # gives every key at once and shows none
-            while True:
-                send(teleop.velocity)
-                teleop.show()
-                client.spin_until(lambda: _waiting(terminal), 1.0 / options.rate)
-                for key in _keys(terminal):
-                    if key == 'q':
-                        return
-                    teleop.press(key)
-        finally:
-            termios.tcsetattr(terminal, termios.TCSADRAIN, former)
-            print()
-
-
-def _waiting(terminal: int) -> bool:
-    return bool(select.select([terminal], [], [], 0.0)[0])
-
-
-def _keys(terminal: int) -> list[str]:
-    """Keys that were pressed, arrows by the letter that does the same; q at the end of input."""
-    if not _waiting(terminal):
-        return []
-    text = os.read(terminal, 1024).decode(errors='replace')
-    pressed = re.findall(r'\x1b[\[O](.)|(.)', text, re.DOTALL)
-    return [ARROWS.get(arrow, '') or key for arrow, key in pressed] or ['q']
-
-
 def _as_mapping(value: Any) -> Any:
     """A message as what YAML can write."""
     if hasattr(value, 'get_fields_and_field_types'):
@@ -334,9 +209,9 @@ def _parser() -> argparse.ArgumentParser:
         added.set_defaults(run=run)
         return added
 
-    def sending(added: argparse.ArgumentParser) -> None:
-        added.add_argument('--rate', metavar='HZ', type=_positive, default=10.0,
-                           help='commands per second (default: 10)')
+    def sending(added: argparse.ArgumentParser, rate_hz: float = 10.0) -> None:
+        added.add_argument('--rate', metavar='HZ', type=_positive, default=rate_hz,
+                           help=f'commands per second (default: {rate_hz:g})')
         added.add_argument('--stamped', action='store_true',
                            help='send TwistStamped, for a suite with stamped_cmd_vel:=true')
 
@@ -365,6 +240,17 @@ def _parser() -> argparse.ArgumentParser:
     printing.add_argument('topic', metavar='TOPIC')
     printing.add_argument('--once', action='store_true', help='end after the first message')
     sending(command('teleop', drive, 'drive by keyboard'))
+    steering = command('joystick', steer, 'drive by joystick')
+    steering.add_argument('device', metavar='DEVICE', nargs='?', default='/dev/input/js0',
+                          help='of Linux (default: /dev/input/js0)')
+    for name, default, unit in (('--top', 0.5, 'm/s'), ('--turn', 0.8, 'rad/s')):
+        steering.add_argument(name, metavar='MOST', type=_positive, default=default,
+                              help=f'with the stick all the way [{unit}] (default: {default:g})')
+    steering.add_argument('--axes', metavar='N', type=int, nargs=3, default=AXES,
+                          help='that go forward, to the left and around (default: 1 0 3)')
+    steering.add_argument('--held', metavar='N', type=int, default=HELD,
+                          help='button without which nothing moves; -1: none (default: 4)')
+    sending(steering, 20.0)
     return parser
 
 

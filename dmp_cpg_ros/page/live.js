@@ -16,6 +16,7 @@ const find = (name) => document.getElementById(name);
 
 let scene = null, frame = null, heard = 0, fresh = false;
 let stick = [0, 0], steering = false, moving = false;
+let gamepad = [0, 0, 0], held = [];  // ahead, to the left, around to the left; buttons that are held
 const keys = new Set();
 
 const oscillators = new Oscillators(find('oscillators')), footfalls = new Footfalls(find('footfalls'));
@@ -140,16 +141,28 @@ function show() {
 
 // --- driving: what is held is sent again and again; nothing held is a zero, once -----------------------
 
+const still = (value) => (Math.abs(value) < 0.08 ? 0 : value);
+
+/** Take what the first gamepad that is laid out as usual says; A inhibits, B resumes. */
+function take_gamepad() {
+  const found = [...navigator.getGamepads()].find((each) => each && each.mapping === 'standard');
+  const buttons = found ? found.buttons.slice(0, 2).map((button) => button.pressed) : [];
+  ['inhibit', 'resume'].forEach((name, i) => { if (buttons[i] && !held[i]) find(name).click(); });
+  held = buttons;
+  gamepad = found ? [1, 0, 2].map((axis) => -still(found.axes[axis]) || 0) : [0, 0, 0];
+}
+
 /** Commanded v_x, v_y [m/s] and yaw rate [rad/s]. */
 function velocity() {
   const pressed = (...names) => names.some((name) => keys.has(name));
   const axis = (plus, minus) => pressed(...plus) - pressed(...minus);
-  const [turn, forward] = steering || find('hold').checked ? stick : [0, 0];
+  const [pad_ahead, pad_aside, pad_around] = gamepad;
+  const [turn, forward] = steering || find('hold').checked ? stick : [pad_around, pad_ahead];
   const top = parseFloat(find('top').value), [, most_aside, most_turn] = scene ? scene.limits : [0, 0, 0];
   const ahead = forward || axis(['ArrowUp', 'w'], ['ArrowDown', 's']);
   const around = turn || axis(['ArrowLeft', 'a'], ['ArrowRight', 'd']);
   const going = ahead || around || find('hold').checked;
-  const aside = axis(['q'], ['e']) || (going ? parseFloat(find('aside').value) : 0);
+  const aside = axis(['q'], ['e']) || pad_aside || (going ? parseFloat(find('aside').value) : 0);
   const round = (value) => Math.round(1000 * value) / 1000 || 0;
   return [round(top * ahead), round(Math.min(most_aside, 0.6 * top) * aside),
     round(Math.min(most_turn, 0.4 + 0.8 * top) * around)];
@@ -168,9 +181,10 @@ async function drive() {
 
 function show_stick() {
   const [v_x, v_y, yaw] = velocity(), pad = find('stick');
-  const driven = steering || find('hold').checked;
   const top = parseFloat(find('top').value);
-  drawStick(pad, driven ? stick : [Math.sign(yaw), v_x / top], v_x || v_y || yaw);
+  const shown = steering || find('hold').checked ? stick
+    : gamepad.some(Boolean) ? [gamepad[2], gamepad[0]] : [Math.sign(yaw), v_x / top];
+  drawStick(pad, shown, v_x || v_y || yaw);
   find('command').textContent = `${v_x.toFixed(2)} m/s, ${v_y.toFixed(2)} m/s, ${yaw.toFixed(2)} rad/s`;
   find('top_text').textContent = `${top.toFixed(2)} m/s`;
   find('aside_text').textContent = parseFloat(find('aside').value).toFixed(2);
@@ -180,13 +194,14 @@ function let_go() {
   keys.clear();
   steering = false;
   stick = [0, 0];
+  gamepad = [0, 0, 0];
   find('hold').checked = false;
 }
 
 function move_stick(event) {
   const pad = find('stick').getBoundingClientRect(), reach = pad.width / 2 - 20;
   const x = (event.clientX - pad.left - pad.width / 2) / reach, y = (event.clientY - pad.top - pad.height / 2) / reach;
-  const length = Math.max(1, Math.hypot(x, y)), still = (value) => (Math.abs(value) < 0.08 ? 0 : value);
+  const length = Math.max(1, Math.hypot(x, y));
   stick = [still(-x / length), still(-y / length)];
 }
 
@@ -300,6 +315,7 @@ if (view) {
 
 let last = performance.now();
 function loop(now) {
+  take_gamepad();
   if (fresh || now - last > 250) {
     fresh = false;
     show();

@@ -379,6 +379,32 @@ def test_in_a_browser_the_robot_is_driven_pushed_and_stopped(
     assert frame['requested'] and frame['stop']['automatic'] == 'false'
 
 
+def test_a_gamepad_drives_and_stops_the_robot(client: Client, page: Page, ros: Ros) -> None:
+    at_rest(client)
+    references = heard(ros, 'reference')
+    page.open(client.address, 900, 640)
+    page.until(state('at rest'))
+
+    def held(axes: str, button: int | None = None) -> None:
+        pressed = ', '.join(f'{{ pressed: {str(i == button).lower()} }}' for i in range(17))
+        page.evaluate('navigator.getGamepads = () => [null, { mapping: "standard", '
+                      f'axes: [{axes}], buttons: [{pressed}] }}]')
+
+    held('0, 0, 0, 0', button=1)
+    page.until("document.querySelector('#answers').textContent.includes('walking in')")
+    held('0, -1, 0.5, 0')
+    ros.spin_until(lambda: bool(references) and references[-1].twist.linear.x > 0.4
+                   and references[-1].twist.angular.z < -0.3)
+    page.until(state('walking'))
+    held('0.05, 0.05, -0.05, 0')
+    ros.spin_until(lambda: abs(references[-1].twist.linear.x) < 0.05)
+    held('0, 0, 0, 0', button=0)
+    page.until("['at rest in', 'already'].some("
+               "words => document.querySelector('#answers').textContent.includes(words))")
+    page.until(state('at rest'))
+    assert not page.problems
+
+
 def test_one_command_gives_an_address_at_which_the_robot_is_driven_pushed_and_stopped(
         page: Page, tmp_path: Path) -> None:
     with reserved_domain() as domain, joined(domain) as ros:

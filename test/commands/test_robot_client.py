@@ -1,7 +1,7 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""``robot_client`` against a running suite: every command over DDS, and the keyboard in a
-terminal.
+"""``robot_client`` against a running suite: every command over DDS, the keyboard in a terminal,
+and a joystick.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import subprocess
 import sys
 import termios
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,8 @@ import ros_processes
 import yaml
 from ros_processes import NodeProcess, Processes, Ros, composed_suite, reserved_domain, wait_until
 
+from dmp_cpg_ros.commands.joystick import AXIS, BUTTON, EVENT, FULL, INITIAL
+from dmp_cpg_ros.commands.teleop import AXES, HELD
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.nodes.messages.conversions import (
     DRIVE_MODES,
@@ -227,6 +230,12 @@ class Terminal:
             stdin=inside, stdout=inside, stderr=inside, env=processes.environment,
             start_new_session=True)
 
+    def close(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        os.close(self.end)
+        os.close(self.inside)
+
     def read(self) -> None:
         if select.select([self.end], [], [], 0.02)[0]:
             self.output += os.read(self.end, 4096).decode()
@@ -245,14 +254,8 @@ class Terminal:
 
 @pytest.fixture
 def terminal(suite: Processes) -> Iterator[Terminal]:
-    opened = Terminal(suite, 'teleop')
-    try:
+    with closing(Terminal(suite, 'teleop')) as opened:
         yield opened
-    finally:
-        opened.process.kill()
-        opened.process.wait()
-        os.close(opened.end)
-        os.close(opened.inside)
 
 
 def test_keys_drive_stop_and_quit_and_the_terminal_is_as_it_was(
@@ -291,6 +294,58 @@ def test_keys_need_a_terminal(suite: Processes) -> None:
                              capture_output=True, text=True, timeout=90, check=False)
     assert process.returncode == 1
     assert 'terminal' in process.stderr
+
+
+class Pad:
+    """A joystick: a pipe through which its events come."""
+
+    def __init__(self, path: Path) -> None:
+        os.mkfifo(path)
+        self.path, self.file = str(path), os.open(path, os.O_RDWR)
+        for axis in AXES:
+            self.tell(AXIS | INITIAL, axis, 0)
+
+    def tell(self, kind: int, number: int, value: int) -> None:
+        os.write(self.file, EVENT.pack(0, value, kind, number))
+
+    def unplug(self) -> None:
+        os.close(self.file)
+
+
+def test_a_joystick_drives_while_a_button_is_held_and_stops(
+        suite: Processes, ros: Ros, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    topic, pad = interface('reference'), Pad(tmp_path / 'js0')
+    references = ros.collect(topic.type, 'reference', topic.reader_qos)
+    said(suite, 'inhibit')
+    await_stop(ros, 'at_rest')
+    client = Terminal(suite, 'joystick', pad.path, '--top', '0.4')
+    request.addfinalizer(client.close)
+    client.wait_for('at rest')
+    ahead, aside, around = AXES
+    pad.tell(AXIS, ahead, -FULL)  # pushed away, with the button not held
+    pad.tell(BUTTON, 0, 1)
+    pad.tell(BUTTON, 0, 0)
+    client.wait_for('walking in')
+    assert references and all(abs(reference.twist.linear.x) < 0.05 for reference in references)
+    pad.tell(BUTTON, HELD, 1)
+    pad.tell(AXIS, around, FULL // 2)
+    ros.spin_until(lambda: references[-1].twist.linear.x > 0.39
+                   and references[-1].twist.angular.z < -0.39)
+    pad.tell(AXIS, ahead, 0)
+    pad.tell(AXIS, around, 0)
+    pad.tell(AXIS, aside, -FULL)
+    ros.spin_until(lambda: references[-1].twist.linear.y > 0.23)
+    pad.tell(BUTTON, HELD, 0)
+    ros.spin_until(lambda: abs(references[-1].twist.linear.y) < 0.01)
+    pad.tell(BUTTON, 0, 1)
+    await_stop(ros, 'at_rest')
+    pad.unplug()
+    client.wait_for('js0 has ended')
+    assert client.status() == 1
+
+
+def test_without_a_joystick_it_says_which_are_there(suite: Processes, tmp_path: Path) -> None:
+    assert 'joysticks here:' in refused(suite, 'joystick', str(tmp_path / 'js7'))
 
 
 # What the clients that looked for twenty seconds have found -------------------------------------
