@@ -45,10 +45,12 @@ class JointDrive:
         self._kp, self._kd = np.tile(description.kp, 4), np.tile(description.kd, 4)
         self._limit = np.concatenate([leg.torque_limit for leg in description.legs])
         speed = np.concatenate([leg.velocity_limit for leg in description.legs])
+        self._unlimited = 0.999 * ROLL_OFF_FROM * speed  # below this rounding decides nothing
         self._slope = self._limit / (speed * (1.0 - ROLL_OFF_FROM))  # [N m s/rad]
         self._stall = self._limit / (1.0 - ROLL_OFF_FROM)  # the falling line at zero speed
         self._forward = self._kd + (self._kp > 0.0) * np.asarray(damping, dtype=float)
         self._steps, self._step_s, self._new = steps, step_s, np.zeros(12)
+        self._nothing = np.zeros(12)  # NumPy needs longer for a number than for an array of them
         self._ahead = step_s * np.arange(steps)[:, None]  # (steps, 1) [s]
         self.reset()
 
@@ -74,7 +76,7 @@ class JointDrive:
         new, last = checked_targets(targets), self._last
         self._last = new
         position, velocity, effort = new
-        if not (new == last).any():  # the usual case, at a third of the price of the general one
+        if not np.count_nonzero(new == last):  # the usual case, at a third of the general price
             self._age = self._new
             reference = position + velocity * self._ahead
             self._command = self._kp * reference + self._forward * velocity + effort
@@ -110,9 +112,12 @@ class JointDrive:
         Torque along the motion is limited to τ_max up to 0.7 of the speed limit and falls linearly
         to zero at the speed limit; torque against the motion is limited to τ_max only.
         """
+        if (np.count_nonzero(np.abs(velocity) <= self._unlimited) == velocity.size
+                and np.count_nonzero(np.abs(torque) <= self._limit) == torque.size):
+            return torque  # the usual case, at half of the general price
         lost = self._slope * velocity
-        upper = np.minimum(self._limit, np.maximum(self._stall - lost, 0.0))
-        lower = np.minimum(self._limit, np.maximum(self._stall + lost, 0.0))
+        upper = np.minimum(self._limit, np.maximum(self._stall - lost, self._nothing))
+        lower = np.minimum(self._limit, np.maximum(self._stall + lost, self._nothing))
         clipped: Array = np.minimum(upper, np.maximum(-lower, torque))
         return clipped
 
@@ -134,7 +139,8 @@ def checked_targets(targets: JointTargets) -> Array:
         name = next(name for name, value in named.items() if np.shape(value) != _STACKED[1:])
         raise DataError(f'joint targets: {name} has shape {np.shape(named[name])}, it must be '
                         f'{_STACKED[1:]}')
-    if not isfinite(float(stacked.sum())) and not np.isfinite(stacked).all():
+    numbers = stacked.ravel()
+    if not isfinite(numbers.dot(numbers)) and not np.isfinite(stacked).all():
         bad = [JOINT_NAMES[i] for i in np.flatnonzero(~np.isfinite(stacked).all(axis=0))]
         raise DataError(f"joint targets: the values for {', '.join(bad)} are not finite")
     return stacked

@@ -170,7 +170,8 @@ class MujocoRobot:
         self._damping, self._friction = (of[self._dof] for of in (
             model.dof_damping, model.dof_frictionloss))
         self._torques = np.zeros((self._steps, 12))  # of each physics step of the tick
-        self._rates = np.zeros((self._steps + 1, 12))  # before each of them and after the last
+        self._rotations = np.zeros((self._steps, 3, 3))  # of the base at the begin of each
+        self._velocities = np.zeros((self._steps + 1, model.nv))  # before each, after the last
         self.reset()
 
     def reset(self, time_ns: int = 0) -> RobotState:
@@ -220,29 +221,28 @@ class MujocoRobot:
         self._drive.accept(targets)
         self._begin_push()
         model, data, drive, strength = self.model, self.data, self._drive, self._strength
-        qpos, qvel, step = data.qpos, data.qvel, mujoco.mj_step
-        d, specific_force = self._ids.base_dof, np.zeros(3)
+        qpos, qvel, step, dof = data.qpos, data.qvel, mujoco.mj_step, self._dof
         R_world_base = data.xmat[self.base].reshape(3, 3)  # a view, of the step's begin
-        base_velocity = qvel[d:d + 3]
-        torques, rates = self._torques, self._rates
+        torques, velocities, rotations = self._torques, self._velocities, self._rotations
         for i in range(self._steps):
-            rates[i] = qvel[self._dof]
-            torques[i] = self._effort = strength * drive.torque(i, qpos[self._qpos], rates[i])
+            velocity = velocities[i]
+            velocity[:] = qvel
+            torques[i] = self._effort = strength * drive.torque(
+                i, qpos[self._qpos], velocity[dof])
             self._actuators.apply(data, self._effort)
             self._push_on()
-            before = base_velocity.copy()
             step(model, data)
-            change = (base_velocity - before) / self._step_s
-            specific_force += (change - self._gravity) @ R_world_base
+            rotations[i] = R_world_base
+        velocities[-1] = qvel
         self._tick += 1
         if not isfinite(qpos.dot(qpos) + qvel.dot(qvel)):
             raise RobotError('the simulation became unstable in the tick that ends at '
                              f'{self._tick * self.tick_ns * 1e-9:.3f} s; lower the gains kp and '
                              'kd or the physics step')
-        self._specific_force = specific_force / self._steps
-        rates[-1] = qvel[self._dof]
+        self._specific_force = self._mean_specific_force()
         # Over a physics step the torque is constant and the velocity changes evenly: with their
         # mean the work is what the step adds to the kinetic energy.
+        rates = velocities[:, dof]
         mean = 0.5 * (rates[1:] + rates[:-1])
         power = np.maximum(torques * mean, 0.0).sum(axis=0)
         self._work = self._work + power * self._step_s
@@ -250,6 +250,15 @@ class MujocoRobot:
         self._loss = self._loss + lost * self._step_s
         self._peak_effort = np.abs(torques).max(axis=0)
         return self._state()
+
+    def _mean_specific_force(self) -> Array:
+        """What an accelerometer in the base felt in the mean over the tick, (3,) [m/s^2]."""
+        d, total = self._ids.base_dof, np.zeros(3)
+        velocity = self._velocities[:, d:d + 3]
+        felt = (velocity[1:] - velocity[:-1]) / self._step_s - self._gravity
+        for force, R_world_base in zip(felt, self._rotations, strict=True):
+            total += force.dot(R_world_base)  # at a seventh of the price of @
+        return total / self._steps
 
     def apply_push(self, force_in_world: Array, duration_ns: int) -> None:
         """Push the base's centre of mass with a force [N] from now on, for whole physics steps.
@@ -326,12 +335,13 @@ class MujocoRobot:
 
     def _state(self) -> RobotState:
         qvel, d, pose = self.data.qvel, self._ids.base_dof, self._base_pose
+        quaternion = _xyzw(pose[3:])
         state = RobotState(
             time_ns=self._tick * self.tick_ns,
             joint_position=self.data.qpos[self._qpos].copy(),
             joint_velocity=qvel[self._dof].copy(), joint_effort=self._effort.copy(),
-            base_position_in_world=pose[:3].copy(), base_quaternion=_xyzw(pose[3:]),
-            base_velocity_in_base=qvel[d:d + 3] @ _rotation(pose[3:]),
+            base_position_in_world=pose[:3].copy(), base_quaternion=quaternion,
+            base_velocity_in_base=qvel[d:d + 3].dot(np.array(rotation(quaternion.tolist()))),
             base_rate_in_base=qvel[d + 3:d + 6].copy(),
             acceleration_in_base=self._specific_force.copy(),
             foot_force=self._contacts.foot_force(self.data),
