@@ -14,7 +14,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, tau
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -182,7 +182,7 @@ class CycleOfLegs(ABC):
 
     def scalar_cycle_position(self, phi: float) -> float:
         """As :meth:`cycle_position` of one leg, without arrays."""
-        return (phi / (2.0 * np.pi) + self.rest + 0.5) % 1.0 - 0.5
+        return (phi / tau + self.rest + 0.5) % 1.0 - 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +307,7 @@ class Gait(CycleOfLegs):
         """
         root = (GRAVITY / scale.leg_length) ** 0.5
         speed = foot_speed / (root * scale.leg_length)
-        return 2.0 * np.pi * root * _interpolated(speed, self._tables[0], self._tables[1])
+        return tau * root * _interpolated(speed, self._tables[0], self._tables[1])
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed."""

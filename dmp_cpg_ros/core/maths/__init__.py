@@ -13,6 +13,11 @@ Array = NDArray[np.float64]
 """An array of floats."""
 
 
+def clamped(value: float, lowest: float, highest: float) -> float:
+    """Number, or the end of a range beyond which it is: ``min(max())`` at a third of its price."""
+    return lowest if value < lowest else highest if value > highest else value
+
+
 def check_positive(**values: float | Array) -> None:
     """Raise ParameterError for a number, or one in an array, that is not positive and finite."""
     for name, value in values.items():

@@ -24,6 +24,7 @@ from dmp_cpg_ros.core.balance.body_command import STANDING, BodyCommand
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.gait.transition import GaitInForce
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.modes.motion_library import BASES, Movements, learned, unit_movement
 from dmp_cpg_ros.core.primitives.discrete import DiscreteInput, DiscretePrimitive, DiscreteState
 from dmp_cpg_ros.core.primitives.spring_damper import SpringDamper, SpringState
@@ -115,7 +116,7 @@ class LegMotion:
             motion = None
             if command.mode != 'damped' and dt > 0.0:
                 joints = self._transformation.follow(joints, goal, goal_velocity, dt)
-        return motion, LegState(joints, 0.0, np.zeros(3)), goal, goal_velocity
+        return motion, LegState(joints, 0.0), goal, goal_velocity
 
     def _moved(self, motion: MotionState | None, joints: SpringState, command: BodyCommand,
                dt: float) -> MotionState:
@@ -238,6 +239,8 @@ class LegControl:
             Of the leg's three joints.
         """
         place, joints, command = self.primitive.place, self.joints, feedback.command
+        goal: Array | Triple
+        goal_velocity: Array | Triple
         if command.balanced:
             motion = None
             leg, goal, goal_velocity = self.primitive.step(

@@ -17,6 +17,7 @@ two forms are one.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,7 +61,8 @@ class SpringDamper:
     stiffness: Array
     damping: Array
     form: Form = 'scaled'
-    _propagators: dict[float, Array] = field(default_factory=dict, init=False, repr=False)
+    _propagators: dict[float, tuple[Array, list[list[list[float]]]]] = field(
+        default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Validate."""
@@ -159,8 +161,8 @@ class SpringDamper:
             grid.tau[0] * velocity, drives, grid.length)
         return y, z / grid.tau[-1]
 
-    def follow(self, state: SpringState, goal: Array, goal_velocity: Array, dt: float
-               ) -> SpringState:
+    def follow(self, state: SpringState, goal: Array | Sequence[float],
+               goal_velocity: Array | Sequence[float], dt: float) -> SpringState:
         """Advance ÿ = k (g − y) + b (ġ − ẏ) to the time at which the goals hold (eq. 28).
 
         Exact for goals that move at ``goal_velocity`` during the step.
@@ -169,7 +171,7 @@ class SpringDamper:
         ----------
         state : SpringState
             State one step before.
-        goal, goal_velocity : ndarray (n,)
+        goal, goal_velocity : ndarray (n,) or sequence of n floats
             Goals at the end of the step.
         dt : float
             [s]
@@ -178,11 +180,11 @@ class SpringDamper:
         -------
         SpringState
         """
-        (all_a, all_b), (all_c, all_d) = self.propagator(dt).tolist()
+        (all_a, all_b), (all_c, all_d) = self._propagator(dt)[1]
         position, velocity = [], []
         for y, y_dot, at, rate, a, b, c, d in zip(
-                state.position.tolist(), state.velocity.tolist(), goal.tolist(),
-                goal_velocity.tolist(), all_a, all_b, all_c, all_d, strict=True):
+                state.position.tolist(), state.velocity.tolist(), goal, goal_velocity,
+                all_a, all_b, all_c, all_d, strict=True):
             error, error_rate = y - (at - rate * dt), y_dot - rate
             position.append(at + a * error + b * error_rate)
             velocity.append(rate + c * error + d * error_rate)
@@ -201,13 +203,17 @@ class SpringDamper:
 
     def propagator(self, length: float) -> Array:
         """Exponential exp(A s), A = [[0, 1], [−k, −b]], for a length s [s]: (2, 2, n)."""
-        E = self._propagators.get(length)
-        if E is None:
+        return self._propagator(length)[0]
+
+    def _propagator(self, length: float) -> tuple[Array, list[list[list[float]]]]:
+        """The same as an array and as lists."""
+        known = self._propagators.get(length)
+        if known is None:
             if len(self._propagators) > 256:
                 self._propagators.clear()
             E = spring_exponential(self.stiffness, self.damping, length)
-            self._propagators[length] = E
-        return E
+            known = self._propagators[length] = (E, E.tolist())
+        return known
 
     def _runge_kutta(self, y: Array, v: Array, drives: Array, grid: StepGrid
                      ) -> tuple[Array, Array]:

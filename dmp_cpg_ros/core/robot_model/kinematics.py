@@ -16,6 +16,7 @@ from math import acos, atan2, cos, hypot, pi, sin, sqrt, tau
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dmp_cpg_ros.core.maths import clamped
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, triple
 from dmp_cpg_ros.core.robot_model.description import LegGeometry, RobotDescription
 from dmp_cpg_ros.core.robot_model.state import Array
@@ -119,13 +120,14 @@ class LegKinematics:
         """:meth:`inverse` for and as a tuple."""
         px, py, pz = foot_in_base
         px, py, pz = px - self._hip[0], py - self._hip[1], pz - self._hip[2]
-        depth = -sqrt(max(py * py + pz * pz - self.lateral_offset * self.lateral_offset, 1e-8))
-        q0 = atan2(pz, py) - atan2(depth, self.lateral_offset)
+        beside = self.lateral_offset
+        squared = py * py + pz * pz - beside * beside
+        depth = -sqrt(1e-8 if squared < 1e-8 else squared)
+        q0 = atan2(pz, py) - atan2(depth, beside)
         x, z = px - self._o[0], depth - self._o[2]
-        lower, upper = self._reach
-        length = min(max(hypot(x, z), lower), upper)
+        length = clamped(hypot(x, z), *self._reach)
         a, b = self.thigh_length, self.shank_length
-        bend = acos(min(max((length * length - a * a - b * b) / (2.0 * a * b), -1.0), 1.0))
+        bend = acos(clamped((length * length - a * a - b * b) / (2.0 * a * b), -1.0, 1.0))
         knee = self.geometry.knee_sign * bend
         hip = atan2(-x, -z) - atan2(b * sin(knee), a + b * cos(knee))
         return (self._s[0] * _wrapped(q0), self._s[1] * _wrapped(hip - self._thigh_angle),

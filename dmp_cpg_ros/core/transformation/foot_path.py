@@ -28,7 +28,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, clamped
 from dmp_cpg_ros.core.maths.vec3 import Triple, moved
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
@@ -108,19 +108,18 @@ class FootPath(NamedTuple):
         """Position (x, y) [m] and velocity [m/s] in the base of a foot that stands, t seconds
         after mid-stance.
         """
-        angle = self.gamma * t
+        (x0, y0, _), v_x, v_y, gamma, _, _, _, (share_x, share_y) = self
+        angle = gamma * t
         s, c = sin(angle), cos(angle)
         if abs(angle) > 1e-6:
-            along, across = s / self.gamma, (1.0 - c) / self.gamma
+            along, across = s / gamma, (1.0 - c) / gamma
         else:
             along, across = t, 0.5 * angle * t
-        x0, y0, _ = self.foothold_in_base
-        x = c * x0 + s * y0 - along * self.v_x - across * self.v_y
-        y = c * y0 - s * x0 - along * self.v_y + across * self.v_x
-        share_x, share_y = self.rolling
+        x = c * x0 + s * y0 - along * v_x - across * v_y
+        y = c * y0 - s * x0 - along * v_y + across * v_x
         return (
             x0 + share_x * (x - x0), y0 + share_y * (y - y0),
-            share_x * (-self.v_x + self.gamma * y), share_y * (-self.v_y - self.gamma * x))
+            share_x * (-v_x + gamma * y), share_y * (-v_y - gamma * x))
 
 
 def swing_height(s: float) -> tuple[float, float]:
@@ -165,7 +164,7 @@ def activity_step(activity: float, phase_rate: float, omega: float, rate: float,
     -------
     float
     """
-    wanted = min(max(phase_rate / omega, 0.0), 1.0)
+    wanted = clamped(phase_rate / omega, 0.0, 1.0)
     return wanted + (activity - wanted) * exp(-rate * dt)
 
 
@@ -174,7 +173,7 @@ def activities_step(activities: Array, phase_rates: list[float], omegas: list[fl
     """As :func:`activity_step` for a few legs, (n,), without arithmetic on arrays."""
     kept, after = exp(-rate * dt), []
     for activity, phase_rate, omega in zip(activities.tolist(), phase_rates, omegas, strict=True):
-        wanted = min(max(phase_rate / omega, 0.0), 1.0)
+        wanted = clamped(phase_rate / omega, 0.0, 1.0)
         after.append(wanted + (activity - wanted) * kept)
     return np.array(after)
 

@@ -85,7 +85,7 @@ class LegState(NamedTuple):
         θ, θ̇ of the kinematic reading, (3,) each.
     activity : float
         Swing activity a in [0, 1].
-    shift_in_base : ndarray (3,)
+    shift_in_base : tuple of float
         Shift of the foot's path that acts now [m].
     stumble : Stumble
         What the stumbling reflex does.
@@ -97,7 +97,7 @@ class LegState(NamedTuple):
 
     joints: SpringState
     activity: float
-    shift_in_base: Array
+    shift_in_base: Triple = (0.0, 0.0, 0.0)
     stumble: reflex.Stumble = reflex.Stumble()
     motion: Any = None
     sent: tuple[Array, ...] = ()
@@ -168,7 +168,7 @@ class LegPrimitive:
     def initial_state(self) -> LegState:
         """State of a leg that stands at its foothold."""
         q = self.kinematics.inverse(self.foothold_in_base)
-        return LegState(SpringState(q, np.zeros(3)), 0.0, np.zeros(3))
+        return LegState(SpringState(q, np.zeros(3)), 0.0)
 
     def picked_up(self, gait: GaitInForce, x: Array, x_dot: Array, r: Array, measured: Array
                   ) -> LegState:
@@ -178,10 +178,10 @@ class LegPrimitive:
         omega = gait.pace(r, self.scale)[2][self.place]
         rate = scalar_phase_rate(*x.tolist(), *x_dot.tolist()) + gait.rest_rate
         activity = activity_step(0.0, rate, omega, self.parameters.activity_rate, 10.0)
-        return LegState(SpringState(measured.copy(), np.zeros(3)), activity, np.zeros(3))
+        return LegState(SpringState(measured.copy(), np.zeros(3)), activity)
 
     def step(self, state: LegState, gait: GaitInForce, x: Array, x_dot: Array, r: Array,
-             feedback: LegFeedback, dt: float) -> tuple[LegState, Array, Array]:
+             feedback: LegFeedback, dt: float) -> tuple[LegState, Triple, Triple]:
         """Advance the leg to ``target_lead`` after the time at which the inputs hold.
 
         Parameters
@@ -202,37 +202,37 @@ class LegPrimitive:
         Returns
         -------
         state : LegState
-        goal, goal_velocity : ndarray (3,)
+        goal, goal_velocity : tuple of float
             g_θ [rad] and g_θ̇ [rad/s].
         """
         p = self.parameters
         reference, _, own_omegas, duty = gait.pace(r, self.scale)
         omega = own_omegas[self.place]
-        x_1, x_2 = x.tolist()
-        rate = scalar_phase_rate(x_1, x_2, *x_dot.tolist()) + gait.rest_rate
+        (x_1, x_2), (x_1_dot, x_2_dot) = x.tolist(), x_dot.tolist()
+        rate = scalar_phase_rate(x_1, x_2, x_1_dot, x_2_dot) + gait.rest_rate
         phi, lead = scalar_phase(x_1, x_2), p.target_lead
-        position = gait.scalar_cycle_position(phi + lead * rate)
-        acts = gait.scalar_cycle_position(phi) if lead else position
-        ahead = round(lead / dt) if dt > 0.0 else 0
-        sent = (*state.sent, state.joints.position)[-1 - ahead:]
+        position = acts = gait.scalar_cycle_position(phi)
+        sent: tuple[Array, ...] = (state.joints.position,)
+        if lead:
+            position = gait.scalar_cycle_position(phi + lead * rate)
+            ahead = round(lead / dt) if dt > 0.0 else 0
+            sent = (*state.sent, *sent)[-1 - ahead:]
         activity = activity_step(state.activity, rate, omega, p.activity_rate, dt)
         path = self.path(reference, omega, duty, activity, state.stumble, feedback)
         motion, foot, path_velocity = self.motion.step(state.motion, path, position, rate, dt)
-        offset = triple(state.shift_in_base.tolist())
         offset_rate, stumble = self._offset_rate(
-            state, offset, activity, path, (acts, position), sent[0], path_velocity, feedback, dt)
-        offset = moved(offset, offset_rate, dt)
+            state, activity, path, (acts, position), sent[0], path_velocity, feedback, dt)
+        offset = moved(state.shift_in_base, offset_rate, dt)
         bounce = gait.bounce(position, duty, omega)
         p_x, p_y, p_z = plus(foot, offset)
         v_x, v_y, v_z = plus(offset_rate, path_velocity)
-        angles = self.kinematics.angles(
+        goal = self.kinematics.angles(
             (p_x, p_y, p_z + (stumble.height - activity * bounce.height)))
-        _, jacobian = self.kinematics.foot_and_jacobian(angles)
-        goal, goal_velocity = np.array(angles), np.array(_joint_velocity(jacobian, (
-            v_x, v_y, v_z + stumble.rate - activity * bounce.velocity * (rate / omega))))
+        _, jacobian = self.kinematics.foot_and_jacobian(goal)
+        goal_velocity = _joint_velocity(jacobian, (
+            v_x, v_y, v_z + stumble.rate - activity * bounce.velocity * (rate / omega)))
         joints = self.transformation.follow(state.joints, goal, goal_velocity, dt)
-        return (LegState(joints, activity, np.array(offset), stumble, motion, sent), goal,
-                goal_velocity)
+        return LegState(joints, activity, offset, stumble, motion, sent), goal, goal_velocity
 
     def path(self, reference: Triple, omega: float, duty: float, activity: float,
              stumble: reflex.Stumble, feedback: LegFeedback) -> FootPath:
@@ -242,7 +242,7 @@ class LegPrimitive:
         return FootPath(
             self._foothold, v_x, v_y, gamma, omega, duty, activity * clearance, self.rolling)
 
-    def _offset_rate(self, state: LegState, offset: Triple, activity: float, path: FootPath,
+    def _offset_rate(self, state: LegState, activity: float, path: FootPath,
                      positions: tuple[float, float], acting: Array, path_velocity: Triple,
                      feedback: LegFeedback, dt: float) -> tuple[Triple, reflex.Stumble]:
         """Rate of the foothold offset [m/s]: placement and stumbling reflex in swing, following
@@ -254,7 +254,7 @@ class LegPrimitive:
         stands, will_stand = (abs(at) >= 0.5 * (1.0 - path.duty) for at in positions)
         measured, target = self.kinematics.foot(feedback.joint_position), self.kinematics.foot(
             acting)
-        away = minus(measured, target)
+        away, offset = minus(measured, target), state.shift_in_base
         lift, lag, progress = self.stumble_lift, self.stumble_lag, None
         if lift and not stands:
             touches = feedback.foot_force > self.touch_force
@@ -271,15 +271,15 @@ class LegPrimitive:
         rate = self.offset_rates.in_swing(offset, placement, height, activity, dt)
         return reflex.compliant_offset_rate(stumble, rate, path_velocity, away), stumble
 
-    def targets(self, state: LegState, goal: Array, goal_velocity: Array, feedback: Array,
-                measured: SpringState | None = None) -> JointTargets:
+    def targets(self, state: LegState, goal: Array | Triple, goal_velocity: Array | Triple,
+                feedback: Array, measured: SpringState | None = None) -> JointTargets:
         """Joint targets of the parameters' reading.
 
         Parameters
         ----------
         state : LegState
             State after :meth:`step`.
-        goal, goal_velocity : ndarray (3,)
+        goal, goal_velocity : ndarray (3,) or tuple of float
             Goals from :meth:`step`.
         feedback : ndarray (3,)
             τ_fb [N m].
@@ -294,8 +294,8 @@ class LegPrimitive:
         effort = [
             J * (p.stiffness * (g - y) - p.damping * (y_dot - g_dot)) + tau
             for J, y, y_dot, g, g_dot, tau in zip(
-                self._inertia, joints.position.tolist(), joints.velocity.tolist(), goal.tolist(),
-                goal_velocity.tolist(), feedback.tolist(), strict=True)]
+                self._inertia, joints.position.tolist(), joints.velocity.tolist(), goal,
+                goal_velocity, feedback.tolist(), strict=True)]
         return JointTargets(joints.position, joints.velocity, np.array(effort))
 
 

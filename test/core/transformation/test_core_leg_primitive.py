@@ -83,7 +83,7 @@ def test_what_a_lead_misses_of_a_changing_cadence_is_of_second_order(place: floa
         leg, x = leg_of('fl', target_lead=lead), state_at(phi)
         state = leg.initial_state()._replace(activity=1.0)
         x_dot = rate * phase_generator() @ x
-        return leg.step(state, gait, x, x_dot, r, asked(leg, state), TICK)[1]
+        return np.array(leg.step(state, gait, x, x_dot, r, asked(leg, state), TICK)[1])
 
     omega, change = gait.omega(leg_of('fl').scale.foot_speed(*r), leg_of('fl').scale), 20.0
     missed = [np.abs(goal(d, begin, omega) - goal(
