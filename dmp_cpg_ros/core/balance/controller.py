@@ -136,9 +136,10 @@ class PostureController:
         self._across: list[float] = footholds[:, 1].tolist()
         self._footholds = [
             vec3.triple(foot) for foot in (footholds - description.com_in_base).tolist()]
+        self._room = self.placement.room(parameters.reach)
         self.foot_radius = float(np.mean([leg.foot_radius for leg in description.legs]))
         self._com_in_base = vec3.triple(description.com_in_base.tolist())
-        self._torque_limit = [vec3.triple(leg.torque_limit.tolist()) for leg in description.legs]
+        self._torque_limit = np.concatenate([leg.torque_limit for leg in description.legs])
         inertia = description.base_inertia.diagonal()
         # moments count as the accelerations that they cause at the length of a leg
         importance = description.mass * self.scale.leg_length / inertia
@@ -206,8 +207,9 @@ class PostureController:
         beside = (p.slope_lean * lean_x + outside * plan.curve[0] + aside_x,
                   p.slope_lean * lean_y + outside * plan.curve[1] + aside_y)
         caught = self.placement.caught(measured, planned, gait.apart)
+        beside_x, beside_y = beside
         shift = [
-            (along + beside[0], across + beside[1]) for along, across in self.placement.shift(
+            (along + beside_x, across + beside_y) for along, across in self.placement.shift(
                 p, caught, planned, pi * duty / omega)]
         raised = self.placement.raised(p, shift, R_ground_base)
         legs = self.legs.at(state.joint_position.tolist())
@@ -217,7 +219,8 @@ class PostureController:
         acceleration = plan.acceleration[0], plan.acceleration[1] + sway.acceleration
         return PostureState(activity, integral, plan, offset), PostureFeedback(
             self._torque(body, legs, feet, load, planned, bounce, acceleration),
-            np.array([(*along, up) for along, up in zip(shift, raised, strict=True)]),
+            np.array([part for (x, y), up in zip(shift, raised, strict=True)
+                      for part in (x, y, up)]).reshape(-1, 3),
             np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
             np.array(correction), command, state.joint_position, believed(state.foot_force),
             self._margins(R_ground_base, feet, swings, (lean_x, lean_y), (
@@ -231,12 +234,12 @@ class PostureController:
         """Margins of the capture point with an error of the velocity [m/s]; legs that swing count
         at their footholds.
         """
-        p, places = self.parameters, []
+        places = []
         for foot, foothold, swing in zip(feet, self._footholds, swings, strict=True):
             place = vec3.times(R_ground_base, foothold)
             places.append(vec3.moved(foot, vec3.minus(place, foot), swing))
         return support_margins(
-            places, under, error, self.model.height, p.friction, self.placement.room(p.reach))
+            places, under, error, self.model.height, self.parameters.friction, self._room)
 
     def _height(self, feet: list[Triple], load: list[float]) -> float:
         """Height of the centre of mass over the ground under the feet that carry [m]."""
@@ -249,9 +252,9 @@ class PostureController:
     def _bounce(self, gait: GaitInForce, positions: list[float], duty: float, omega: float,
                 moving: float) -> Bounce:
         """Planned bounce of the body: what the legs give way to, in the mean."""
-        each = [gait.bounce(position, duty, omega) for position in positions]
-        if each[0] is LEVEL:  # wherever the legs are
+        if gait.bounce(positions[0], duty, omega) is LEVEL:  # wherever the legs are
             return LEVEL
+        each = [gait.bounce(position, duty, omega) for position in positions]
         share = moving / len(each)
         return Bounce(*(share * sum(values) for values in zip(*each, strict=True)))
 
@@ -273,10 +276,8 @@ class PostureController:
             force, moment, feet, load, self.parameters.friction,
             LARGEST_LOAD * self.description.mass * GRAVITY, self._importance)
         torques: list[float] = []
-        for on_foot, (_, J), limits in zip(forces, legs, self._torque_limit, strict=True):
-            a, b, c = vec3.transposed_times(J, vec3.transposed_times(body.R_ground_base, on_foot))
-            most_a, most_b, most_c = limits
-            torques += (
-                min(max(-a, -most_a), most_a), min(max(-b, -most_b), most_b),
-                min(max(-c, -most_c), most_c))
-        return np.array(torques)
+        for on_foot, (_, J) in zip(forces, legs, strict=True):
+            torques += vec3.transposed_times(
+                J, vec3.transposed_times(body.R_ground_base, on_foot))
+        most = self._torque_limit
+        return np.minimum(np.maximum(-np.array(torques), -most), most)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.maths import vec3
+from dmp_cpg_ros.core.maths import clamped
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 
@@ -81,24 +81,24 @@ class VelocityCorrection(NamedTuple):
         dt : float
             [s]
         """
-        R = vec3.rotation(quaternion)
-        yaw = atan2(R[1][0], R[0][0])
+        x, y, z, w = quaternion
+        yaw = atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
         froude, wanted = (GRAVITY * leg_length) ** 0.5, plan.expected
         wide = self.wide + dt * (1.0 / WIDENING_S if plan.behind < SETTLED * froude
                                  else -1.0 / NARROWING_S)
-        wide = min(max(wide, 0.0), 1.0) * moving
+        wide = clamped(wide, 0.0, 1.0) * moving
         share = p.speed_correction_limit + wide * max(
             p.speed_mismatch_limit - p.speed_correction_limit, 0.0)
         limit = share * max(hypot(*wanted), SLOWEST * froude)
         gain = p.speed_integral * (GRAVITY / leg_length) ** 0.5 * moving * dt
         kept = exp(-(1.0 - moving) * p.activity_rate * dt)
-        along, across = (
-            min(max(before + gain * (should - is_now), -limit), limit) * kept
-            for before, should, is_now in zip(self.correction, wanted, velocity[:2], strict=True))
+        (along, across), (should_along, should_across) = self.correction, wanted
+        along = clamped(along + gain * (should_along - velocity[0]), -limit, limit) * kept
+        across = clamped(across + gain * (should_across - velocity[1]), -limit, limit) * kept
         turn = 0.0 if isnan(self.yaw) else (yaw - self.yaw + pi) % (2.0 * pi) - pi
         error = (self.heading_error + gamma * dt - turn) * moving
         return VelocityCorrection(
-            (along, across), min(max(error, -p.heading_limit), p.heading_limit), yaw, wide)
+            (along, across), clamped(error, -p.heading_limit, p.heading_limit), yaw, wide)
 
     def lasting(self, p: PostureParameters, leg_length: float, plan: MotionPlan) -> Pair:
         """Part of the correction beyond the limit where the reference moves [m/s]: it makes up for
@@ -107,7 +107,7 @@ class VelocityCorrection(NamedTuple):
         limit = p.speed_correction_limit * max(
             hypot(*plan.expected), SLOWEST * (GRAVITY * leg_length) ** 0.5)
         x, y = self.correction
-        return x - min(max(x, -limit), limit), y - min(max(y, -limit), limit)
+        return x - clamped(x, -limit, limit), y - clamped(y, -limit, limit)
 
     def acting(self, p: PostureParameters, leg_length: float, moving: float) -> Triple:
         """Correction of v_x, v_y [m/s], γ [rad/s] that the legs apply."""
@@ -139,16 +139,15 @@ class MassOffset(NamedTuple):
         """Go on for a tick; arguments as for :meth:`VelocityCorrection.integrated`."""
         froude_rate, (z_x, z_y, _) = (GRAVITY / leg_length) ** 0.5, R_ground_base[2]
         forgotten = exp(-MEAN * froude_rate * dt)
-        roll, pitch = (is_now + forgotten * (mean - is_now)
-                       for mean, is_now in zip(self.tilt, (z_y, -z_x), strict=True))
-        x, y = self.place
+        (roll, pitch), (x, y) = self.tilt, self.place
+        roll, pitch = z_y + forgotten * (roll - z_y), -z_x + forgotten * (pitch + z_x)
         limit = p.offset_limit * leg_length
         speed = p.offset_rate * froude_rate * leg_length * moving * dt
         return MassOffset((roll, pitch), (
-            min(max(x + speed * _beyond(pitch), -limit), limit),
-            min(max(y - speed * _beyond(roll), -limit), limit)))
+            clamped(x + speed * _beyond(pitch), -limit, limit),
+            clamped(y - speed * _beyond(roll), -limit, limit)))
 
 
 def _beyond(tilt: float) -> float:
     """What of a mean tilt is not the body's own [rad]."""
-    return tilt - min(max(tilt, -BELIEVED), BELIEVED)
+    return tilt - clamped(tilt, -BELIEVED, BELIEVED)

@@ -25,7 +25,7 @@ from collections.abc import Sequence
 from math import sqrt
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
-from dmp_cpg_ros.core.maths import Array, vec3
+from dmp_cpg_ros.core.maths import Array, clamped, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 from dmp_cpg_ros.core.robot_model.kinematics import LegKinematics
@@ -131,9 +131,11 @@ class FootPlacement:
         reached = []
         for (x, y), straight, depth, lateral in zip(
             down, self._straight, self._depth, self._lateral, strict=True):
-            room = max((reach * straight) ** 2 - depth * depth, 1e-6)
-            squared, outward = max(x * x + y * y, 1e-12), lateral * y
-            share = min((sqrt(outward * outward + squared * room) - outward) / squared, 1.0)
+            room, squared = (reach * straight) ** 2 - depth * depth, x * x + y * y
+            room, squared = 1e-6 if room < 1e-6 else room, 1e-12 if squared < 1e-12 else squared
+            outward = lateral * y
+            share = (sqrt(outward * outward + squared * room) - outward) / squared
+            share = 1.0 if share > 1.0 else share
             reached.append((x * share, y * share))
         return reached
 
@@ -188,7 +190,7 @@ class FootPlacement:
         gain, raised = p.levelling / max(upward[2], 0.3), []
         for (x, y, z), (more_x, more_y) in zip(self._footholds, shift, strict=True):
             lost = z - vec3.dot((x + more_x, y + more_y, z), upward)
-            raised.append(min(max(gain * lost, -limit), limit))
+            raised.append(clamped(gain * lost, -limit, limit))
         return raised
 
     def drift(self, p: PostureParameters, measured: Triple, planned: Triple,

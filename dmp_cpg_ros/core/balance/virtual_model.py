@@ -57,6 +57,7 @@ from typing import NamedTuple
 
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
+from dmp_cpg_ros.core.maths import clamped
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Triple, cross, inverse, times, triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
@@ -154,10 +155,11 @@ def contact_weights(cycle_position: Sequence[float], duty: float, activity: Sequ
     list of n floats
         In [0, 1].
     """
-    lift_off = 0.5 * (1.0 - duty)
-    return [
-        max(min(max((abs(position) - lift_off) / transfer, 0.0), 1.0), 1.0 - swings)
-        for position, swings in zip(cycle_position, activity, strict=True)]
+    lift_off, weights = 0.5 * (1.0 - duty), []
+    for position, swings in zip(cycle_position, activity, strict=True):
+        planned = clamped((abs(position) - lift_off) / transfer, 0.0, 1.0)
+        weights.append(max(planned, 1.0 - swings))
+    return weights
 
 
 REGULARISATION = 1e-4
@@ -288,7 +290,7 @@ def distribute(force: Triple, moment: Triple, feet: Sequence[Triple], load: Sequ
     for foot, share in zip(feet, load, strict=True):
         x, y, z = cross(turn, foot)
         x, y, z = share * (pull_x + x), share * (pull_y + y), share * (pull_z + z)
-        z = min(max(z, 0.0), largest * share)
+        z = clamped(z, 0.0, largest * share)
         tangential, allowed = sqrt(x * x + y * y), friction * z
         if tangential > allowed:
             x, y = x * (allowed / tangential), y * (allowed / tangential)

@@ -83,6 +83,8 @@ def changing_share(network: GaitNetwork, wanted: Gait, command: tuple[float, flo
     command : tuple of float
         v_x, v_y [m/s], γ [rad/s].
     """
+    if network.gait.name == wanted.name:
+        return 1.0
     most = network.scale.speed(changing_speed(network.gait, wanted))
     speed = network.scale.foot_speed(*command, wanted.apart)
     return 1.0 if speed <= most else most / speed

@@ -215,7 +215,8 @@ class GaitSupervisor:
         if not self.parameters.block_stop or state.requested or state.push.acts or (
                 state.state not in ('walking', 'free')):
             return state if block is NO_BLOCK else replace_unchecked(state, block=NO_BLOCK)
-        wanted = min(hypot(r[0], r[1]) / state.share, hypot(command[0], command[1]))
+        v_x, v_y, _ = r.tolist()
+        wanted = min(hypot(v_x, v_y) / state.share, hypot(command[0], command[1]))
         block = block_step(block, r, wanted, progress, network.scale.leg_length, dt)
         if block.acts:
             state = self.request(state, True, True)

@@ -12,9 +12,9 @@ from math import acos, inf
 
 import numpy as np
 
-from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.maths import Array, clamped
 from dmp_cpg_ros.core.maths.constants import GRAVITY
-from dmp_cpg_ros.core.maths.vec3 import dot, triple, upward
+from dmp_cpg_ros.core.maths.vec3 import dot, upward
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
@@ -68,14 +68,15 @@ class BodySense:
 
     def condition(self, state: RobotState) -> BodyCondition:
         """Condition in a measured state."""
-        towards = triple([-part for part in upward(state.base_quaternion.tolist())])
+        x, y, z = upward(state.base_quaternion.tolist())
+        towards, height = (-x, -y, -z), -inf
         legs, down = self._legs.at(state.joint_position.tolist()), np.array(towards)
-        height = max([-inf, *(dot(towards, foot) + radius
-                              for (foot, _), radius in zip(legs, self._radius, strict=True))])
+        for (foot, _), radius in zip(legs, self._radius, strict=True):
+            height = max(height, dot(towards, foot) + radius)
         support = sum(state.foot_force.tolist()) / self._weight
         if support < CERTAIN_SUPPORT:
             support = max(support, self._pressed(state, down))
-        return BodyCondition(down, acos(min(max(-towards[2], -1.0), 1.0)), height, support)
+        return BodyCondition(down, acos(clamped(-towards[2], -1.0, 1.0)), height, support)
 
     def _pressed(self, state: RobotState, down: Array) -> float:
         """Share of the weight that the joint torques press onto the ground.
@@ -160,6 +161,8 @@ class FallDetector:
         p, height = self.parameters, condition.height / self._stance_height
         signs = (condition.tilt > p.fall_tilt, standing and height < p.fall_height,
                  standing and condition.support < p.fall_support)
+        if not any(signs):  # as it always is
+            return FallState(), ''
         since = tuple((before if before >= 0 else time_ns) if present else -1
                       for before, present in zip(state.since_ns, signs, strict=True))
         delays = (p.fall_delay, p.fall_delay, p.fall_support_delay)

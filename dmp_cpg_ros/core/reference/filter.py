@@ -26,6 +26,7 @@ from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.first_order import FirstOrderFilter
+from dmp_cpg_ros.core.maths.vec3 import Triple, triple
 from dmp_cpg_ros.core.parameters import Parameters, parameter
 from dmp_cpg_ros.core.reference.governor import Governor
 
@@ -164,12 +165,14 @@ class ReferenceSystem:
         is requested; ndarray (3,).
         """
         if not inhibition.requested:
-            return self.step(r, inhibition.share * np.array(command), dt)
+            v_x, v_y, gamma = command
+            share = inhibition.share
+            return self._towards(r, (share * v_x, share * v_y, share * gamma), dt)
         v_x, v_y, gamma = r.tolist()
         speed = (v_x * v_x + v_y * v_y) ** 0.5 + abs(gamma) * self._foot_distance
         kept, lost = self._filter.kept(dt), self.parameters.braking * dt
         if lost <= (1.0 - kept) * speed:
-            return self.step(r, np.zeros(3), dt)
+            return self._towards(r, (0.0, 0.0, 0.0), dt)
         return r * max(0.0, 1.0 - lost / speed) if speed > 0.0 else np.zeros(3)
 
     def step(self, r: Array, r_ext: Array, dt: float) -> Array:
@@ -188,16 +191,25 @@ class ReferenceSystem:
         -------
         ndarray (3,)
         """
-        kept = self._filter.kept(dt)
-        following = r_ext + (r - r_ext) * kept
+        return self._towards(r, triple(r_ext.tolist()), dt)
+
+    def _towards(self, r: Array, r_ext: Triple, dt: float) -> Array:
+        """As :meth:`step`."""
+        kept, (x, y, gamma), (to_x, to_y, to_gamma) = (
+            float(self._filter.kept(dt)), r.tolist(), r_ext)
+        after_x, after_y = to_x + (x - to_x) * kept, to_y + (y - to_y) * kept
+        following = np.array((after_x, after_y, to_gamma + (gamma - to_gamma) * kept))
         self.limited = False
-        if dt <= 0.0 or not r_ext[:2].any():
+        if dt <= 0.0 or not (to_x or to_y):
             return following
-        change = following[:2] - r[:2]
-        share = self._governor.share(r, change, dt, self.parameters.max_acceleration)
-        if share < 1.0 and following[:2] @ following[:2] <= r[:2] @ r[:2]:
-            share = max(share, float((1.0 - kept) * np.sqrt((r[:2] @ r[:2]) / (change @ change))))
-        self.limited = share < 1.0
-        if self.limited:
-            following[:2] = r[:2] + share * change
+        share = self._governor.share(
+            r, (after_x - x, after_y - y), dt, self.parameters.max_acceleration)
+        if share < 1.0:
+            before, change = r[:2], following[:2] - r[:2]
+            if following[:2] @ following[:2] <= before @ before:
+                share = max(share, float(
+                    (1.0 - kept) * np.sqrt((before @ before) / (change @ change))))
+            self.limited = share < 1.0
+            if self.limited:
+                following[:2] = before + share * change
         return following

@@ -29,6 +29,7 @@ from math import hypot, pi, sqrt
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
+from dmp_cpg_ros.core.maths.vec3 import Pair
 
 LEAST = 0.25
 """Share of the largest acceleration that is always allowed."""
@@ -49,14 +50,14 @@ class Governor:
         """Keep both."""
         self._gaits, self._scale = gaits, scale
 
-    def share(self, r: Array, change: Array, dt: float, largest: float) -> float:
+    def share(self, r: Array, change: Array | Pair, dt: float, largest: float) -> float:
         """Share of a change of the velocity that is within the limits.
 
         Parameters
         ----------
         r : ndarray (3,)
             Reference v_x, v_y [m/s], γ [rad/s].
-        change : ndarray (2,)
+        change : ndarray (2,) or pair of float
             Of v_x and v_y within the step [m/s].
         dt : float
             Step [s].
