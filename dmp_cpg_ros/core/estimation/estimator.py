@@ -26,7 +26,7 @@ from dmp_cpg_ros.core.estimation import frozen, leg_odometry, mid_stride, veloci
 from dmp_cpg_ros.core.estimation.leg_odometry import FootMotion, TerrainState, normal_in_world
 from dmp_cpg_ros.core.estimation.parameters import EstimationParameters
 from dmp_cpg_ros.core.estimation.velocity_filter import FilterState
-from dmp_cpg_ros.core.maths import Array, vec3
+from dmp_cpg_ros.core.maths import Array, clamped, vec3
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.records import replace_unchecked
 from dmp_cpg_ros.core.maths.rotations import levelled
@@ -285,7 +285,7 @@ class BodyEstimator:
                 force[i] = felt if isfinite(felt) else 0.0
         full = self.parameters.contact_share * self._weight
         return [
-            min(max((felt / full - UNTRUSTED_SHARE) / (1.0 - UNTRUSTED_SHARE), 0.0), 1.0)
+            clamped((felt / full - UNTRUSTED_SHARE) / (1.0 - UNTRUSTED_SHARE), 0.0, 1.0)
             if usable else 0.0
             for felt, usable in zip(force, readings.usable_legs, strict=True)]
 

@@ -16,12 +16,14 @@ carries the readings that fails, and nothing of it is believed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.records import replace_unchecked
+from dmp_cpg_ros.core.maths.vec3 import minus, triple
 from dmp_cpg_ros.core.robot_model.sensor_readings import SensorReadings
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
@@ -57,9 +59,9 @@ class SensorWatch:
         Last usable angles [rad].
     imu_ns : int
         Stamp of the last turn rate that was believed [ns].
-    heard_ns : ndarray (12,)
+    heard_ns : tuple of 12 int
         Stamps at which each joint's angle was new [ns].
-    jumped_ns : ndarray (4,)
+    jumped_ns : tuple of 4 int
         Stamps at which each leg's joints jumped last [ns].
     """
 
@@ -67,76 +69,94 @@ class SensorWatch:
     since_ns: tuple[int, ...]
     joint_position: Array
     imu_ns: int
-    heard_ns: Array
-    jumped_ns: Array
+    heard_ns: tuple[int, ...]
+    jumped_ns: tuple[int, ...]
+
+
+NOT_REPEATED = (-1,) * (1 + 2 * N)
+"""Stamps of sensors none of which repeats itself."""
 
 
 def first_watch(readings: SensorReadings) -> SensorWatch:
     """Memory after the first readings."""
     usable = np.where(np.isfinite(readings.joint_position), readings.joint_position, 0.0)
     now = readings.time_ns
-    return SensorWatch(readings, (-1,) * (1 + 2 * N), usable, now, np.full(3 * N, now),
-                       np.full(N, now - JOINTS_NS))
+    return SensorWatch(readings, NOT_REPEATED, usable, now, (now,) * (3 * N),
+                       (now - JOINTS_NS,) * N)
 
 
 def without_frozen(watch: SensorWatch, readings: SensorReadings
                    ) -> tuple[SensorWatch, SensorReadings]:
     """Readings in which those of sensors that freeze or jump are missing (NaN)."""
-    told, passed = _without_jumps(watch, readings)
-    return replace_unchecked(told, joint_position=_known(watch, passed)), passed
+    now = readings.time_ns
+    heard, jumped = _heard(watch, readings)
+    told, since, imu_ns, passed = _without_repeated(watch, readings)
+    if now - max(jumped) < JOINTS_NS:
+        everything = min(jumped) == max(jumped)
+        passed = _without(
+            passed, everything, [now - leg < JOINTS_NS for leg in jumped], everything)
+    return SensorWatch(told, since, _known(watch, passed), imu_ns, heard, jumped), passed
 
 
-def _without_jumps(watch: SensorWatch, readings: SensorReadings
-                   ) -> tuple[SensorWatch, SensorReadings]:
-    """Without those of encoders that jump, and without frozen ones."""
-    last, now, jumped = watch.readings, readings.time_ns, watch.jumped_ns
-    dt = 1e-9 * (now - watch.heard_ns)
-    change = readings.joint_position - last.joint_position
-    new = np.abs(change) > 0.0
-    told = 0.5 * dt * (readings.joint_velocity + last.joint_velocity)
-    jumps = new & (np.abs(change - told) > APART + PULL * dt * dt)
-    if jumps.any():
-        jumped = np.where(jumps.reshape(N, 3).any(axis=1), now, jumped)
-    heard = np.where(new, now, watch.heard_ns)
-    watch, passed = _without_repeated(watch, readings)
-    watch = replace_unchecked(watch, heard_ns=heard, jumped_ns=jumped)
-    if now - jumped.max() < JOINTS_NS:
-        everything = bool((jumped == jumped[0]).all())
-        passed = _without(passed, everything, now - jumped < JOINTS_NS, everything)
-    return watch, passed
+def _heard(watch: SensorWatch, readings: SensorReadings
+           ) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Stamps at which each joint was heard last, and at which each leg jumped."""
+    last, now, heard, jumping = watch.readings, readings.time_ns, [], set()
+    for i, (q, before, rate, rate_before, heard_ns) in enumerate(zip(
+            readings.joint_position.tolist(), last.joint_position.tolist(),
+            readings.joint_velocity.tolist(), last.joint_velocity.tolist(), watch.heard_ns,
+            strict=True)):
+        change = q - before
+        if not (change > 0.0 or change < 0.0):  # not a number included
+            heard.append(heard_ns)
+            continue
+        heard.append(now)
+        dt = 1e-9 * (now - heard_ns)
+        apart, most = change - 0.5 * dt * (rate + rate_before), APART + PULL * dt * dt
+        if apart > most or apart < -most:
+            jumping.add(i // 3)
+    jumped = watch.jumped_ns
+    if jumping:
+        jumped = tuple(now if leg in jumping else stamp for leg, stamp in enumerate(jumped))
+    return tuple(heard), jumped
 
 
 def _without_repeated(watch: SensorWatch, readings: SensorReadings
-                      ) -> tuple[SensorWatch, SensorReadings]:
-    """Without those of sensors that repeat themselves, and of a gyroscope that jumps."""
+                      ) -> tuple[SensorReadings, tuple[int, ...], int, SensorReadings]:
+    """Without those of sensors that repeat themselves, and of a gyroscope that jumps: what to
+    compare the next ones with, since when what repeats, when the IMU was believed, and the
+    readings.
+    """
     last, now = watch.readings, readings.time_ns
-    x, y, z = (readings.rate_in_base - last.rate_in_base).tolist()
-    if max(x, y, z) > JUMP or min(x, y, z) < -JUMP:
-        if now - watch.imu_ns < JUMPS_NS:
-            passed = _without(readings, True, (False,) * N, False)
-            return replace_unchecked(watch, readings=_told(watch, passed, now)), passed
-    watch = replace_unchecked(watch, imu_ns=now)
+    turning, before = triple(readings.rate_in_base.tolist()), triple(last.rate_in_base.tolist())
+    change = minus(turning, before)
+    if (max(change) > JUMP or min(change) < -JUMP) and now - watch.imu_ns < JUMPS_NS:
+        passed = _without(readings, True, (False,) * N, False)
+        return _told(watch, passed, now), watch.since_ns, watch.imu_ns, passed
     rates, q = readings.joint_velocity, readings.joint_position
-    repeated = q == last.joint_position
-    loaded = (readings.foot_force != 0.0) & (last.foot_force != 0.0)
-    change = readings.foot_force - last.foot_force
-    force = loaded & (change == 0.0) & (loaded & (np.abs(change) > 0.0)).any()
+    repeated, force = q == last.joint_position, _repeated_forces(readings, last)
     # A simulated body may ride level, without any noise.
-    imu = bool(readings.rate_in_base[0] == last.rate_in_base[0] and readings.rate_in_base.all())
-    if not (imu or repeated.any() or force.any()):  # as it always is
-        return replace_unchecked(
-            watch, readings=readings, since_ns=(-1,) * (1 + 2 * N)), readings
+    imu = turning[0] == before[0] and all(turning)
+    if not (imu or np.count_nonzero(repeated) or any(force)):  # as it always is
+        return readings, NOT_REPEATED, now, readings
     imu = imu and np.array_equal(readings.rate_in_base, last.rate_in_base) and np.array_equal(
         readings.specific_force_in_base, last.specific_force_in_base)
     legs = (repeated & (rates == last.joint_velocity)).reshape(N, 3).all(axis=1)
     moves = np.abs(np.nan_to_num(rates)).max() > MOVING  # also those say so that are frozen
-    since = tuple((before if before >= 0 else now) if same and moves else -1
-                  for before, same in zip(watch.since_ns, [imu, *legs, *force], strict=True))
+    since = tuple((begun if begun >= 0 else now) if same and moves else -1
+                  for begun, same in zip(watch.since_ns, [imu, *legs, *force], strict=True))
     frozen = [begun >= 0 and now - begun >= FROZEN_NS for begun in since]
     if any(frozen):
         readings = _without(readings, frozen[0], frozen[1:1 + N], frozen[1 + N:])
-    return replace_unchecked(
-        watch, readings=_told(watch, readings, now), since_ns=since), readings
+    return _told(watch, readings, now), since, now, readings
+
+
+def _repeated_forces(readings: SensorReadings, last: SensorReadings) -> list[bool]:
+    """Which feet are loaded and tell the same force again, while that of another one changes."""
+    changes = [now - before if now != 0.0 and before != 0.0 else nan for now, before in zip(
+        readings.foot_force.tolist(), last.foot_force.tolist(), strict=True)]
+    changing = any(abs(change) > 0.0 for change in changes)
+    return [changing and change == 0.0 for change in changes]
 
 
 def _without(readings: SensorReadings, imu: bool, legs: ArrayLike, contacts: ArrayLike

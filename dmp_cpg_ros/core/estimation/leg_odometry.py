@@ -217,9 +217,10 @@ def fitted_slope(points: Sequence[Sequence[float]]) -> tuple[float, float]:
     Directions in which the points do not spread get no slope; slopes beyond ``STEEPEST`` are cut.
     """
     xs, ys, zs = zip(*points, strict=True)
-    x_mean, y_mean, z_mean = (sum(values) / len(xs) for values in (xs, ys, zs))
+    count = len(points)
+    x_mean, y_mean, z_mean = sum(xs) / count, sum(ys) / count, sum(zs) / count
     xx, yy, xy, xz, yz = NARROWEST, NARROWEST, 0.0, 0.0, 0.0
-    for x, y, z in zip(xs, ys, zs, strict=True):
+    for x, y, z in points:
         x, y, z = x - x_mean, y - y_mean, z - z_mean
         xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
         yy, yz = yy + y * y, yz + y * z

@@ -184,24 +184,25 @@ def update(state: FilterState, rate: Array, contact_in_base: Sequence[Triple],
     spread_x, spread_y, spread_z = predicted[0][0], predicted[1][1], predicted[2][2]
     turning = triple((rate - state.gyro_bias).tolist())
     v, nu = triple(state.velocity_in_base.tolist()), noise.foot_freedom
-    total, pull, distances = 0.0, (0.0, 0.0, 0.0), []
+    total = pull_x = pull_y = pull_z = 0.0
+    distances = []
     for contact, measured, share in zip(contact_in_base, velocity_in_base, trust, strict=True):
         if share <= 0.0:
             distances.append(0.0)
             continue
-        off = minus(minus(measured, v), cross(turning, contact))
+        x, y, z = minus(minus(measured, v), cross(turning, contact))
         variance = (noise.foot_noise / share) ** 2
-        x, y, z = off
         distance = (x * x / (spread_x + variance) + y * y / (spread_y + variance)
                     + z * z / (spread_z + variance))
         distances.append(distance)
         weight = 1.0 / (variance * max((nu + distance) / (nu + 3.0), 1.0))
-        total, pull = total + weight, moved(pull, off, weight)
+        total += weight
+        pull_x, pull_y, pull_z = pull_x + x * weight, pull_y + y * weight, pull_z + z * weight
     if total == 0.0:
         return state, tuple(distances)
     HP = P[VELOCITY]
     KT = np.array(vec3.inverse(_with_diagonal(predicted, 1.0 / total))).dot(HP)  # (3, 12)
-    error = np.array([part / total for part in pull]).dot(KT)
+    error = np.array((pull_x / total, pull_y / total, pull_z / total)).dot(KT)
     P = P - HP.T.dot(KT)
     return FilterState(
         turned(state.quaternion, error[TILT]), state.velocity_in_base + error[VELOCITY],

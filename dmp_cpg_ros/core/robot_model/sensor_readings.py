@@ -15,6 +15,9 @@ FASTEST_TURN, HARDEST_BLOW = 100.0, 1000.0
 FASTEST_JOINT, LARGEST_FORCE = 200.0, 1e5
 """Readings beyond these are faults of joint and contact sensors [rad/s], [N]."""
 
+ALL = (True,) * len(LEGS)
+"""What is so of every leg."""
+
 
 @dataclass(frozen=True)
 class SensorReadings:
@@ -50,17 +53,17 @@ class SensorReadings:
 
     def __post_init__(self) -> None:
         """Judge the readings, once for all who ask."""
-        q, q_dot = self.joint_position.tolist(), self.joint_velocity.tolist()
-        legs = (True,) * len(LEGS)
-        if not (_within(q, FASTEST_JOINT) and _within(q_dot, FASTEST_JOINT)):
+        q, q_dot, legs = self.joint_position.tolist(), self.joint_velocity.tolist(), ALL
+        if not _within(q + q_dot, FASTEST_JOINT):
             legs = tuple(
                 _within(q[i:i + 3] + q_dot[i:i + 3], FASTEST_JOINT) for i in range(0, 12, 3))
+        forces, contacts = self.foot_force.tolist(), ALL
+        if not _within(forces, LARGEST_FORCE):
+            contacts = tuple(abs(force) <= LARGEST_FORCE for force in forces)
         vars(self).update(
             imu_is_usable=_within(self.rate_in_base.tolist(), FASTEST_TURN) and _within(
                 self.specific_force_in_base.tolist(), HARDEST_BLOW),
-            usable_legs=legs,
-            usable_contacts=tuple(
-                abs(force) <= LARGEST_FORCE for force in self.foot_force.tolist()))
+            usable_legs=legs, usable_contacts=contacts)
 
 
 def _within(values: list[float], limit: float) -> bool:
