@@ -104,6 +104,7 @@ def test_one_vote_does_not_stop_the_nodes_and_three_do(
     assert told[-1].message in ('releasing', 'walking', 'free')
 
 
+@pytest.mark.usefixtures('ros_domain')
 def test_a_scenario_that_votes_needs_voting(tmp_path: Path,
                                             capsys: pytest.CaptureFixture[str]) -> None:
     scenario = tmp_path / 'votes.yaml'
