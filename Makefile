@@ -71,7 +71,7 @@ DUEL_ARGS ?=
 FIGURE_ARGS ?=
 PAGE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images view-image paper-figures paper-page bench bench-ros doc lint install clean
+.PHONY: help demo test study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images view-image paper-figures paper-page bench bench-ros doc deb lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -137,6 +137,9 @@ bench-ros: $(INSTALLED) ## measure the running suite beside bare relays, 5 min (
 
 doc: $(INSTALLED) $(VENV)/.documentation ## make the documentation as a site: build/site/index.html
 	$(ACTIVATED) NO_MKDOCS_2_WARNING=1 mkdocs --quiet build --strict
+
+deb: $(INSTALLED) ## make a Debian package for ROS 2 Jazzy on Ubuntu 24.04: build/*.deb
+	$(ACTIVATED) python -m dmp_cpg_ros.commands.debian_package $(BUILD)/wheel/*.whl --out build
 
 lint: $(INSTALLED) ## ruff, mypy and the rules for package.xml
 	$(BIN)/python -m ruff check

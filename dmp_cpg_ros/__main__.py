@@ -26,6 +26,17 @@ STUDIES = ('study_stops', 'benchmark_walking', 'study_recovery')
 BAD_INPUT, INTERRUPTED = 2, 130
 """Exit statuses."""
 
+ON_THE_INDEX = {
+    'numpy': 'numpy', 'scipy': 'scipy', 'mujoco': 'mujoco', 'rosbags': 'rosbags', 'mcap': 'mcap',
+    'lz4': 'lz4', 'zstandard': 'zstandard', 'yaml': 'PyYAML', 'matplotlib': 'matplotlib',
+    'PIL': 'pillow'}
+"""Requirements by the name that is imported, with that on the Python package index: where a
+distribution has no package of one, the suite is installed without it.
+"""
+
+WITHOUT_REQUIREMENT = ("{} needs the Python package '{}', which this Python ({}) does not find: "
+                       'pip install {}')
+
 WITHOUT_ROS = ("{} needs ROS 2 Jazzy, which this Python ({}) does not find: source it, or "
                "pip install 'dmp_cpg_ros[ros]' (x86-64, Python 3.10 to 3.13)")
 
@@ -66,9 +77,13 @@ def run(name: str) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except ModuleNotFoundError as error:
-        if str(error.name).startswith(PACKAGE) or find_spec('rclpy') is not None:
+        missing = str(error.name).partition('.')[0]
+        wanted = ON_THE_INDEX.get(missing, '')
+        if not wanted and (missing == PACKAGE or find_spec('rclpy') is not None):
             raise
-        print(f'dmp_cpg_ros: {WITHOUT_ROS.format(name, sys.executable)}', file=sys.stderr)
+        text = WITHOUT_REQUIREMENT.format(name, wanted, sys.executable, wanted) if wanted else (
+            WITHOUT_ROS.format(name, sys.executable))
+        print(f'dmp_cpg_ros: {text}', file=sys.stderr)
         return BAD_INPUT
 
 

@@ -21,6 +21,8 @@ import pytest
 from checkout import PACKAGE, ROOT, imports, modules, setup_argument, setup_constant
 
 import dmp_cpg_ros
+from dmp_cpg_ros.__main__ import ON_THE_INDEX
+from dmp_cpg_ros.commands.debian_package import debian_package
 from dmp_cpg_ros.configuration import load_yaml
 from dmp_cpg_ros.suite_table import KINDS
 
@@ -204,6 +206,51 @@ def test_who_has_no_ros_is_told_what_to_install(tmp_path: Path) -> None:
 
 
 # --- what is installed ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(('missing', 'words'), [
+    ('mujoco', ('mujoco_robot',)), ('mujoco', ('walk', 'amble_60')), ('yaml', ('certify',)),
+    ('mcap', ('analyze', 'no_such_run'))])
+def test_a_requirement_that_is_missing_is_named_in_one_line(
+        missing: str, words: tuple[str, ...]) -> None:
+    process = subprocess.run(
+        [sys.executable, '-c', f'import sys; sys.modules[{missing!r}] = None; '
+         f'from dmp_cpg_ros.__main__ import main; sys.exit(main({list(words)}))'],
+        capture_output=True, text=True, check=False, timeout=120)
+    assert process.returncode == 2, process.stderr
+    assert process.stderr.count('\n') == 1, process.stderr
+    assert f'pip install {ON_THE_INDEX[missing]}\n' in process.stderr
+
+
+def test_every_requirement_can_be_named() -> None:
+    assert ON_THE_INDEX == {module: name for name, (_, module) in DEPENDENCIES.items()}
+
+
+@pytest.mark.skipif(shutil.which('dpkg-deb') is None, reason='dpkg-deb is of Debian')
+def test_a_debian_package_has_the_files_of_the_wheel_and_asks_for_what_debian_has(
+        checkout: Path, tmp_path: Path) -> None:
+    wheel = built(checkout, 'wheel')
+    deb = debian_package(wheel, tmp_path)
+    subprocess.run(['dpkg-deb', '--extract', str(deb), str(tmp_path / 'root')], check=True)
+    prefix = tmp_path / 'root' / 'opt' / 'ros' / 'jazzy'
+    found = {str(path.relative_to(prefix)) for path in prefix.rglob('*') if path.is_file()}
+    packages = 'lib/python3.12/site-packages/'
+    with ZipFile(wheel) as archive:
+        wanted = {name.partition('.data/data/')[2] or packages + name
+                  for name in archive.namelist()}
+    assert found == wanted | {f'lib/{PACKAGE}/{name}' for name in (*executables(), PACKAGE)}
+    assert not any(name.startswith('bin/') for name in found)
+    for name in executables():
+        script = prefix / 'lib' / PACKAGE / name
+        assert os.access(script, os.X_OK) and f'import {name}' in script.read_text('utf-8')
+    said = {field: subprocess.run(
+        ['dpkg-deb', '--field', str(deb), field], capture_output=True, text=True,
+        check=True).stdout for field in ('Depends', 'Description')}
+    depends = said['Depends'].strip().split(', ')
+    assert {'ros-jazzy-rclpy', 'ros-jazzy-sensor-msgs', 'python3-yaml'} <= set(depends)
+    assert not [name for name in depends if name.endswith('-pip') or 'mcap' in name]
+    for name in ('mujoco', 'rosbags', 'mcap'):
+        assert name in said['Description']
 
 
 @installed
