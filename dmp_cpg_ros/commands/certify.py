@@ -99,7 +99,8 @@ def _report(suite: Suite, certificate: Certificate, needed: votes.VotesNeeded) -
     verdict = ('FAILS: ' + ', '.join(entry.name for entry in certificate.failing)
                if certificate.failing else
                f'holds; contraction under inhibition is of {certificate.contraction_grade} grade; '
-               f"sampled, not proved: {', '.join(certificate.sampled) or 'nothing'}")
+               f"sampled, not proved: {', '.join(certificate.sampled) or 'nothing'}; of the "
+               f"equation, not the step: {', '.join(certificate.continuous) or 'nothing'}")
     voting = 'on' if suite.parameters.voting.voting else 'off'
     enough, too_weak = (', '.join(f'{gain:.4g}' for gain in gains)
                         for gains in (needed.enough, needed.too_weak))

@@ -34,7 +34,7 @@ from dmp_cpg_ros.core.reference.stop_distance import slowing_time, stop_distance
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.foot_path import FootPath, activity_step
-from dmp_cpg_ros.studies import adversary_networks, delays
+from dmp_cpg_ros.studies import adversary_networks, adversary_steps, delays
 from dmp_cpg_ros.studies.adversary_runs import Batch, Case, Setting
 from dmp_cpg_ros.studies.adversary_suite import GAITS, Oscillators
 
@@ -615,6 +615,9 @@ def _judge_carried(_: RobotDescription, case: Case, weaken: bool) -> Judged:
 
 ROWS = {
     'capture_anywhere': Attack(_draw_anywhere, _judge_anywhere),
+    'step_capture': Attack(adversary_steps.draw, adversary_steps.judge_capture),
+    'step_contraction': Attack(adversary_steps.draw, adversary_steps.judge_contraction),
+    'step_synchronisation': Attack(adversary_steps.draw, adversary_steps.judge_synchronisation),
     'reference': Attack(_draw_reference, _judge_reference),
     'transformation': Attack(_draw_joints, _judge_joints),
     'hierarchy': Attack(_draw_hierarchy, _judge_hierarchy),

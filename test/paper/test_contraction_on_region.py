@@ -112,7 +112,7 @@ def test_equilibria_impossible_regions_and_grades_are_refused() -> None:
         Box(np.ones(2), np.zeros(2))
     with pytest.raises(ParameterError, match='>= 0'):
         Ball(np.zeros(2), -1.0)
-    with pytest.raises(ParameterError, match='proved, sampled'):
+    with pytest.raises(ParameterError, match='proved, continuous, sampled'):
         Finding(1.0, 'hoped', 0, '')
 
 

@@ -24,14 +24,14 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates import network as of_network
-from dmp_cpg_ros.core.certificates.inequality import Inequality, finite
+from dmp_cpg_ros.core.certificates.inequality import Inequality, discharged, finite
 from dmp_cpg_ros.core.certificates.network import Setting
-from dmp_cpg_ros.core.certificates.step import delay_inequalities, step_inequalities
+from dmp_cpg_ros.core.certificates.step import step_inequalities, stepped_network
 from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest, time_to_walking
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction import hierarchy
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
-from dmp_cpg_ros.core.contraction.finding import PROVED, weakest
+from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, PROVED, SAMPLED, weakest
 from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_contraction
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, REGIONAL
 from dmp_cpg_ros.core.contraction.region import Annulus
@@ -111,12 +111,20 @@ class Certificate:
     @property
     def sampled(self) -> tuple[str, ...]:
         """Names of the required inequalities that are sampled and not proved."""
+        return self._graded(SAMPLED)
+
+    @property
+    def continuous(self) -> tuple[str, ...]:
+        """Names of those that are proved of the differential equation alone."""
+        return self._graded(CONTINUOUS)
+
+    def _graded(self, grade: str) -> tuple[str, ...]:
         return tuple(entry.name for entry in self.inequalities
-                     if entry.required and not entry.proved)
+                     if entry.required and entry.grade == grade)
 
     @property
     def grade(self) -> str:
-        """``proved`` when every required inequality is, else ``sampled``."""
+        """The weakest of the required inequalities."""
         return weakest(tuple(entry.grade for entry in self.inequalities if entry.required))
 
     def as_mapping(self) -> dict[str, object]:
@@ -127,7 +135,8 @@ class Certificate:
             'time_to_walking_s': finite(self.time_to_walking),
             'distance_to_rest_m': finite(self.distance_to_rest), 'legs': list(self.legs),
             'rest_phase_rad': list(self.rest_phase), 'rest_radius': list(self.rest_radius),
-            'sampled': list(self.sampled), 'failing': [entry.name for entry in self.failing],
+            'sampled': list(self.sampled), 'continuous': list(self.continuous),
+            'failing': [entry.name for entry in self.failing],
             'inequalities': {entry.name: entry.as_mapping() for entry in self.inequalities}}
 
     def explained(self) -> str:
@@ -196,7 +205,8 @@ def certificate_of(s: Setting, legs: Collection[int] = (), *,
         row, left=max(row.left, clearance)) for row in rows]
     slowest = max(found, key=lambda each: each.time_to_walking)
     return replace(
-        slowest, inequalities=tuple(rows), time_to_rest=max(each.time_to_rest for each in found),
+        slowest, inequalities=tuple(discharged(rows, alike=s.alike)),
+        time_to_rest=max(each.time_to_rest for each in found),
         contraction_grade=max((each.contraction_grade for each in found),
                               key=(GLOBAL, REGIONAL, NONE).index),
         legs=tuple(LEGS[leg] for leg in sorted(legs)))
@@ -208,12 +218,13 @@ def _certificate(s: Setting, required_only: bool) -> Certificate:
     found, contraction, rest = analysis.found, analysis.contraction, analysis.rest
     rates = (found.rate, max(contraction.rate, analysis.capture.rate), 2.0 * p.rho * p.radius**2)
     slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
-    stop = time_to_rest(s, analysis.capture, rest)
+    step = stepped_network(s, analysis)
+    stop = time_to_rest(s, analysis.capture, rest, step)
     start = time_to_walking(s, found, rest)
     rows = of_network.network_inequalities(s, analysis)
     if not required_only:
         rows.append(of_network.capture_anywhere(s, analysis))
-    rows += [*step_inequalities(s, slowest), *hierarchy_inequalities(s, found),
+    rows += [*step_inequalities(s, slowest, step), *hierarchy_inequalities(s, found),
              *rest_inequalities(s, rest)]
     if not required_only:
         rows.append(of_network.mismatch_inequality(s, found))
@@ -227,15 +238,16 @@ def _certificate(s: Setting, required_only: bool) -> Certificate:
     reference = s.parameters.reference
     fastest = math.hypot(reference.max_speed, reference.max_lateral_speed)
     if not required_only:
-        rows += delay_inequalities(of_network.armed_capture(s, analysis, contact), s.tick_s)
+        rows += of_network.delay_inequalities(
+            of_network.armed_capture(s, analysis, contact), s.tick_s)
     rows += [
-        Inequality('time_to_rest', stop, LONGEST_STOP, 's', 'bound', 'longest stop', PROVED,
+        Inequality('time_to_rest', stop, LONGEST_STOP, 's', 'bound', 'longest stop', CONTINUOUS,
                    'from a request at any phase of the locked gait, at any speed, to rest'),
-        Inequality('time_to_walking', start, LONGEST_STOP, 's', 'bound', 'longest start', PROVED,
-                   'from release at rest to locked phases and full swings', required=False),
+        Inequality('time_to_walking', start, LONGEST_STOP, 's', 'bound', 'longest start',
+                   CONTINUOUS, 'from release at rest to locked phases and full swings', False),
         *vote_inequalities(s)]
     return Certificate(
-        tuple(rows), contraction.reach, s.span.omega[1], stop, start,
+        tuple(discharged(rows, alike=s.alike)), contraction.reach, s.span.omega[1], stop, start,
         () if rest is None else tuple(rest.phase_ahead.tolist()),
         () if rest is None else tuple(rest.radius.tolist()), contact,
         stop_distance(reference, fastest, fastest, s.tick_s,
@@ -334,5 +346,5 @@ def hierarchy_inequalities(s: Setting, found: Synchronisation) -> list[Inequalit
                    'is limited'),
         Inequality('transformation', 0.0, spring, '1/s', 'zero', 'rate of the joints', PROVED,
                    'the joints converge to what the oscillators and the reference ask for'),
-        Inequality('hierarchy', 0.0, whole.rate, '1/s', 'zero', 'smallest rate of all', PROVED,
+        Inequality('hierarchy', 0.0, whole.rate, '1/s', 'zero', 'smallest rate of all', CONTINUOUS,
                    f'for a held command the whole suite is {whole.kind} (Theorem 4)')]

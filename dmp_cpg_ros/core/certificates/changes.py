@@ -17,10 +17,10 @@ from dataclasses import replace
 from itertools import combinations
 
 from dmp_cpg_ros.core.certificates.certify import Certificate, certificate_of
-from dmp_cpg_ros.core.certificates.inequality import Inequality
+from dmp_cpg_ros.core.certificates.inequality import Inequality, discharged
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
-from dmp_cpg_ros.core.contraction.finding import PROVED
+from dmp_cpg_ros.core.contraction.finding import CONTINUOUS
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.gait.running import CADENCE_RATE
@@ -80,11 +80,12 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
     bound = whole.time_to_rest + pause + arriving
     rows = [_changed(row, bound, p.leg, 'gait' if ways else 'cadence')
             for row in whole.inequalities]
-    rows += _votes(p, networks, tick_s)
+    rows = discharged([*rows, *_votes(p, networks, tick_s)],
+                      alike=replace(setting, parameters=p).alike)
     if ways and not required_only:
         rows.append(Inequality(
             'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
-            'fastest offset', 'tolerated mismatch', PROVED,
+            'fastest offset', 'tolerated mismatch', CONTINUOUS,
             'the legs would keep their places even if the moving offsets were not fed forward',
             required=False))
     return replace(whole, inequalities=tuple(rows), time_to_rest=bound)

@@ -5,9 +5,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
-from dmp_cpg_ros.core.contraction.finding import GRADES, PROVED
+from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, GRADES, PROVED
 from dmp_cpg_ros.core.errors import ParameterError
 
 ROUNDING = 1e-9
@@ -29,7 +30,7 @@ class Inequality:
     left_is, right_is : str
         What the sides are, as short expressions.
     grade : str
-        ``proved`` or ``sampled``.
+        ``proved``, ``continuous`` (of the differential equation) or ``sampled``.
     sentence : str
         What it means for the robot.
     required : bool
@@ -38,7 +39,7 @@ class Inequality:
     Raises
     ------
     ParameterError
-        If the grade is neither of the two.
+        If there is no such grade.
     """
 
     name: str
@@ -73,7 +74,7 @@ class Inequality:
 
     @property
     def proved(self) -> bool:
-        """Whether it is proved and not only sampled."""
+        """Whether it is proved of what runs."""
         return self.grade == PROVED
 
     def as_mapping(self) -> dict[str, object]:
@@ -92,3 +93,35 @@ class Inequality:
 def finite(value: float) -> float | None:
     """Return a value that strict JSON can write; None for what is not finite."""
     return float(value) if math.isfinite(value) else None
+
+
+STEP_ROWS = ('step_capture', 'step_contraction', 'step_synchronisation')
+"""Rows that say of the step that runs what others say of the differential equation."""
+
+_CARRIED_OVER = ('synchronisation', 'contraction', 'capture', 'time_to_rest')
+
+
+def discharged(rows: Iterable[Inequality], *, alike: bool) -> list[Inequality]:
+    """Rows with what those of the step make of them.
+
+    Where the step is proved to capture, contract and synchronise, the sampled ``time_step`` is not
+    required, and what is proved of the equation is so of what runs.
+
+    Parameters
+    ----------
+    rows : iterable of Inequality
+        All of a certificate.
+    alike : bool
+        Whether all legs turn at one frequency and only the service stops them: votes and unequal
+        frequencies are in no row of the step.
+    """
+    rows = list(rows)
+    proved = alike and all(row.holds for row in rows if row.name in STEP_ROWS)
+
+    def now(row: Inequality) -> Inequality:
+        if row.name in STEP_ROWS or row.name == 'time_step':
+            return replace(row, required=proved is (row.name in STEP_ROWS))
+        return replace(row, grade=PROVED if proved else CONTINUOUS) if (
+            row.name in _CARRIED_OVER) else row
+
+    return [now(row) for row in rows]

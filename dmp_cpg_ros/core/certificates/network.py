@@ -16,9 +16,14 @@ from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.contraction import inhibited
 from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set
 from dmp_cpg_ros.core.contraction.capture_anywhere import needed_gain_anywhere
-from dmp_cpg_ros.core.contraction.delays import Capture
+from dmp_cpg_ros.core.contraction.delays import (
+    Capture,
+    carried_margin,
+    held_margin,
+    late_margin,
+)
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium, inhibited_equilibrium
-from dmp_cpg_ros.core.contraction.finding import PROVED
+from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, PROVED
 from dmp_cpg_ros.core.contraction.heterogeneity import mismatch_bound, mismatch_margin
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.contraction.inhibited import InhibitedContraction
@@ -34,6 +39,9 @@ from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 
 EXPECTED_MISMATCH = 0.05
 """Difference of the legs' frequencies that should be tolerated, as a share of the highest."""
+
+EXPECTED_TICKS = 3
+"""Ticks that a sample should be allowed to be old: held for one, a tick late, one message lost."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +83,11 @@ class Setting:
         return cls(network, parameters, tick_s, span or operating_range(
             network, parameters.inhibition, parameters.reference),
             farthest_way(network, parameters.inhibition))
+
+    @property
+    def alike(self) -> bool:
+        """Whether all legs turn at one frequency and only the service stops them."""
+        return not (self.parameters.voting.voting or self.network.parameters.contact_feedback)
 
     @property
     def arc(self) -> float:
@@ -131,7 +144,7 @@ def network_inequalities(s: Setting, analysis: NetworkAnalysis) -> list[Inequali
     found = analysis.found
     return [
         Inequality('synchronisation', found.growth, found.connectivity, '1/s', 'rho r^2',
-                   'connectivity of L_K', PROVED,
+                   'connectivity of L_K', CONTINUOUS,
                    f'from every state the legs find their places, at {found.rate:.4g} 1/s '
                    f'({found.method} bound)'),
         _contraction(analysis.contraction),
@@ -144,7 +157,7 @@ def mismatch_inequality(s: Setting, found: Synchronisation) -> Inequality:
     margin = mismatch_margin(s.network.system.graph, found, p.rho, p.radius,
                              LOCKED_PHASE_ERROR)
     return Inequality('frequency_mismatch', EXPECTED_MISMATCH * s.span.omega[1], margin, 'rad/s',
-                      f'{EXPECTED_MISMATCH:.0%} of omega_max', 'tolerated mismatch', PROVED,
+                      f'{EXPECTED_MISMATCH:.0%} of omega_max', 'tolerated mismatch', CONTINUOUS,
                       f'legs whose own frequencies differ stay within {LOCKED_PHASE_ERROR:g} rad '
                       'of their places', required=False)
 
@@ -166,7 +179,7 @@ def _contraction(found: InhibitedContraction) -> Inequality:
     if found.reach != inhibited.NONE:
         where += f' ({found.reach} grade), at {found.rate:.4g} 1/s'
     return Inequality('contraction', found.growth, found.inhibition_rate, '1/s', left_is,
-                      'connectivity of L_K + k_inh E', PROVED,
+                      'connectivity of L_K + k_inh E', CONTINUOUS,
                       f'the inhibited network contracts {where}')
 
 
@@ -181,7 +194,8 @@ def _capture(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
     exists = '' if np.isfinite(distance) else '; there is none, the other legs break free'
     cadence = f'at the highest cadence, {span.omega[1]:.4g} rad/s'
     return [
-        Inequality('capture', needed, gain, '1/s', 'N omega r/r0 made exact', 'k_inh', PROVED,
+        Inequality('capture', needed, gain, '1/s', 'N omega r/r0 made exact', 'k_inh',
+                   CONTINUOUS,
                    f'legs that enter C in their places cannot leave it again, {cadence}'),
         Inequality('rest_in_region', distance, r0, '', '|x_1* - x_d|', 'r0', PROVED,
                    f'the inhibited equilibrium lies inside C, {cadence}{exists}')]
@@ -197,7 +211,7 @@ def capture_anywhere(s: Setting, analysis: NetworkAnalysis) -> Inequality:
     needed = max(needed_gain_anywhere(system, s.span.omega[1], int(node), p.region_radius)
                  for node in different)
     return Inequality('capture_anywhere', needed, p.inhibition_gain, '1/s',
-                      'gain for any |x_j| <= r', 'k_inh', PROVED,
+                      'gain for any |x_j| <= r', 'k_inh', CONTINUOUS,
                       'C cannot be left even while the other legs are out of place',
                       required=False)
 
@@ -240,5 +254,38 @@ def contact_limits(s: Setting, found: Synchronisation, start: float
     share, margin = s.network.parameters.margin_share, contact_margin(s, found)
     return ContactLimits(share * margin, s.span.omega[1], start), Inequality(
         'contact_feedback', share * margin, margin, 'rad/s', f'{share:.0%} of it',
-        'margin for unequal leg frequencies', PROVED,
+        'margin for unequal leg frequencies', CONTINUOUS,
         'however the feet touch down, the legs stay in their places and near their cycle')
+
+
+def delay_inequalities(capture: Capture, tick_s: float) -> list[Inequality]:
+    """Inequalities (j): delays, held samples and lost messages against what capture bears.
+
+    Parameters
+    ----------
+    capture : Capture
+        Of the suite, at the fastest cadence at which inhibition is armed.
+    tick_s : float
+        Control tick [s].
+
+    Returns
+    -------
+    list of Inequality
+        None is required: in the suite one node has all oscillators and switches inhibition.
+    """
+    age = EXPECTED_TICKS * tick_s
+    slower = 1.0 + age * float(capture.coupling.sum(axis=1).max())
+
+    def row(name: str, margin: float, what: str, how: str) -> Inequality:
+        late = 'any number of' if math.isinf(margin) else max(0, math.floor(margin / tick_s) - 1)
+        return Inequality(name, age, margin, 's', 'held, late, one lost', what, CONTINUOUS,
+                          f'{how}, {late} ticks late or messages lost', required=False)
+
+    return [
+        row('late_inhibition', late_margin(capture), 'time to cross C',
+            'inhibition captures as it does at once when it acts'),
+        row('held_coupling', held_margin(capture), 'age of states',
+            "with an oscillator per node that holds the others' states "
+            f'(at {slower:.3g} times the period) capture would bear'),
+        row('carried_coupling', carried_margin(capture), 'age of states',
+            'with states that are carried on by their rate times their age it would bear')]

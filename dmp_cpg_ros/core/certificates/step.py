@@ -1,29 +1,42 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Time step against stiffness: what the exponential step can take; and delays against what capture
-bears.
+"""The step that runs: what capture, contraction and synchronisation are for it and not for the
+differential equation.
+
+In locked coordinates a tick is y⁺ = Φ(y) with ẏ = −M y + α x_d + N(y), M = L + diag α,
+N = (ρ(r² − |y|²) − iω) y. No entry of M beside its diagonal is positive, so that its exponentials
+have none that is negative, and N = q y + Q(y) with q = −κ − iω leaves a Q that is small and, for κ
+= 2ρr², bounded by 2ρr³ wherever |y| ≤ 2r. What follows for |Φ(y)| and |Φ(y) − Φ(z)| are
+nonnegative inequalities (:mod:`~dmp_cpg_ros.core.maths.step_comparison`), which become those of
+the differential equation as the tick vanishes. doc/certificate.md has the proof.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.certificates.inequality import Inequality
-from dmp_cpg_ros.core.certificates.network import Setting
+from dmp_cpg_ros.core.certificates.network import NetworkAnalysis, Setting
 from dmp_cpg_ros.core.contraction.capture import radius_tolerance
-from dmp_cpg_ros.core.contraction.delays import (
-    Capture,
-    carried_margin,
-    held_margin,
-    late_margin,
-)
 from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
+from dmp_cpg_ros.core.contraction.hopf_bounds import largest_radial, largest_shifted, mild_rate
+from dmp_cpg_ros.core.contraction.synchronisation import (
+    cascade_weights,
+    comparison_laplacian,
+    synchronisation_complement,
+)
+from dmp_cpg_ros.core.gait.network import LONGEST_STEP
+from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST
+from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 from dmp_cpg_ros.core.maths.roots import last_that_holds
+from dmp_cpg_ros.core.maths.step_comparison import StepBounds, StepComparison
 
 STEP_ERROR = 0.025
 """c: with s = tick · ℓ, a mode that decays by more than c s⁴ per tick decays in the step too."""
@@ -31,27 +44,9 @@ STEP_ERROR = 0.025
 LARGEST_MILD_STEP = 1.4
 """Largest s = tick · ℓ for which that is so with some room."""
 
-EXPECTED_TICKS = 3
-"""Ticks that a sample should be allowed to be old: held for one, a tick late, one message lost."""
-
-
-def mild_rate(rho: float, radius: float, omega: float) -> float:
-    """ℓ = sup ‖∂N/∂x‖ over |x| ≤ r of the part that the step does not integrate exactly.
-
-    With z = x₁ + i x₂, N = (ρr² − iω − ρ|z|²) z has ‖∂N/∂x‖ = |ρr² − iω − 2ρ|z|²| + ρ|z|², a
-    convex function of |z|², largest at |z| = r.
-
-    Parameters
-    ----------
-    rho, radius, omega : float
-        Parameters of the oscillators [1/s], [-], [rad/s].
-
-    Returns
-    -------
-    float
-        [1/s]
-    """
-    return math.hypot(omega, rho * radius**2) + rho * radius**2
+_FARTHEST_STAGE = 1.29  # |a|, |b| over r up to which the bounds of Q are what they are taken for
+_CASCADE = 2.0**-64  # weight of a component of a graph, as a share of those before it
+_MOST_TRIALS = 40
 
 
 def longest_step(rho: float, radius: float, omega: float, rate: float) -> float:
@@ -111,8 +106,195 @@ def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -
     return abs(cycle / radius - 1.0)
 
 
-def step_inequalities(s: Setting, rate: float) -> list[Inequality]:
-    """Inequalities (d): the tick against the mild part, and against the region C.
+@dataclass(frozen=True)
+class SteppedNetwork:
+    """What is proved of the step.
+
+    Attributes
+    ----------
+    distance : ndarray (N,)
+        ū_i of a box |x_i − x_d| ≤ ū_i that holds the one of capture.
+    farthest : float
+        Distance of an inhibited node from x_d after a step out of the box, as a share of r0;
+        infinite where the others may leave the box.
+    disc : float
+        R of a disc |x_i| ≤ R that neither free nor inhibited oscillators leave.
+    approach : float
+        Rate at which two states in the box approach each other, and at which |ẋ| falls [1/s].
+    locking : float
+        Rate at which disagreement of the free oscillators shrinks [1/s].
+    step_s : float
+        Length of the step [s].
+    differences, moved : ndarray (N, N)
+        Bounds in the box of |Φ(x) − Φ(z)| over |x − z|, and of |Φ(x) − x| over |ẋ|.
+    rates : tuple of ndarray (N, N)
+        Bounds of |ẋ| after a step over |Φ(x) − x| and over |ẋ| before it.
+    forced : ndarray (N,)
+        What a frequency that is off by 1/r does to a state in a step.
+    """
+
+    distance: Array
+    farthest: float
+    disc: float
+    approach: float
+    locking: float
+    step_s: float
+    differences: Array
+    moved: Array
+    rates: tuple[Array, Array]
+    forced: Array
+
+    @property
+    def proved(self) -> bool:
+        """Whether all of it holds."""
+        return self.farthest < 1.0 and min(self.approach, self.locking) > 0.0
+
+
+def step_of(tick_s: float) -> float:
+    """Length of the oscillators' step in a tick [s]."""
+    return tick_s / math.ceil(tick_s / LONGEST_STEP - 1e-9)
+
+
+def stepped_network(s: Setting, analysis: NetworkAnalysis) -> SteppedNetwork | None:
+    """Prove of the step what can be; None for couplings that are not k_ij I.
+
+    Parameters
+    ----------
+    s : Setting
+        Oscillators, region, tick.
+    analysis : NetworkAnalysis
+        Of the differential equation; its box is enlarged until no step leaves it.
+    """
+    graph, capture, rho = s.network.system.graph, analysis.capture, s.network.parameters.rho
+    if np.any(graph.gains != graph.gains[:, :1, :1] * np.eye(2)):
+        return None
+    r, omega, h = s.network.parameters.radius, s.span.omega[1], step_of(s.tick_s)
+    L, alpha = comparison_laplacian(graph), capture.gains
+    held, free = StepComparison(L + np.diag(alpha), h), StepComparison(L, h)
+    kappa = 2.0 * rho * r**2
+    bounds, quick = held.moduli(kappa, omega), free.moduli(kappa, QUICKEST * omega)
+    disc = max(r, *(_disc(bound, gains * r, rho * r**3)
+                    for bound, gains in ((bounds, alpha), (quick, 0.0 * alpha))))
+    plain, plain_quick = held.moduli(0.0, omega), free.moduli(0.0, QUICKEST * omega)
+    a, b = _stages(plain, alpha * r, disc, rho, r)
+    _, b_free = _stages(plain_quick, 0.0 * alpha, disc, rho, r)
+    if not max(disc, a, b, b_free) < _FARTHEST_STAGE * r:
+        return None
+    box = _Box(bounds, plain, omega * r, rho, r, (disc, a, b))
+    u, after = box.closed(capture.distance, alpha > 0.0)
+    kept = bool(np.all((after <= u) | (alpha > 0.0) | (u >= disc + r)))
+    farthest = float((after / u)[alpha > 0.0].max()) if kept else math.inf
+
+    # ‖κ + ∂(ρ(r² − |y|²) y)/∂y‖ is the larger of κ + ρ(r² − |y|²) and ρ(3|y|² − r²) − κ
+    u_a, u_b = box.stages(u)
+    inner = [np.maximum(r - far, 0.0) for far in (
+        u, np.maximum(u, u_a), np.maximum(np.maximum(u, u_a), u_b))]
+    most = 3.0 * max(disc, a, b) ** 2 - r**2
+    kappa = 0.5 * rho * (most - r**2 + float(inner[2].min()) ** 2)
+    bounds = held.moduli(kappa, omega)
+    start, middle, end = (np.maximum(kappa + rho * (r**2 - least**2), rho * most - kappa)
+                          for least in inner)
+    Z, rates = bounds.difference(start, middle, end), bounds.rates(end)
+    slowest = max(np.abs(np.linalg.eigvals(matrix)).max() for matrix in (Z, rates[1]))
+    return SteppedNetwork(
+        u, farthest, disc, -math.log(max(slowest, 1e-300)) / h,
+        _locking(s, analysis, L, h, max(disc, b_free)), h, Z, bounds.moved(end), rates,
+        bounds.forced(middle, end).sum(axis=1) * max(disc, a, b) / r)
+
+
+def _disc(bound: StepBounds, pull: Array, rho_r3: float) -> float:
+    """R of a disc that no step leaves whose stages are within 2r, where |Q| ≤ 2ρr³."""
+    pushed = bound.C @ pull + (bound.C_y + bound.C_a + bound.C_b).sum(axis=1) * 2.0 * rho_r3
+    kept = 1.0 - bound.T.sum(axis=1)
+    return float((pushed / kept).max()) if kept.min() > 0.0 else math.inf
+
+
+def _stages(bound: StepBounds, pull: Array, disc: float, rho: float, r: float
+            ) -> tuple[float, float]:
+    """Largest |a| and |b| of states within a disc."""
+    start = largest_radial(rho, r, disc)
+    a = float((bound.A.sum(axis=1) * disc + bound.A_y @ (pull + start)).max())
+    middle = largest_radial(rho, r, a)
+    return a, float((bound.B.sum(axis=1) * disc + bound.B_c @ pull + bound.B_y.sum(axis=1) * start
+                     + bound.B_a.sum(axis=1) * middle).max())
+
+
+@dataclass(frozen=True)
+class _Box:
+    """Boxes |y_i − x_d| ≤ u_i under a step: bounds with κ = 2ρr² and with κ = 0, ωr, and the
+    largest |y|, |a|, |b|.
+    """
+
+    bound: StepBounds
+    plain: StepBounds
+    turning: float
+    rho: float
+    r: float
+    largest: tuple[float, float, float]
+
+    def _off(self, u: Array, R: float) -> Array:
+        return largest_shifted(self.rho, self.r, u, R)
+
+    def stages(self, u: Array) -> tuple[Array, Array]:
+        """Distances of a and b."""
+        at, plain, turning = self.bound, self.plain, np.full(len(u), self.turning)
+        R, R_a, R_b = self.largest
+        radial = largest_radial(self.rho, self.r, R_a)
+        off = self._off(u, R)
+        a = np.minimum(at.A @ u + at.A_y @ (turning + off), R_a + self.r)
+        moved = at.A_moved @ u + at.A_y @ (turning + off)
+        inner = np.maximum(self.r - np.maximum(u, a), 0.0)
+        change = self.rho * (3.0 * self.r**2 - inner**2) * moved           # |Q(a) − Q(y)|
+        either = np.minimum(at.B_y @ off + at.B_a @ self._off(a, R_a),
+                            at.B_c @ off + at.B_a @ change)
+        b = np.minimum(at.B @ u + at.B_c @ turning + either, plain.B @ u + plain.B_c @ turning
+                       + (plain.B_y + plain.B_a) @ np.full(len(u), radial))
+        return a, np.minimum(b, R_b + self.r)
+
+    def after(self, u: Array) -> Array:
+        """Distances after a step."""
+        at, (R, R_a, R_b), (a, b) = self.bound, self.largest, self.stages(u)
+        turning = np.full(len(u), self.turning)
+        return np.asarray(at.T @ u + at.C @ turning + at.C_y @ self._off(u, R)
+                          + at.C_a @ self._off(a, R_a) + at.C_b @ self._off(b, R_b))
+
+    def closed(self, u: Array, held: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Box that free nodes do not leave, enlarged from one, and the distances after a step; a
+        node is anywhere in the disc where there is none.
+        """
+        edge, slope = self.largest[0] + self.r, 2.0 * self.rho * self.r**2
+        J = self.bound.T + (self.bound.C_y + self.bound.C_a + self.bound.C_b) * slope
+        u = np.minimum(u, edge)
+        for _ in range(_MOST_TRIALS):
+            after = self.after(u)
+            moving = ~held & (u < edge)
+            if np.all(after[moving] <= u[moving]):
+                break
+            room = np.linalg.solve(np.eye(int(moving.sum())) - J[np.ix_(moving, moving)],
+                                   np.maximum(after - u, 0.0)[moving] + 1e-7 * self.r)
+            u = u.copy()
+            u[moving] = np.minimum(u[moving] + room, edge) if np.all(room > 0.0) else edge
+        return u, self.after(u)
+
+
+def _locking(s: Setting, analysis: NetworkAnalysis, L: Array, h: float, farthest: float) -> float:
+    """Rate at which steps of free oscillators shrink (Σ ξ_i |y_i − ȳ|²)^½ [1/s]."""
+    p, xi = s.network.parameters, analysis.found.weights
+    if not analysis.found.synchronises:
+        return -math.inf
+    if xi is None:
+        xi = cascade_weights(s.network.system.graph, _CASCADE)
+    V, root = synchronisation_complement(len(L), 1, xi), np.sqrt(xi)
+    kappa = p.rho * (1.5 * farthest**2 - p.radius**2)
+    bound = StepComparison(V @ (root[:, None] * L / root) @ V.T, h).norms(
+        kappa, QUICKEST * s.span.omega[1])
+    most = np.full(1, kappa + p.rho * p.radius**2)
+    return -math.log(float(bound.difference(most, most, most)[0, 0])) / h
+
+
+def step_inequalities(s: Setting, rate: float, found: SteppedNetwork | None) -> list[Inequality]:
+    """Inequalities (d): the step for itself, the tick against the mild part, and against the
+    region C.
 
     Parameters
     ----------
@@ -120,15 +302,27 @@ def step_inequalities(s: Setting, rate: float) -> list[Inequality]:
         Oscillators, region and tick.
     rate : float
         Slowest certified rate of the network [1/s].
+    found : SteppedNetwork or None
+        What is proved of the step.
 
     Returns
     -------
     list of Inequality
+        See :func:`~dmp_cpg_ros.core.certificates.inequality.discharged` for which are required.
     """
     rho, radius = s.network.parameters.rho, s.network.parameters.radius
     omega, tick_s, r0 = s.span.omega[1], s.tick_s, s.parameters.inhibition.region_radius
     limit = longest_step(rho, radius, omega, rate)
+    farthest, captured, locking = (math.inf, -math.inf, -math.inf) if found is None else (
+        found.farthest, found.approach, found.locking)
     return [
+        Inequality('step_capture', farthest, 1.0, '', '|x_1 - x_d|/r0 after a step', 'edge of C',
+                   PROVED, 'no step of the integration takes legs that are captured out of C',
+                   required=False),
+        Inequality('step_contraction', 0.0, captured, '1/s', 'zero', 'rate of the step', PROVED,
+                   'steps take captured states towards each other and to rest', required=False),
+        Inequality('step_synchronisation', 0.0, locking, '1/s', 'zero', 'rate of the step', PROVED,
+                   'steps take the legs to their places', required=False),
         Inequality('time_step', tick_s, limit, 's', 'tick', 'longest stable step', SAMPLED,
                    'what decays in the equations decays in their numerical integration'),
         Inequality('cycle_radius', cycle_radius_error(rho, radius, omega, tick_s),
@@ -137,36 +331,3 @@ def step_inequalities(s: Setting, rate: float) -> list[Inequality]:
                    'the integration keeps the radius of the limit cycle'),
         Inequality('region_per_tick', omega * tick_s, s.arc, 'rad', 'omega_max tick', 'arc of C',
                    PROVED, 'an oscillator cannot step over the region C between two ticks')]
-
-
-def delay_inequalities(capture: Capture, tick_s: float) -> list[Inequality]:
-    """Inequalities (j): delays, held samples and lost messages against what capture bears.
-
-    Parameters
-    ----------
-    capture : Capture
-        Of the suite, at the fastest cadence at which inhibition is armed.
-    tick_s : float
-        Control tick [s].
-
-    Returns
-    -------
-    list of Inequality
-        None is required: in the suite one node has all oscillators and switches inhibition.
-    """
-    age = EXPECTED_TICKS * tick_s
-    slower = 1.0 + age * float(capture.coupling.sum(axis=1).max())
-
-    def row(name: str, margin: float, what: str, how: str) -> Inequality:
-        late = 'any number of' if math.isinf(margin) else max(0, math.floor(margin / tick_s) - 1)
-        return Inequality(name, age, margin, 's', 'held, late, one lost', what, PROVED,
-                          f'{how}, {late} ticks late or messages lost', required=False)
-
-    return [
-        row('late_inhibition', late_margin(capture), 'time to cross C',
-            'inhibition captures as it does at once when it acts'),
-        row('held_coupling', held_margin(capture), 'age of states',
-            "with an oscillator per node that holds the others' states "
-            f'(at {slower:.3g} times the period) capture would bear'),
-        row('carried_coupling', carried_margin(capture), 'age of states',
-            'with states that are carried on by their rate times their age it would bear')]

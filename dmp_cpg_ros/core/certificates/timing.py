@@ -9,20 +9,23 @@ once at most until it is in C; from anywhere in the capture set the rates |ẋ_i
     v̇ ≤ −(L + diag α − diag b) v + |∂f/∂ω| |ω̇|
 
 (contraction applied to ẋ itself, driven by the reference's decay), and the swings' activity
-follows the phase rates through its filter. Every step rounds the bound up.
+follows the phase rates through its filter. Where it is proved, the same is computed for the step
+that runs, by what it has moved. Every step rounds the bound up.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dmp_cpg_ros.core.certificates.network import Setting, free_synchronisation
+from dmp_cpg_ros.core.certificates.step import SteppedNetwork
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
-from dmp_cpg_ros.core.contraction.hopf_bounds import growth
+from dmp_cpg_ros.core.contraction.hopf_bounds import growth, largest_radial
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation, comparison_laplacian
 from dmp_cpg_ros.core.inhibition import entry, supervisor
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
@@ -40,7 +43,8 @@ _STEP = 0.01  # [s]
 _HORIZON = 10.0  # [s] beyond it a bound is of no use
 
 
-def time_to_rest(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium | None) -> float:
+def time_to_rest(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium | None,
+                 step: SteppedNetwork | None = None) -> float:
     """Bound on the time from a request to rest, for a gait whose legs are in their places.
 
     Parameters
@@ -51,6 +55,8 @@ def time_to_rest(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium | N
         Invariant set under inhibition.
     rest : InhibitedEquilibrium or None
         Equilibrium at zero reference.
+    step : SteppedNetwork, optional
+        What is proved of the step; where it is, the bound is the larger of its and the equation's.
 
     Returns
     -------
@@ -68,6 +74,8 @@ def time_to_rest(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium | N
     slowed = min(span.armed_speed * math.exp(-alpha_r * arriving), max(
         0.0, span.armed_speed - s.parameters.reference.braking * arriving))
     settling = _settling(s, capture, rest, slowed)
+    if step is not None and step.proved:
+        settling = max(settling, _settling(s, capture, rest, slowed, step))
     return arming + arriving + settling + DELAY_TICKS * s.tick_s
 
 
@@ -181,38 +189,100 @@ def later_arming(s: Setting, x: Array, r: Array) -> float:
     return max(locking, slowing_time(s.parameters.reference, speed, limit, s.tick_s))
 
 
-def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed: float) -> float:
-    """Time from any state in the capture set to the thresholds of rest [s]."""
-    system, r, span = s.network.system, s.network.parameters.radius, s.span
-    alpha_r, L = s.parameters.reference.alpha_r, comparison_laplacian(system.graph)
-    a_b = s.parameters.reference.braking
-    K = L + np.diag(capture.gains) - np.diag(growth(system.rho, system.radius,
-                                                    capture.smallest_radius))
-    phi = phi_functions(-K * _STEP, 1)
-    carry, feed = phi[0], _STEP * phi[1].sum(axis=1)
+class _Falling(NamedTuple):
+    """How bounds fall in a cell of time, and what ω̇ and ω feed them.
+
+    Attributes
+    ----------
+    cell : float
+        Its length [s].
+    start : ndarray (n,)
+        Bounds at first; the last 2N are those of |ẋ_i| and of the distance from rest.
+    carry : ndarray (n, n)
+        Of bounds in a cell.
+    turning, away : ndarray (n,)
+        What r |ω̇| and r times what ω is off that of rest add to them [s].
+    inner : ndarray (N,)
+        Smallest |x_i| in the set.
+    """
+
+    cell: float
+    start: Array
+    carry: Array
+    turning: Array
+    away: Array
+    inner: Array
+
+
+def _fastest(s: Setting, gains: Array, u: Array, disc: float) -> Array:
+    """Bound of |ẋ_i| in a box and a disc, ndarray (N,)."""
+    system, r, degree = s.network.system, s.network.parameters.radius, np.diag(
+        comparison_laplacian(s.network.system.graph))
+    return np.asarray(
+        s.span.omega_armed[1] * disc + largest_radial(float(system.rho[0]), r, disc)
+        + gains * u + degree * (u + u.max()))
+
+
+def _falling(s: Setting, capture: CaptureSet, turning: float, away: float) -> _Falling:
+    """Of the differential equation."""
+    system, u = s.network.system, capture.distance
+    K = comparison_laplacian(system.graph) + np.diag(capture.gains) - np.diag(
+        growth(system.rho, system.radius, capture.smallest_radius))
+    phi, none = phi_functions(-K * _STEP, 1), np.zeros_like(K)
+    feed, idle = _STEP * phi[1].sum(axis=1), none[0]
     shape = np.linalg.solve(K, np.ones(len(K)))              # K shape = 1: bounds above it fall
+    fastest = _fastest(s, capture.gains, u, s.network.parameters.radius)
+    start = np.concatenate([max(float((fastest / shape).max()), turning) * shape,
+                            max(float((2.0 * u / shape).max()), away) * shape])
+    return _Falling(_STEP, start, np.block([[phi[0], none], [none, phi[0]]]),
+                    np.concatenate([feed, idle]), np.concatenate([idle, feed]),
+                    capture.smallest_radius)
+
+
+def _falling_in_steps(s: Setting, capture: CaptureSet, step: SteppedNetwork) -> _Falling:
+    """Of the step, some of which make a cell; what it has moved is bounded too."""
+    r, u, none = s.network.parameters.radius, step.distance, np.zeros_like(step.moved)
+    fastest, idle = _fastest(s, capture.gains, u, step.disc), none[0]
+    start = np.concatenate([np.minimum(2.0 * u, step.moved @ fastest), fastest, 2.0 * u])
+    each = np.block([[step.differences, none, none], [*step.rates, none],
+                     [none, none, step.differences]])
+    kicks = np.stack([
+        np.concatenate([step.forced, np.full(len(u), step.disc / r), idle]) * step.step_s,
+        np.concatenate([idle, idle, step.forced])], axis=1)
+    carry, feed = np.eye(len(each)), 0.0 * kicks
+    count = max(1, round(_STEP / step.step_s))
+    for _ in range(count):
+        carry, feed = each @ carry, each @ feed + kicks
+    return _Falling(count * step.step_s, start, carry, feed[:, 0], feed[:, 1],
+                    np.maximum(r - u, 0.0))
+
+
+def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed: float,
+              step: SteppedNetwork | None = None) -> float:
+    """Time from any state in the capture set to the thresholds of rest [s]."""
+    r, span, N = s.network.parameters.radius, s.span, len(capture.distance)
+    alpha_r, a_b = s.parameters.reference.alpha_r, s.parameters.reference.braking
     # |∂f/∂ω| |ω̇| at first: sideways and turning count twice in the speed that sets the cadence
     turning = span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r
     away = span.omega_slope * speed * r                      # |∂f/∂ω| |ω − ω_rest| at first
-    u = capture.distance
-    fastest = (span.omega_armed[1] * r + 0.385 * system.rho * r**3 + capture.gains * u
-               + np.diag(L) * (u + u.max()))
-    v = max(float((fastest / shape).max()), turning) * shape
-    e = max(float((2.0 * u / shape).max()), away) * shape
-    fade, swing_fade = math.exp(-alpha_r * _STEP), math.exp(
-        -s.parameters.leg.activity_rate * _STEP)
-    activity = np.ones(len(K))
-    for k in range(int(_HORIZON / _STEP)):
-        inner = np.maximum(capture.smallest_radius, rest.radius - e)
+    of = _falling(s, capture, turning, away) if step is None else _falling_in_steps(
+        s, capture, step)
+    bounds = of.start
+    fade, swing_fade = math.exp(-alpha_r * of.cell), math.exp(
+        -s.parameters.leg.activity_rate * of.cell)
+    activity = np.ones(N)
+    for k in range(int(_HORIZON / of.cell)):
+        v, e = bounds[-2 * N:-N], bounds[-N:]
+        inner = np.maximum(of.inner, rest.radius - e)
         phase_rate = np.divide(v, inner, out=np.full_like(v, np.inf), where=inner > 1e-12)
         if (phase_rate.max() <= supervisor.REST_PHASE_RATE and speed <= supervisor.REST_SPEED
                 and activity.max() <= supervisor.REST_ACTIVITY):
-            return k * _STEP
+            return k * of.cell
         wanted = np.minimum(1.0, phase_rate / span.omega_armed[0])
         activity = wanted + (activity - wanted) * swing_fade
-        v, e = carry @ v + feed * turning, carry @ e + feed * away
+        bounds = of.carry @ bounds + of.turning * turning + of.away * away
         if a_b > 0.0:
-            speed = max(0.0, min(speed * fade, speed - a_b * _STEP))
+            speed = max(0.0, min(speed * fade, speed - a_b * of.cell))
             turning = span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r
             away = span.omega_slope * speed * r
         else:

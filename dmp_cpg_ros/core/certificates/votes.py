@@ -22,7 +22,7 @@ from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest
 from dmp_cpg_ros.core.contraction import inhibited
 from dmp_cpg_ros.core.contraction.capture import capture_set, shared_capture
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
-from dmp_cpg_ros.core.contraction.finding import PROVED, SAMPLED
+from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, SAMPLED
 from dmp_cpg_ros.core.contraction.voting import (
     certified_threshold,
     different_voters,
@@ -128,13 +128,13 @@ def vote_inequalities(s: Setting) -> list[Inequality]:
         count, f'{count - 1} legs cannot stop')
     return [
         Inequality('votes_contraction', worst.growth, worst.inhibition_rate, '1/s', left_is,
-                   f'connectivity of L_K + k_inh alpha E_{count}', PROVED,
+                   f'connectivity of L_K + k_inh alpha E_{count}', CONTINUOUS,
                    f'the network contracts {where} under the votes of {who}'),
         Inequality('votes_suffice', max(needed), clamp.gain, '1/s', f'capture by {count}',
-                   'k_inh alpha_max', PROVED,
+                   'k_inh alpha_max', CONTINUOUS,
                    f'{who} can stop the gait, with weights of {clamp.limit:.4g}'),
         # There may be equilibria that do not grow out of the one without rotation.
         Inequality('votes_needed', clamp.gain, clamp.window.highest, '1/s', 'k_inh alpha_max',
                    f'rest held by {count - 1}', SAMPLED, f'{fewer} the gait'),
         Inequality('votes_time_to_rest', max(bounds), LONGEST_STOP, 's', 'bound', 'longest stop',
-                   PROVED, 'from the vote that stops the locked gait to rest')]
+                   CONTINUOUS, 'from the vote that stops the locked gait to rest')]

@@ -11,10 +11,13 @@ from dmp_cpg_ros.core.errors import ParameterError
 PROVED = 'proved'
 """Grade of a bound that holds at every point: a closed form, or intervals rounded outwards."""
 
+CONTINUOUS = 'continuous'
+"""Grade of a bound that is proved of the differential equation, of which the suite runs steps."""
+
 SAMPLED = 'sampled'
 """Grade of a bound that was evaluated at points, and may fail between them."""
 
-GRADES = (PROVED, SAMPLED)
+GRADES = (PROVED, CONTINUOUS, SAMPLED)
 """All grades, the stronger one first."""
 
 
@@ -28,7 +31,7 @@ class Finding:
         λ of the definitions in Section 3.1 [1/s]: distances shrink at least like exp(−λt).
         Negative where the test found no contraction.
     grade : str
-        ``proved`` or ``sampled``.
+        ``proved``, ``continuous`` or ``sampled``.
     evaluations : int
         Points (sampled) or boxes (proved) at which the Jacobian was evaluated; 0 for closed forms.
     statement : str
@@ -58,5 +61,5 @@ class Finding:
 
 
 def weakest(grades: tuple[str, ...]) -> str:
-    """Grade of a conclusion from several premises: proved only when all of them are."""
-    return PROVED if all(grade == PROVED for grade in grades) else SAMPLED
+    """Grade of a conclusion from several premises: that of the weakest."""
+    return max(grades, key=GRADES.index, default=PROVED)

@@ -38,7 +38,7 @@ class Part:
     rate : float
         λ [1/s]; the part has the property of its kind when the rate is positive.
     grade : str
-        ``proved`` or ``sampled``.
+        ``proved``, ``continuous`` or ``sampled``.
 
     Raises
     ------

@@ -11,6 +11,7 @@ closed form.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -39,6 +40,55 @@ def growth(rho: ArrayLike, radius: ArrayLike, smallest_radius: ArrayLike = 0.0) 
         [1/s]
     """
     return np.asarray(rho) * (np.asarray(radius) ** 2 - np.asarray(smallest_radius) ** 2)
+
+
+def mild_rate(rho: float, radius: float, omega: float) -> float:
+    """ℓ = sup ‖∂N/∂x‖ over |x| ≤ r of the part that the step does not integrate exactly.
+
+    With z = x₁ + i x₂, N = (ρr² − iω − ρ|z|²) z has ‖∂N/∂x‖ = |ρr² − iω − 2ρ|z|²| + ρ|z|², a
+    convex function of |z|², largest at |z| = r.
+
+    Parameters
+    ----------
+    rho, radius, omega : float
+        Parameters of the oscillators [1/s], [-], [rad/s].
+
+    Returns
+    -------
+    float
+        [1/s]
+    """
+    return math.hypot(omega, rho * radius**2) + rho * radius**2
+
+
+def largest_radial(rho: float, radius: float, farthest: float) -> float:
+    """Largest |ρ(r² − |y|²) y| over |y| ≤ farthest: at r/√3, or at the end beyond r."""
+    return max(2.0 / math.sqrt(27.0) * rho * radius**3,
+               rho * (farthest**2 - radius**2) * farthest)
+
+
+def largest_shifted(rho: float, radius: float, distance: Array, farthest: float) -> Array:
+    """Largest |κ(y − x_d) + ρ(r² − |y|²) y|, κ = 2ρr², over |y − x_d| ≤ distance, |y| ≤ farthest.
+
+    With |x_d| = r = 1, u = |y − x_d| and d = |y|² − 1 its square over ρ² is 4u² − 2u²d − d² + d³,
+    for d ≤ 1 rising with u, and largest at d = (1 − (1 + 6u²)^½)/3, or at −1.
+
+    Parameters
+    ----------
+    rho, radius : float
+        Parameters of the oscillator.
+    distance : ndarray (...)
+        Largest distance from x_d.
+    farthest : float
+        Not beyond √2 r.
+
+    Returns
+    -------
+    ndarray (...)
+    """
+    u = distance / radius
+    d = ((1.0 - np.sqrt(1.0 + 6.0 * u**2)) / 3.0).clip(-1.0, (farthest / radius) ** 2 - 1.0)
+    return np.asarray(rho * radius**3 * np.sqrt(4.0 * u**2 - 2.0 * u**2 * d - d**2 + d**3))
 
 
 def interval_jacobian(oscillator: AndronovHopf, omega: float) -> Callable[[Interval], Interval]:

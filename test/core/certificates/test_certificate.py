@@ -72,7 +72,8 @@ def test_what_fails_is_named(name: str, suite: SuiteParameters, canonical: dict[
 
 
 def test_a_tick_that_is_too_long_fails() -> None:
-    assert 'time_step' in [entry.name for entry in certificate(tick=0.08).failing]
+    coarse = {'rho': 60.0, 'coupling_gain': 400.0}
+    assert 'time_step' in [entry.name for entry in certificate(tick=0.08, **coarse).failing]
     assert 'region_per_tick' in [
         entry.name for entry in certificate(
             tick=0.01, suite=with_inhibition(region_radius=0.05, inhibition_gain=5e3)).failing]
@@ -107,7 +108,7 @@ def test_margins_are_right_minus_left_and_rounding_is_not_enough() -> None:
     assert not inequality(float('inf'), float('inf')).holds
     assert inequality(1.0, float('inf')).holds
     assert 'x: a = 3 1/s is not < b = 1 1/s' in inequality(3.0, 1.0).explained()
-    with pytest.raises(ParameterError, match='proved, sampled'):
+    with pytest.raises(ParameterError, match='proved, continuous, sampled'):
         Inequality('x', 0.0, 1.0, '', 'a', 'b', 'hoped', 'so')
 
 
@@ -122,8 +123,12 @@ def test_the_mapping_is_strict_json_with_both_sides_and_margins() -> None:
 
 def test_grades_say_what_is_not_proved() -> None:
     found = certificate()
-    assert found.sampled == ('time_step',) and found.grade == 'sampled'
-    assert found['capture'].proved
+    assert found.sampled == () and found.continuous == ('hierarchy',)
+    assert found.grade == 'continuous' and found['capture'].proved
+    coarse = certificate(rho=60.0, coupling_gain=400.0, coupling_graph='path', suite=(
+        with_inhibition(inhibition_gain=2000.0)))
+    assert coarse.holds and coarse.sampled == ('time_step',) and coarse.grade == 'sampled'
+    assert not coarse['capture'].proved
     with pytest.raises(ParameterError, match='valid are synchronisation'):
         found['courage']
 
