@@ -218,10 +218,10 @@ def _certificate(s: Setting, required_only: bool) -> Certificate:
     found, contraction, rest = analysis.found, analysis.contraction, analysis.rest
     rates = (found.rate, max(contraction.rate, analysis.capture.rate), 2.0 * p.rho * p.radius**2)
     slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
-    step = stepped_network(s, analysis)
+    rows = of_network.network_inequalities(s, analysis)
+    step = stepped_network(s, analysis) if all(row.holds for row in rows) else None
     stop = time_to_rest(s, analysis.capture, rest, step)
     start = time_to_walking(s, found, rest)
-    rows = of_network.network_inequalities(s, analysis)
     if not required_only:
         rows.append(of_network.capture_anywhere(s, analysis))
     rows += [*step_inequalities(s, slowest, step), *hierarchy_inequalities(s, found),
