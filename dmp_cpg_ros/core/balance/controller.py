@@ -25,6 +25,7 @@ from dmp_cpg_ros.core.balance.footholds import FootPlacement, ground_from_base, 
 from dmp_cpg_ros.core.balance.motion_plan import MotionPlan
 from dmp_cpg_ros.core.balance.parameters import PostureParameters
 from dmp_cpg_ros.core.balance.progress import feet_behind
+from dmp_cpg_ros.core.balance.unfelt import as_planned
 from dmp_cpg_ros.core.balance.virtual_model import BodyMotion, VirtualModel, distribute
 from dmp_cpg_ros.core.canonical.phase import scalar_phase, scalar_phase_rates
 from dmp_cpg_ros.core.gait.com_height import LEVEL, Bounce
@@ -36,7 +37,7 @@ from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Matrix, Pair, Triple
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.kinematics import RobotLegs
-from dmp_cpg_ros.core.robot_model.state import RobotState
+from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
 from dmp_cpg_ros.core.transformation.foot_path import activities_step
 from dmp_cpg_ros.core.transformation.leg import LegFeedback, body_scale, nominal_foothold
 
@@ -44,6 +45,11 @@ __all__ = ['PostureController', 'PostureFeedback', 'PostureParameters', 'Posture
 
 LARGEST_LOAD = 2.0
 """Largest normal force of a fully loaded foot, in weights of the robot."""
+
+LEVEL_WITH_GROUND: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+"""Rotation from the base to the frame of the ground as planned."""
+
+FELT = (True,) * len(LEGS)
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,8 @@ class PostureFeedback:
         Measured joint angles that the feedback was made of [rad].
     foot_force : ndarray (4,)
         Measured normal forces of the feet [N]; 0 where there is none to be believed.
+    felt : tuple of 4 bool
+        Whose joints were measured; those of other legs are planned.
     margins : tuple of float
         Of the capture point to the edges of the support polygon [m]; ``WIDE`` while nobody asks.
     progress : Progress or None
@@ -81,6 +89,7 @@ class PostureFeedback:
     foot_force: Array = field(default_factory=lambda: np.zeros(4))
     margins: tuple[float, ...] = WIDE
     progress: Progress | None = None
+    felt: tuple[bool, ...] = FELT
 
     def of_leg(self, i: int) -> LegFeedback:
         """What the path of leg ``i`` takes of it."""
@@ -134,6 +143,7 @@ class PostureController:
         self.model = VirtualModel(description, self.scale.leg_length)
         self.placement = FootPlacement(self.kinematics, footholds, self.scale.leg_length)
         self._across: list[float] = footholds[:, 1].tolist()
+        self._nominal = [vec3.triple(foot) for foot in footholds.tolist()]
         self._footholds = [
             vec3.triple(foot) for foot in (footholds - description.com_in_base).tolist()]
         self._room = self.placement.room(parameters.reach)
@@ -185,6 +195,12 @@ class PostureController:
                      for (x_1, x_2), rate in zip(x.tolist(), rates, strict=True)]
         load = virtual_model.contact_weights(positions, duty, swings, p.load_transfer)
         R_ground_base, upward = ground_from_base(state, p.slope_following)
+        felt = state.felt_legs
+        if felt is not None:
+            if state.feels_nothing:
+                R_ground_base = LEVEL_WITH_GROUND
+            state = as_planned(state, self.kinematics, self._nominal, reference, own_omegas, duty,
+                               positions)
         velocity = vec3.times(R_ground_base, vec3.triple(state.base_velocity_in_base.tolist()))
         rate = vec3.times(R_ground_base, vec3.triple(state.base_rate_in_base.tolist()))
         moving = sum(swings) / len(swings)
@@ -227,7 +243,8 @@ class PostureController:
                 measured[0] - (planned[0] - lasting[0]),
                 measured[1] - (planned[1] - lasting[1]))),
             Progress((measured[0], measured[1]), feet_behind(
-                plan.expected, beside, feet, self._footholds, positions, duty, omega)))
+                plan.expected, beside, feet, self._footholds, positions, duty, omega)),
+            felt or FELT)
 
     def _margins(self, R_ground_base: Matrix, feet: list[Triple], swings: list[float],
                  under: Pair, error: Pair) -> tuple[float, ...]:

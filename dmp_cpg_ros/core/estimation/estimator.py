@@ -81,11 +81,12 @@ class BodyEstimate:
 def estimated_state(readings: SensorReadings, estimate: BodyEstimate) -> RobotState:
     """Robot's state with an estimate in place of the ground truth, for the controllers."""
     readings = estimate.readings or readings
+    felt = None if all(readings.usable_legs) else readings.usable_legs
     return RobotState(
         readings.time_ns, readings.joint_position, readings.joint_velocity, readings.joint_effort,
         estimate.position_in_world, estimate.quaternion, estimate.velocity_in_base,
         estimate.rate_in_base, readings.specific_force_in_base, readings.foot_force,
-        readings.rate_in_base, estimate.normal_in_world)
+        readings.rate_in_base, estimate.normal_in_world, felt_legs=felt)
 
 
 BLIND = 0.02

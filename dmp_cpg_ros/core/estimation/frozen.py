@@ -9,8 +9,14 @@ everything else; contacts while the force of another one changes. No body change
 
 Angles and velocities of a joint tell the same motion twice: over a time t its angle changes by
 the mean velocity times t, but for what accelerations change meanwhile, which goes with t². A leg
-with a joint that breaks this is not believed for a while. Where all legs do at once it is what
-carries the readings that fails, and nothing of it is believed.
+with a joint that breaks this is doubted. Where all legs do at once it is what carries the readings
+that fails, and nothing of it is believed.
+
+What lasts is no proof: an offset that comes in one tick is told as steadily as the truth. A leg is
+believed again once for a while it has not jumped and either its jumps have cancelled each other,
+as those do by which an offset comes and goes, or its joints have moved about the angles about
+which they moved before. One that jumped again and again told anything, not the truth and an
+offset: it is believed after a longer while whatever it tells.
 """
 
 from __future__ import annotations
@@ -35,14 +41,57 @@ JUMP, JUMPS_NS = 8.0, 100_000_000
 
 APART, PULL, JOINTS_NS = 0.06, 2500.0, 600_000_000
 """Change of a joint's angle apart from what its velocity says [rad], more by that [rad/s²] times
-the squared time between the readings, that is none, and for how long its leg is not believed [ns].
-Accelerations have made 0.007 rad in 4 ms in a walk and 0.018 rad in a fall, 1200 rad/s² at most.
+the squared time between the readings, that is none, and for how long its leg is not believed at
+least [ns]. Accelerations have made 0.007 rad in 4 ms in a walk and 0.018 rad in a fall, 1200 rad/s²
+at most.
+"""
+
+MANY, CALM_NS = 3, 2_000_000_000
+"""Ticks with jumps from which an encoder tells anything, and for how long it must not have jumped to
+be believed then [ns].
+"""
+
+ALIKE, USUAL_S = 0.075, 1.0
+"""Distance of two mean angles within which they are the same [rad], and the time over which they are
+taken [s].
 """
 
 MOVING = 0.5
 """Velocity of a joint from which the robot moves [rad/s]."""
 
 N = len(LEGS)
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Legs that have jumped, and what they told since.
+
+    Attributes
+    ----------
+    legs : tuple of 4 bool
+        Which are not believed yet.
+    all_at_once : bool
+        Whether all jumped in the same tick.
+    count, jumped_ns : ndarray (4,)
+        Ticks in which they have jumped, and the stamps of the last one [ns].
+    odd_ns : ndarray (4,)
+        Stamps at which they told last what does not fit [ns].
+    slipped, told : ndarray (12,)
+        Sum of their jumps, and their mean angles since the last one [rad].
+    """
+
+    legs: tuple[bool, ...]
+    all_at_once: bool
+    count: Array
+    jumped_ns: Array
+    odd_ns: Array
+    slipped: Array
+    told: Array
+
+
+NOBODY = Doubt((False,) * N, False, np.zeros(N), np.zeros(N, int), np.zeros(N, int),
+               np.zeros(3 * N), np.zeros(3 * N))
+"""No leg is in doubt."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +110,10 @@ class SensorWatch:
         Stamp of the last turn rate that was believed [ns].
     heard_ns : tuple of 12 int
         Stamps at which each joint's angle was new [ns].
-    jumped_ns : tuple of 4 int
-        Stamps at which each leg's joints jumped last [ns].
+    usual : ndarray (12,)
+        Mean angles while they were believed [rad].
+    doubt : Doubt
+        Which legs are not believed.
     """
 
     readings: SensorReadings
@@ -70,7 +121,8 @@ class SensorWatch:
     joint_position: Array
     imu_ns: int
     heard_ns: tuple[int, ...]
-    jumped_ns: tuple[int, ...]
+    usual: Array
+    doubt: Doubt
 
 
 NOT_REPEATED = (-1,) * (1 + 2 * N)
@@ -81,27 +133,31 @@ def first_watch(readings: SensorReadings) -> SensorWatch:
     """Memory after the first readings."""
     usable = np.where(np.isfinite(readings.joint_position), readings.joint_position, 0.0)
     now = readings.time_ns
-    return SensorWatch(readings, NOT_REPEATED, usable, now, (now,) * (3 * N),
-                       (now - JOINTS_NS,) * N)
+    return SensorWatch(readings, NOT_REPEATED, usable, now, (now,) * (3 * N), usable, NOBODY)
 
 
 def without_frozen(watch: SensorWatch, readings: SensorReadings
                    ) -> tuple[SensorWatch, SensorReadings]:
     """Readings in which those of sensors that freeze or jump are missing (NaN)."""
-    now = readings.time_ns
-    heard, jumped = _heard(watch, readings)
+    heard, jumps = _heard(watch, readings)
+    doubt = watch.doubt
+    if jumps or any(doubt.legs):
+        doubt = _in_doubt(watch, readings, jumps)
     told, since, imu_ns, passed = _without_repeated(watch, readings)
-    if now - max(jumped) < JOINTS_NS:
-        everything = min(jumped) == max(jumped)
-        passed = _without(
-            passed, everything, [now - leg < JOINTS_NS for leg in jumped], everything)
-    return SensorWatch(told, since, _known(watch, passed), imu_ns, heard, jumped), passed
+    if any(doubt.legs):
+        passed = _without(passed, doubt.all_at_once, doubt.legs, doubt.all_at_once)
+    known = _known(watch, passed)
+    usual = watch.usual + _share(1e-9 * (readings.time_ns - watch.readings.time_ns)) * (
+        known - watch.usual)
+    if any(doubt.legs):
+        usual = np.where(np.repeat(doubt.legs, 3), watch.usual, usual)
+    return SensorWatch(told, since, known, imu_ns, heard, usual, doubt), passed
 
 
 def _heard(watch: SensorWatch, readings: SensorReadings
-           ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Stamps at which each joint was heard last, and at which each leg jumped."""
-    last, now, heard, jumping = watch.readings, readings.time_ns, [], set()
+           ) -> tuple[tuple[int, ...], dict[int, float]]:
+    """Stamps at which each joint was heard last, and by how much joints jumped [rad]."""
+    last, now, heard, jumps = watch.readings, readings.time_ns, [], {}
     for i, (q, before, rate, rate_before, heard_ns) in enumerate(zip(
             readings.joint_position.tolist(), last.joint_position.tolist(),
             readings.joint_velocity.tolist(), last.joint_velocity.tolist(), watch.heard_ns,
@@ -114,11 +170,39 @@ def _heard(watch: SensorWatch, readings: SensorReadings
         dt = 1e-9 * (now - heard_ns)
         apart, most = change - 0.5 * dt * (rate + rate_before), APART + PULL * dt * dt
         if apart > most or apart < -most:
-            jumping.add(i // 3)
-    jumped = watch.jumped_ns
-    if jumping:
-        jumped = tuple(now if leg in jumping else stamp for leg, stamp in enumerate(jumped))
-    return tuple(heard), jumped
+            jumps[i] = apart
+    return tuple(heard), jumps
+
+
+def _in_doubt(watch: SensorWatch, readings: SensorReadings, jumps: dict[int, float]) -> Doubt:
+    """Doubt in legs that jump or have jumped, by the jumps of this tick's joints [rad]."""
+    doubt, now, q = watch.doubt, readings.time_ns, readings.joint_position
+    apart = np.zeros(3 * N)
+    apart[list(jumps)] = list(jumps.values())
+    jump = (apart != 0.0).reshape(N, 3).any(axis=1)
+    at_once = doubt.all_at_once or bool(jump.all())
+    jumped = np.where(jump, now, doubt.jumped_ns)
+    since, slipped = 1e-9 * np.repeat(now - jumped, 3), doubt.slipped + apart
+    dt = 1e-9 * (now - watch.readings.time_ns)
+    mean = doubt.told + np.where(np.isfinite(q), np.maximum(
+        dt / np.maximum(since, dt), _share(dt)) * (q - doubt.told), 0.0)
+    alike = (np.abs(slipped) <= APART).reshape(N, 3).all(axis=1) | (
+        np.abs(mean - watch.usual) <= ALIKE).reshape(N, 3).all(axis=1)
+    count = doubt.count + jump
+    odd = np.where(alike & ~jump, doubt.odd_ns, now)
+    legs = (jump | doubt.legs) & (now - odd < JOINTS_NS) & ~(
+        (count >= MANY) & (now - jumped >= CALM_NS))
+    if at_once:
+        legs = np.full(N, legs.any())
+    if not legs.any():
+        return NOBODY
+    return Doubt(tuple(legs.tolist()), at_once, count * legs, jumped, odd,
+                 np.where(np.repeat(legs, 3), slipped, 0.0), mean)
+
+
+def _share(dt: float) -> float:
+    """Share of the newest angle in a mean."""
+    return min(dt / USUAL_S, 1.0)
 
 
 def _without_repeated(watch: SensorWatch, readings: SensorReadings

@@ -242,9 +242,12 @@ class LegControl:
         goal: Array | Triple
         goal_velocity: Array | Triple
         if command.balanced:
-            motion = None
+            motion, told = None, feedback.of_leg(place)
+            if not feedback.felt[place]:  # its foot is where it was told to be
+                told = told._replace(joint_position=(
+                    *state.leg.sent[1:], state.leg.joints.position)[0])
             leg, goal, goal_velocity = self.primitive.step(
-                state.leg, gait, x[place], x_dot[place], r, feedback.of_leg(place), dt)
+                state.leg, gait, x[place], x_dot[place], r, told, dt)
         else:
             motion, leg, goal, goal_velocity = self._motion.step(
                 state.motion, state.leg, command, feedback.measured[joints], dt)

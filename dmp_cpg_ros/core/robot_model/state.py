@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isnan
 
 from dmp_cpg_ros.core.maths import Array
 
@@ -49,6 +50,9 @@ class RobotState:
     joint_loss : ndarray (12,), optional
         Energy that damping and dry friction of each joint have taken since time 0 [J]. These three
         are known where torques are applied more often than states are told: in a simulator.
+    felt_legs : tuple of 4 bool, optional
+        Whose joints an estimator could use, where it could not use all; those of other legs are
+        the last that it could.
 
     Joints, efforts, gyroscope, accelerometer and forces are measured; position, orientation and
     velocities of the base are the truth in a simulator's state and an estimate in a controller's.
@@ -69,6 +73,13 @@ class RobotState:
     joint_work: Array | None = None
     joint_peak_effort: Array | None = None
     joint_loss: Array | None = None
+    felt_legs: tuple[bool, ...] | None = None
+
+    @property
+    def feels_nothing(self) -> bool:
+        """Whether neither joints nor IMU could be used."""
+        return self.felt_legs is not None and not any(self.felt_legs) and isnan(
+            self.measured_rate_in_base[0])
 
     @property
     def measured_rate_in_base(self) -> Array:

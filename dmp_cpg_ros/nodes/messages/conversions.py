@@ -266,6 +266,8 @@ class PostureFeedbackWriter:
     def fill(self, time_ns: int, feedback: PostureFeedback) -> cdr.SerializedJointState:
         """Refill with a feedback; raises DataError when it is not finite."""
         self._position[_JOINTS] = feedback.measured
+        self._velocity[_JOINTS].reshape(len(LEGS), 3)[:] = [
+            (not felt,) for felt in feedback.felt]
         self._position[_FEET] = feedback.shift_in_base.reshape(-1)
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
@@ -293,7 +295,8 @@ class PostureFeedbackReader:
             velocity[_FEET].reshape(len(LEGS), 3)[:, :2], velocity[_BASE],
             self._command.of(position[_COMMAND], velocity[_COMMAND]), position[_JOINTS],
             effort[_FEET].reshape(len(LEGS), 3)[:, 2], tuple(position[_MARGINS].tolist()),
-            _progress(position[_PROGRESS]))
+            _progress(position[_PROGRESS]), tuple(
+                unfelt == 0.0 for unfelt in velocity[_JOINTS][::3].tolist()))
 
 
 def _progress(row: Array) -> Progress:

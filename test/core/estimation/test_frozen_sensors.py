@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from dmp_cpg_ros.core.estimation.frozen import (
+    CALM_NS,
     FROZEN_NS,
     JOINTS_NS,
     first_watch,
@@ -101,9 +102,27 @@ def test_a_turn_rate_that_jumps_is_not_believed_for_a_while() -> None:
     assert not any(seen[:20]) and all(seen[30:])
 
 
+def swing(k: int, told: SensorReadings) -> None:
+    """Let all joints swing as those of a walking robot do."""
+    phase = 2.0 * np.pi * 1e-9 * TICK_NS * k / 0.5 + np.arange(12)
+    told.joint_position[:] = 0.3 * np.sin(phase) + 1e-3 * np.random.default_rng(k).normal(size=12)
+    told.joint_velocity[:] = 0.3 * 2.0 * np.pi / 0.5 * np.cos(phase)
+
+
+def swinging(spoil: Callable[[int, SensorReadings], None]
+             ) -> Callable[[int, SensorReadings], None]:
+    """Spoil readings of joints that swing."""
+    def both(k: int, told: SensorReadings) -> None:
+        swing(k, told)
+        spoil(k, told)
+    return both
+
+
 def judged(spoil: Callable[[int, SensorReadings], None], ticks: int = 500) -> list[SensorReadings]:
     """Readings of a run as they were passed on, each spoiled before by its tick."""
-    watch, passed = first_watch(readings(0)), []
+    first, passed = readings(0), []
+    spoil(0, first)
+    watch = first_watch(first)
     for k in range(1, ticks):
         told = readings(k)
         spoil(k, told)
@@ -117,22 +136,48 @@ def judged(spoil: Callable[[int, SensorReadings], None], ticks: int = 500) -> li
 def test_a_leg_whose_encoders_tell_anything_is_missing_until_a_while_after(joint: int | slice
                                                                            ) -> None:
     def spoil(k: int, told: SensorReadings) -> None:
-        if 100 <= k < 200:
+        if 1000 <= k < 1100:
             told.joint_position[joint] += 2.0 * np.random.default_rng(k).normal()
 
-    passed, again = judged(spoil), 200 + JOINTS_NS // TICK_NS
-    legs = np.array([sound.usable_legs for sound in passed])
-    assert legs[:, (0, 2, 3)].all() and legs[:99, 1].all() and legs[again:, 1].all()
-    assert not legs[99:199, 1].any()
-    assert all(sound.imu_is_usable and all(sound.usable_contacts) for sound in passed)
+    for passed, again_ns in ((judged(spoil, 2000), CALM_NS),
+                             (judged(swinging(spoil), 2000), 3 * JOINTS_NS)):
+        again = 1100 + again_ns // TICK_NS
+        legs = np.array([sound.usable_legs for sound in passed])
+        assert legs[:, (0, 2, 3)].all() and legs[:999, 1].all() and legs[again:, 1].all()
+        assert not legs[999:1099 + JOINTS_NS // TICK_NS - 1, 1].any()
+        assert all(sound.imu_is_usable and all(sound.usable_contacts) for sound in passed)
 
 
-def test_an_encoder_that_is_off_from_one_tick_to_the_next_is_not_believed_for_a_while() -> None:
+@pytest.mark.parametrize('offset', [0.15, -0.4])
+@pytest.mark.parametrize('legs', [(2,), (0, 1, 2, 3)])
+def test_an_offset_that_comes_in_one_tick_is_believed_only_once_it_is_gone(
+        legs: tuple[int, ...], offset: float) -> None:
+    """However long it lasts; with all legs nothing else is believed either."""
+    joints = [3 * leg + 1 for leg in legs]
+
     def spoil(k: int, told: SensorReadings) -> None:
-        told.joint_position[7] += 0.15 * (k >= 100)
+        told.joint_position[joints] += offset * (200 <= k < 1500)
 
-    legs, again = [sound.usable_legs[2] for sound in judged(spoil)], 99 + JOINTS_NS // TICK_NS
-    assert all(legs[:99]) and not any(legs[99:again]) and all(legs[again:])
+    for passed in (judged(spoil, 2000), judged(swinging(spoil), 2000)):
+        sound = np.array([of.usable_legs for of in passed])[:, legs].all(axis=1)
+        again = 1499 + JOINTS_NS // TICK_NS
+        assert sound[:199].all() and not sound[199:again].any() and sound[again:].all()
+        imu = np.array([of.imu_is_usable for of in passed])
+        np.testing.assert_array_equal(imu, sound if len(legs) == 4 else True)
+
+
+def test_joints_that_come_back_elsewhere_in_their_stride_are_believed_again() -> None:
+    """What is told a tenth of a second late jumps by one amount and back by another."""
+    def spoil(k: int, told: SensorReadings) -> None:
+        if 1300 <= k < 1420:
+            late = readings(k)
+            swing(k - 25, late)
+            told.joint_position[:], told.joint_velocity[:] = (
+                late.joint_position, late.joint_velocity)
+
+    sound = [all(of.usable_legs) for of in judged(swinging(spoil), 2000)]
+    assert all(sound[:1299]) and not any(sound[1299:1419 + JOINTS_NS // TICK_NS])
+    assert all(sound[1419 + 3 * JOINTS_NS // TICK_NS:])
 
 
 def test_nothing_is_believed_of_what_makes_all_legs_jump_at_once() -> None:
