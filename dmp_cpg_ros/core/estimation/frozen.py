@@ -42,18 +42,18 @@ JUMP, JUMPS_NS = 8.0, 100_000_000
 APART, PULL, JOINTS_NS = 0.06, 2500.0, 600_000_000
 """Change of a joint's angle apart from what its velocity says [rad], more by that [rad/s²] times
 the squared time between the readings, that is none, and for how long its leg is not believed at
-least [ns]. Accelerations have made 0.007 rad in 4 ms in a walk and 0.018 rad in a fall, 1200 rad/s²
-at most.
+least [ns]. Accelerations have made 0.007 rad in 4 ms in a walk and 0.018 rad in a fall, at most
+1200 rad/s².
 """
 
 MANY, CALM_NS = 3, 2_000_000_000
-"""Ticks with jumps from which an encoder tells anything, and for how long it must not have jumped to
-be believed then [ns].
+"""Ticks with jumps from which an encoder tells anything, and for how long it must not have jumped
+to be believed then [ns].
 """
 
 ALIKE, USUAL_S = 0.075, 1.0
-"""Distance of two mean angles within which they are the same [rad], and the time over which they are
-taken [s].
+"""Distance of two mean angles within which they are the same [rad], and the time over which they
+are taken [s].
 """
 
 MOVING = 0.5

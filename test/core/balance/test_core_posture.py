@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from core_examples import GAITS, GRAVITY, TICK, network, quadruped, standing_state
@@ -118,6 +120,33 @@ def test_standing_still_the_feet_carry_the_weight_and_nothing_else(gait: str) ->
     wrench = wrench_of(forces_of(feedback.torque), FEET)
     assert np.allclose(wrench, [0.0, 0.0, WEIGHT, 0.0, 0.0, 0.0], atol=0.01 * WEIGHT)
     assert not feedback.shift_in_base.any() and not feedback.correction.any()
+
+
+@pytest.mark.parametrize('gait', GAITS)
+def test_who_feels_nothing_carries_its_weight_as_planned(gait: str) -> None:
+    """Whatever it was told last of joints, attitude and velocity."""
+    of, x, state = controller(), network(gait).locked_state(), standing_state(ROBOT)
+    felt = replace(
+        state, joint_position=state.joint_position + 0.3, felt_legs=(False,) * 4,
+        base_velocity_in_base=np.array((1.0, 0.3, 0.0)), gyro_in_base=np.full(3, np.nan),
+        base_rate_in_base=np.ones(3), base_quaternion=turned(
+            state.base_quaternion, np.array((0.2, -0.1, 0.0))))
+    told = [of.step(of.initial_state(), of_state, GAITS[gait], x, 0.0 * x, np.zeros(3), TICK)[1]
+            for of_state in (state, felt)]
+    assert np.allclose(told[1].torque, told[0].torque, atol=1e-6)
+    assert np.allclose(told[1].measured, state.joint_position, atol=1e-6)
+    assert told[0].felt == (True,) * 4 and told[1].felt == (False,) * 4
+
+
+def test_a_leg_that_is_not_felt_is_where_the_plan_has_it() -> None:
+    of, x, state = controller(), network('trot').locked_state(), standing_state(ROBOT)
+    angles = state.joint_position.copy()
+    angles[3:6] += 0.3
+    _, feedback = of.step(of.initial_state(), replace(
+        state, joint_position=angles, felt_legs=(True, False, True, True)), GAITS['trot'], x,
+        0.0 * x, np.zeros(3), TICK)
+    assert np.allclose(feedback.measured, state.joint_position, atol=1e-6)
+    assert feedback.felt == (True, False, True, True)
 
 
 @pytest.mark.parametrize(('change', 'component', 'sign'), [
