@@ -39,7 +39,8 @@ MOVEMENT_ROWS = tuple(f'movement/{name}' for name in MOVEMENT_NAMES)
 POSTURE_ROWS = (
     *JOINT_NAMES, *SHIFT_ROWS, *CORRECTION_ROWS, *MARGIN_ROWS, *PROGRESS_ROWS, *MODE_ROWS,
     *MOVEMENT_ROWS)
-"""Of ``posture_feedback``. A margin's position is that of the capture point to an edge of the
+"""Of ``posture_feedback``. A joint's velocity is 1 where its angle is planned instead of measured,
+else 0. A margin's position is that of the capture point to an edge of the
 support polygon [m]; those of the progress are the body's velocity [m/s] and how far the leading
 feet are behind [m]. A mode's position is 1 while it lasts, else 0; a movement's is the
 phase of its canonical system, 0 while it does not move the legs.
