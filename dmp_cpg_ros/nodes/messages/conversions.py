@@ -50,7 +50,8 @@ _FEET = slice(_JOINTS.stop, _JOINTS.stop + len(layouts.SHIFT_ROWS))
 _BASE = slice(_FEET.stop, _FEET.stop + len(layouts.CORRECTION_ROWS))
 _MARGINS = slice(_BASE.stop, _BASE.stop + len(layouts.MARGIN_ROWS))
 _PROGRESS = slice(_MARGINS.stop, _MARGINS.stop + len(layouts.PROGRESS_ROWS))
-_COMMAND = slice(_PROGRESS.stop, None)
+_FELT = slice(_PROGRESS.stop, _PROGRESS.stop + len(layouts.FELT_ROWS))
+_COMMAND = slice(_FELT.stop, None)
 
 
 def read_twist(message: Twist) -> tuple[float, float, float]:
@@ -266,14 +267,13 @@ class PostureFeedbackWriter:
     def fill(self, time_ns: int, feedback: PostureFeedback) -> cdr.SerializedJointState:
         """Refill with a feedback; raises DataError when it is not finite."""
         self._position[_JOINTS] = feedback.measured
-        self._velocity[_JOINTS].reshape(len(LEGS), 3)[:] = [
-            (not felt,) for felt in feedback.felt]
         self._position[_FEET] = feedback.shift_in_base.reshape(-1)
         self._velocity[_FEET].reshape(len(LEGS), 3)[:, :2] = feedback.drift_in_base
         self._velocity[_BASE] = feedback.correction
         self._position[_MARGINS] = feedback.margins
         velocity, behind = feedback.progress or Progress()
         self._position[_PROGRESS] = (*velocity, behind)
+        self._position[_FELT] = feedback.felt
         self._effort[_JOINTS] = feedback.torque
         self._effort[_FEET].reshape(len(LEGS), 3)[:, 2] = feedback.foot_force
         self._position[_COMMAND], self._velocity[_COMMAND] = layouts.command_rows(feedback.command)
@@ -296,7 +296,7 @@ class PostureFeedbackReader:
             self._command.of(position[_COMMAND], velocity[_COMMAND]), position[_JOINTS],
             effort[_FEET].reshape(len(LEGS), 3)[:, 2], tuple(position[_MARGINS].tolist()),
             _progress(position[_PROGRESS]), tuple(
-                unfelt == 0.0 for unfelt in velocity[_JOINTS][::3].tolist()))
+                felt > 0.0 for felt in position[_FELT].tolist()))
 
 
 def _progress(row: Array) -> Progress:
