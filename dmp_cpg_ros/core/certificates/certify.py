@@ -187,9 +187,7 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
 
 def certificate_of(s: Setting, legs: Collection[int] = (), *,
                    required_only: bool = False) -> Certificate:
-    """Compute the certificate of a setting. Where the leg is chosen, of each inequality the worst
-    over those that may be: some that are given, or the eligible ones.
-    """
+    """Certificate of a setting; where the leg is chosen, the worst of those given or eligible."""
     p = s.parameters.inhibition
     if not p.auto:
         return _certificate(s, required_only)
@@ -221,6 +219,8 @@ def _certificate(s: Setting, required_only: bool) -> Certificate:
     rows = of_network.network_inequalities(s, analysis)
     step = stepped_network(s, analysis) if all(row.holds for row in rows) else None
     stop = time_to_rest(s, analysis.capture, rest, step)
+    if stop >= LONGEST_STOP:  # a step that is proved to contract too slowly is of no use
+        step, stop = None, time_to_rest(s, analysis.capture, rest)
     start = time_to_walking(s, found, rest)
     if not required_only:
         rows.append(of_network.capture_anywhere(s, analysis))
