@@ -95,24 +95,26 @@ def read_description(model: mujoco.MjModel, file: RobotFile) -> RobotDescription
         belly_depth=_belly_depth(model, ids.base, at_zero), joint_names=file.joint_names)
     standing = pose(model, ids, home_joint_position(description))
     com, inertia = _composite_inertia(model, standing, ids.base)
-    kd = _damping(model, standing, ids, file, DAMPING_TIME * np.sqrt(leg_length / GRAVITY)
+    joints = model.jnt_dofadr[ids.joints]
+    joint_inertia = np.zeros((model.nv, model.nv))
+    mujoco.mj_crb(model, standing)
+    mujoco.mj_fullM(model, standing, joint_inertia)
+    free = 1.0 / np.diag(np.linalg.inv(joint_inertia))[joints].reshape(4, 3)  # 1/(M⁻¹)_jj
+    kd = _damping(model, file, free.min(axis=0), DAMPING_TIME * np.sqrt(leg_length / GRAVITY)
                   * description.kp)
     radius = _rolling_radius(model, standing, ids)
-    if radius is not None:
-        legs = tuple(replace(leg, foot_radius=radius) for leg in legs)
+    legs = tuple(
+        replace(leg, foot_radius=leg.foot_radius if radius is None else radius,
+                swing_inertia=float(joint_inertia[hip, hip]))
+        for leg, hip in zip(legs, joints.reshape(4, 3)[:, 1], strict=True))
     return replace(description, legs=legs, base_inertia=inertia, com_in_base=com, kd=kd)
 
 
-def _damping(model: mujoco.MjModel, standing: mujoco.MjData, ids: ModelIds, file: RobotFile,
-             usual: Array) -> Array:
+def _damping(model: mujoco.MjModel, file: RobotFile, free: Array, usual: Array) -> Array:
     """Damping (3,) of the drive [N m s/rad]: the file's, or the usual one, less where it would
-    stop a joint of a swinging leg within a physics step; I = 1/(M⁻¹)_jj, the least of four legs.
+    stop a joint of a swinging leg, of the inertia ``free`` (3,), within a physics step.
     """
-    inertia = np.zeros((model.nv, model.nv))
-    mujoco.mj_crb(model, standing)
-    mujoco.mj_fullM(model, standing, inertia)
-    free = 1.0 / np.diag(np.linalg.inv(inertia))[model.jnt_dofadr[ids.joints]].reshape(4, 3)
-    stopping = free.min(axis=0) / model.opt.timestep
+    stopping = free / model.opt.timestep
     if file.kd is None:
         return np.minimum(usual, DAMPING_SHARE * stopping)
     if (np.array(file.kd) >= 2.0 * stopping).any():

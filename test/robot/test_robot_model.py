@@ -12,7 +12,8 @@ from dmp_cpg_ros.robot.model_loader import load_model
 from dmp_cpg_ros.robot.model_parts import find_ids
 from dmp_cpg_ros.robot.model_reader import load_description, pose
 from dmp_cpg_ros.robot.mujoco_import import mujoco
-from dmp_cpg_ros.robot.robot_file import own_robot_file
+from dmp_cpg_ros.robot.robot_file import load_robot_file, own_robot_file
+from dmp_cpg_ros.robot.start_pose import home_joint_position
 
 # Cheetah-Software, MiniCheetah.h, left legs: mass [kg], centre of mass [m], inertia [1e-6 kg m^2].
 PUBLISHED = {
@@ -178,3 +179,19 @@ def test_a_model_for_accelerators_is_solved_as_any_other(model, tmp_path):
         mujoco.mj_step(each, state, 200)
         data.append(state.qpos.copy())
     np.testing.assert_array_equal(*data)
+
+
+def test_the_inertia_that_a_swing_moves_is_that_of_the_leg_about_its_hip():
+    """By the kinetic energy of a robot that turns one hip and nothing else."""
+    description = load_description(own_robot_file())
+    model = load_model(own_robot_file().model, 'base_link')
+    data = pose(model, find_ids(model, load_robot_file(own_robot_file())),
+                home_joint_position(description))
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    for i, leg in enumerate(description.legs):
+        data.qvel[:] = 0.0
+        data.qvel[6 + 3 * i + 1] = 2.0
+        mujoco.mj_forward(model, data)
+        # that of a stance in which feet are not rolled over yet
+        assert leg.swing_inertia == pytest.approx(2.0 * data.energy[1] / 2.0**2, rel=2e-3)
+        assert leg.swing_inertia > leg.rotor_inertia[1]

@@ -15,9 +15,6 @@ from __future__ import annotations
 from math import floor, pi
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 
 
@@ -47,42 +44,6 @@ LEVEL = Bounce(0.0, 0.0, 0.0)
 """Plan of a gait without flight phases."""
 
 
-def stance_groups(lag: NDArray[np.float64]) -> int:
-    """Number of groups of legs that stand in turn, evenly over the cycle; 0 where it is uneven.
-
-    Parameters
-    ----------
-    lag : ndarray (n,)
-        Fractions of a cycle by which the legs follow the first.
-
-    Returns
-    -------
-    int
-        1 for a pronk, 2 for a trot, a pace and a bound.
-    """
-    places = np.unique(np.round(lag % 1.0, 9))
-    gaps = np.diff(np.append(places, places[0] + 1.0))
-    return len(places) if np.ptp(gaps) < 1e-6 else 0
-
-
-def two_sided(lag: NDArray[np.float64], duty: float, grid: int = 400) -> float:
-    """Share of the stance of some foot in which feet of both sides stand.
-
-    Parameters
-    ----------
-    lag : ndarray (4,)
-        Fractions of a cycle by which fl, fr, rl, rr follow the first.
-    duty : float
-        Duty factor β.
-    grid : int
-        Number of phases that are looked at.
-    """
-    at = (np.arange(grid)[:, None] / grid - lag + 0.5) % 1.0 - 0.5
-    left, right = (np.any((np.abs(at) > 0.5 * (1.0 - duty))[:, legs], axis=1)
-                   for legs in ([0, 2], [1, 3]))
-    return float(np.sum(left & right) / max(1, np.sum(left | right)))
-
-
 def planned_bounce(cycle_position: float, groups: int, duty: float, omega: float) -> Bounce:
     """Bounce of the body, from where any leg is in its cycle.
 
@@ -91,7 +52,7 @@ def planned_bounce(cycle_position: float, groups: int, duty: float, omega: float
     cycle_position : float
         0 at the leg's mid-swing, in [−1/2, 1/2].
     groups : int
-        As from :func:`stance_groups`.
+        As from :func:`~dmp_cpg_ros.core.gait.lags.stance_groups`.
     duty : float
         Duty factor β; there are flights where groups · β < 1.
     omega : float

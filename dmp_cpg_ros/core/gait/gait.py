@@ -21,8 +21,9 @@ import numpy as np
 
 from dmp_cpg_ros.core.canonical.phase import wrapped
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce, stance_groups, two_sided
-from dmp_cpg_ros.core.gait.speed_limit import within_limit
+from dmp_cpg_ros.core.gait.com_height import Bounce, planned_bounce
+from dmp_cpg_ros.core.gait.lags import rest_phase, stance_groups, two_sided
+from dmp_cpg_ros.core.gait.speed_limit import fastest_swing, swing_acceleration, within_limit
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
@@ -49,6 +50,8 @@ class BodyScale:
         Distance of a neutral place from the middle [m].
     rolling : float
         (I_xx/I_yy) (y/x), with I the body's inertia and x, y the distances of its feet.
+    swing : float
+        Acceleration that the hips can give the feet [m/s^2]; infinite where it is not known.
     """
 
     leg_length: float
@@ -56,6 +59,7 @@ class BodyScale:
     room_ahead: float = inf
     room_across: float = inf
     rolling: float = 1.0
+    swing: float = inf
 
     def speed(self, dimensionless: float) -> float:
         """Speed u √(g l) of a dimensionless one u [m/s]."""
@@ -114,8 +118,6 @@ class CycleOfLegs(ABC):
     rest : float
         Cycle position of fl at phase 0, where inhibition holds it: all legs are then as far from
         their mid-swing as can be.
-    highest_speed : float
-        Dimensionless foot speed that is never exceeded.
     phases : ndarray (4,)
         Locked oscillator phases relative to fl [rad].
     moving_phases : ndarray (4,) or None
@@ -128,7 +130,6 @@ class CycleOfLegs(ABC):
     """
 
     rest: float
-    highest_speed: float
     phases: Array
     moving_phases: Array | None = None
     apart: float = 1.0
@@ -145,9 +146,13 @@ class CycleOfLegs(ABC):
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed [m/s]."""
 
+    @abstractmethod
+    def highest(self, scale: BodyScale) -> float:
+        """Dimensionless foot speed that is never exceeded on a robot."""
+
     def own_omegas(self, omega: float) -> list[float]:
-        """Frequencies with which the legs go through their cycles when the gait's is ω: the
-        same, other than while gaits change [rad/s].
+        """Frequencies of the legs' cycles when the gait's is ω: the same, other than while gaits
+        change [rad/s].
         """
         return [omega] * len(LEGS)
 
@@ -162,9 +167,9 @@ class CycleOfLegs(ABC):
         kept, for the body and its legs ask in turn.
         """
         v_x, v_y, gamma = r.tolist()
-        asked = (v_x, v_y, gamma, scale.leg_length, scale.hip_radius)
+        asked = (v_x, v_y, gamma, scale.leg_length, scale.hip_radius, scale.rolling, scale.swing)
         if self._paced is None or self._paced[0] != asked:
-            velocity = scale.limited((v_x, v_y, gamma), self.highest_speed, apart=self.apart)
+            velocity = scale.limited((v_x, v_y, gamma), self.highest(scale), apart=self.apart)
             speed = scale.foot_speed(*velocity)
             omega, duty = self.omega(speed, scale), self.duty(speed, scale)
             pace = Pace(velocity, omega, self.own_omegas(omega), duty)
@@ -175,8 +180,7 @@ class CycleOfLegs(ABC):
     def cycle_position(self, phi: Array | float) -> Array:
         """Where legs are in their cycle at phases φ (...) [rad]: 0 at mid-swing, in [−1/2, 1/2).
 
-        The phase φ = 0 of oscillator fl, where inhibition holds it, is the moment at which all
-        legs are farthest from mid-swing.
+        At phase 0 of fl, where inhibition holds it, all legs are farthest from mid-swing.
         """
         return wrapped(np.asarray(phi) + 2.0 * np.pi * self.rest) / (2.0 * np.pi)
 
@@ -208,7 +212,8 @@ class Gait(CycleOfLegs):
         How often in a cycle feet come down.
     highest_speed : float
         Dimensionless foot speed that the gait never exceeds, not below the last of ``speed``, so
-        that the cadence is that of the tables with and without it; infinite for none.
+        that the cadence is that of the tables with and without it; infinite for none. What holds
+        on a robot is :meth:`highest`.
     """
 
     name: str
@@ -225,6 +230,8 @@ class Gait(CycleOfLegs):
     apart: float = field(init=False, default=1.0)
     cadence_scale: float = field(init=False, default=1.0)
     _tables: tuple[list[float], ...] = field(init=False, repr=False, compare=False)
+    _nominal: list[float] = field(init=False, repr=False, compare=False)
+    _highest: tuple[float, float] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Validate and find the rest phase."""
@@ -249,10 +256,11 @@ class Gait(CycleOfLegs):
             if not holds:
                 raise ParameterError(f"gait '{self.name}': {rule}")
         vars(self).update(
-            rest=_rest_phase(lag), phases=-2.0 * np.pi * lag, groups=stance_groups(lag),
+            rest=rest_phase(lag), phases=-2.0 * np.pi * lag, groups=stance_groups(lag),
             apart=float(stance_groups(lag) != 1), steps=len(np.unique(np.round(lag % 1.0, 9))),
             two_sided=two_sided(lag, float(self.duty_factor.min())),
-            _tables=tuple(table.tolist() for table in tables))
+            _tables=tuple(table.tolist() for table in tables),
+            _nominal=self.cadence.tolist(), _highest=(inf, self.highest_speed))
 
     @classmethod
     def from_mapping(cls, name: str, values: Mapping[str, Any]) -> Gait:
@@ -302,9 +310,7 @@ class Gait(CycleOfLegs):
         return self, 0.0
 
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
-        """Angular frequency ω of the oscillators at a foot speed, as from
-        :meth:`BodyScale.foot_speed` [m/s], in [rad/s].
-        """
+        """Angular frequency ω of the oscillators at a foot speed [rad/s]."""
         root = (GRAVITY / scale.leg_length) ** 0.5
         speed = foot_speed / (root * scale.leg_length)
         return tau * root * _interpolated(speed, self._tables[0], self._tables[1])
@@ -314,10 +320,20 @@ class Gait(CycleOfLegs):
         return _interpolated(
             foot_speed / (GRAVITY * scale.leg_length) ** 0.5, self._tables[0], self._tables[2])
 
-    def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
-        """How the body is planned to rise and fall, see
-        :mod:`~dmp_cpg_ros.core.gait.com_height`.
+    def highest(self, scale: BodyScale) -> float:
+        """Dimensionless foot speed that is never exceeded on a robot: the gait's, or the one for
+        which hips can swing the legs without a factor on the cadence; the last answer is kept.
         """
+        if self._highest[0] != scale.swing:
+            speeds, _, duties = self._tables
+            vars(self)['_highest'] = scale.swing, fastest_swing(
+                lambda u: swing_acceleration(u, _interpolated(u, speeds, self._nominal),
+                                             _interpolated(u, speeds, duties)),
+                scale.swing / GRAVITY, self.highest_speed)
+        return self._highest[1]
+
+    def bounce(self, cycle_position: float, duty: float, omega: float) -> Bounce:
+        """How the body rises and falls, see :mod:`~dmp_cpg_ros.core.gait.com_height`."""
         return planned_bounce(cycle_position, self.groups, duty, omega)
 
 
@@ -332,17 +348,3 @@ def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:
         return ys[-1]
     share = (at - xs[place - 1]) / (xs[place] - xs[place - 1])
     return ys[place - 1] + share * (ys[place] - ys[place - 1])
-
-
-def _rest_phase(lag: Array) -> float:
-    """Cycle position of fl at which the leg nearest to its mid-swing is as far from it as
-    possible.
-
-    Of several such positions the one at which fl itself is farthest from mid-swing, and of two the
-    earlier one.
-    """
-    mid_swings = np.unique(np.round(lag % 1.0, 9))  # cycle positions of fl
-    gaps = np.diff(np.append(mid_swings, mid_swings[0] + 1.0))
-    middles = (mid_swings + 0.5 * gaps)[gaps > gaps.max() - 1e-6] % 1.0
-    own = np.abs((middles + 0.5) % 1.0 - 0.5)
-    return float(min(middles[own > own.max() - 1e-6]))

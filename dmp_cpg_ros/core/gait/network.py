@@ -169,7 +169,7 @@ class GaitNetwork:
     @property
     def highest_speed(self) -> float:
         """Foot speed at which the gait in force is held [m/s]."""
-        return self.scale.speed(self.gait.highest_speed)
+        return self.scale.speed(self.gait.highest(self.scale))
 
     def omega(self, r: Array) -> float:
         """Angular frequency ω [rad/s] at a reference r = (v_x, v_y, γ), ndarray (3,)."""

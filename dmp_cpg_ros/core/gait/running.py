@@ -320,7 +320,8 @@ class RunningGait:
             return network, x
         v_x, v_y, gamma = r.tolist()
         speed = self.scale.foot_speed(v_x, v_y, gamma, wanted.apart)
-        most = wanted.highest_speed if self.choice.auto_gait else changing_speed(gait, wanted)
+        most = (wanted.highest(self.scale) if self.choice.auto_gait
+                else changing_speed(gait, wanted, self.scale))
         if speed > HASTE * self.scale.speed(most):
             return network, x
         transition = self.gaits.transition(self.gaits.named(gait.name), wanted)

@@ -24,13 +24,29 @@ speed sideways and from turning then counts (I_yy/I_xx) (x/y) times in s, with x
 distances, else twice.
 
 Velocity and turn rate are shortened alike: a curve stays the same curve.
+
+The highest speed is that of the gait, or less on a robot that cannot swing its legs as fast. The
+swing is a cubic from one end of the stance, u β/f long, to the other within (1 − β)/f, and meets
+the ground's speed −u at both (:mod:`~dmp_cpg_ros.core.transformation.foot_path`); so at its ends
+the foot is accelerated by
+
+    6 (u β/f + u (1 − β)/f) (f/(1 − β))² = 6 u f/(1 − β)² ≤ τ l/I ,
+
+with τ the torque of the hip joint, I the leg's inertia about it and l the height of the hips: what
+the hip alone gives to a foot under it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import hypot, inf, sqrt
 
+from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.maths.vec3 import Triple
+
+BEYOND = 5.0
+"""Dimensionless speed beyond any of legged animals and robots, to look for a limit up to twice it.
+"""
 
 
 def within_limit(velocity: Triple, speed: float, most: float, tightest: float = inf) -> Triple:
@@ -75,3 +91,54 @@ def blended_limit(before: float, after: float, weight: float) -> float:
     """
     slowness = (1.0 - weight) / before + weight / after
     return 1.0 / slowness if slowness > 0.0 else inf
+
+
+def swing_acceleration(speed: float, cadence: float, duty: float) -> float:
+    """Acceleration of a foot at both ends of its swing, 6 u f/(1 − β)².
+
+    Parameters
+    ----------
+    speed : float
+        u [m/s], or u/√(g l).
+    cadence : float
+        f [1/s], or f √(l/g).
+    duty : float
+        β in (0, 1).
+
+    Returns
+    -------
+    float
+        [m/s^2], or as a share of g.
+    """
+    return 6.0 * speed * cadence / (1.0 - duty) ** 2
+
+
+def fastest_swing(needed: Callable[[float], float], available: float, highest: float,
+                  grid: int = 64) -> float:
+    """Lowest speed from which on swinging the legs takes more than there is.
+
+    Parameters
+    ----------
+    needed : callable (float) → float
+        Acceleration that a speed takes, 0 at rest.
+    available : float
+        That there is, in the same unit.
+    highest : float
+        Speed that is not exceeded anyway; infinite for none.
+    grid : int
+        Number of steps in which it is looked for.
+
+    Returns
+    -------
+    float
+        ``highest`` where none below takes more.
+    """
+    if available == inf:
+        return highest
+    last, end = 0.0, highest if highest < inf else 2.0 * BEYOND
+    for i in range(1, grid + 1):
+        speed = end * i / grid
+        if needed(speed) > available:
+            return last_that_holds(lambda u: needed(u) <= available, last, speed, 50)
+        last = speed
+    return highest

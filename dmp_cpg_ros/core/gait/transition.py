@@ -162,7 +162,6 @@ class BlendedGait(CycleOfLegs):
     weight: float = field(init=False, repr=False, compare=False)
     turning: float = field(init=False, repr=False, compare=False)
     rest: float = field(init=False, repr=False, compare=False)
-    highest_speed: float = field(init=False, repr=False, compare=False)
     apart: float = field(init=False, repr=False, compare=False)
     two_sided: float = field(init=False, repr=False, compare=False)
 
@@ -176,8 +175,6 @@ class BlendedGait(CycleOfLegs):
         phases = way.before.phases + (2.0 * np.pi * weight) * way.offset_arcs
         vars(self).update(
             weight=weight, turning=turning, rest=way.before.rest + weight * way.rest_arc,
-            highest_speed=blended_limit(
-                way.before.highest_speed, way.after.highest_speed, weight),
             apart=way.before.apart + weight * (way.after.apart - way.before.apart),
             two_sided=way.before.two_sided + weight * (
                 way.after.two_sided - way.before.two_sided),
@@ -233,16 +230,21 @@ class BlendedGait(CycleOfLegs):
         omega = omega + self.turning * self.transition.common_arc
         return omega + self.turning * self.transition.offset_arcs
 
+    def highest(self, scale: BodyScale) -> float:
+        """Dimensionless foot speed that is never exceeded on a robot, between those of both."""
+        before, after = self.transition.before, self.transition.after
+        return blended_limit(before.highest(scale), after.highest(scale), self.weight)
+
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
         """Angular frequency ω at a foot speed, as :meth:`Gait.omega` [rad/s]."""
-        foot_speed = min(foot_speed, scale.speed(self.highest_speed))
+        foot_speed = min(foot_speed, scale.speed(self.highest(scale)))
         before, after = self.transition.before, self.transition.after
         return self.cadence_scale * self._blended(
             before.omega(foot_speed, scale), after.omega(foot_speed, scale))
 
     def duty(self, foot_speed: float, scale: BodyScale) -> float:
         """Duty factor β at a foot speed, as :meth:`Gait.duty`."""
-        foot_speed = min(foot_speed, scale.speed(self.highest_speed))
+        foot_speed = min(foot_speed, scale.speed(self.highest(scale)))
         before, after = self.transition.before, self.transition.after
         return self._blended(before.duty(foot_speed, scale), after.duty(foot_speed, scale))
 
@@ -266,15 +268,15 @@ GaitInForce = Gait | BlendedGait
 """What phases are read in."""
 
 
-def changing_speed(gait: GaitInForce, wanted: Gait) -> float:
-    """Largest foot speed while a gait changes into the one that is wanted, in the form of
-    ``highest_speed``; infinite when it is in force, or no gait has a limit.
+def changing_speed(gait: GaitInForce, wanted: Gait, scale: BodyScale) -> float:
+    """Largest foot speed on a robot while a gait changes into the one that is wanted, in the form
+    of ``highest_speed``; infinite when it is in force, or no gait has a limit.
     """
     if gait.name == wanted.name:
         return inf
     ends = (gait.transition.before, gait.transition.after) if isinstance(
         gait, BlendedGait) else (gait,)
-    return CHANGING * min(each.highest_speed for each in (*ends, wanted))
+    return CHANGING * min(each.highest(scale) for each in (*ends, wanted))
 
 
 def arcs_between(places: Array, new_places: Array, duty: float, new_duty: float) -> Array:

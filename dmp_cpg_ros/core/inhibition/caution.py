@@ -85,6 +85,6 @@ def changing_share(network: GaitNetwork, wanted: Gait, command: tuple[float, flo
     """
     if network.gait.name == wanted.name:
         return 1.0
-    most = network.scale.speed(changing_speed(network.gait, wanted))
+    most = network.scale.speed(changing_speed(network.gait, wanted, network.scale))
     speed = network.scale.foot_speed(*command, wanted.apart)
     return 1.0 if speed <= most else most / speed

@@ -88,7 +88,9 @@ class CommandGate:
     def follow(self, parameters: ReferenceParameters, gaits: Sequence[Gait]) -> None:
         """Take new limits; they hold for the next command, those of the gait at once."""
         self.parameters = parameters
-        self._fastest = max(gaits, key=lambda gait: gait.highest_speed) if gaits else None
+        scale, self._fastest = self._scale, None
+        if gaits and scale is not None:
+            self._fastest = max(gaits, key=lambda gait: gait.highest(scale))
 
     def accept(self, v_x: float, v_y: float, gamma: float) -> None:
         """Take a new command; it acts from the next :meth:`at` on.
@@ -127,7 +129,7 @@ class CommandGate:
             return self._command
         gait = self._fastest
         limited = self._scale.limited(
-            self._command, gait.highest_speed, self.parameters.max_curve * gait.two_sided,
+            self._command, gait.highest(self._scale), self.parameters.max_curve * gait.two_sided,
             gait.apart)
         if limited != self._command:
             self.limited_by = 'gait'

@@ -43,6 +43,9 @@ class LegGeometry:
         robot stands: its radius, less the compression of soft feet [m].
     damping : ndarray (3,)
         Viscous friction of the joints, which their drives may make up for [N m s/rad].
+    swing_inertia : float
+        Of the leg about its hip joint while the robot stands, with the rotor [kg m^2]; 0 where it
+        is not known.
     """
 
     name: str
@@ -59,6 +62,7 @@ class LegGeometry:
     rotor_inertia: Array
     foot_radius: float
     damping: Array = field(default_factory=lambda: np.zeros(3))
+    swing_inertia: float = 0.0
 
 
 @dataclass(frozen=True)

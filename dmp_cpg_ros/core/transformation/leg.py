@@ -9,6 +9,7 @@ Jacobian.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -308,10 +309,12 @@ def body_scale(description: RobotDescription) -> BodyScale:
     straight, depth = (kinematics.thigh_length + kinematics.shank_length,
                        hip_height - geometry.foot_radius)
     x, y = (abs(float(place)) for place in foothold[:2])
+    swing = min((float(leg.torque_limit[1]) * hip_height / leg.swing_inertia
+                 for leg in description.legs if leg.swing_inertia > 0.0), default=inf)
     return BodyScale(
         hip_height, float(np.hypot(foothold[0], foothold[1])),
         float(np.sqrt(max(straight * straight - depth * depth, 0.0))), y,
-        float(inertia[0] / inertia[1]) * y / x)
+        float(inertia[0] / inertia[1]) * y / x, swing)
 
 
 def nominal_foothold(description: RobotDescription, leg: str) -> Array:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.core.gait.com_height import LEVEL, planned_bounce, stance_groups
+from dmp_cpg_ros.core.gait.com_height import LEVEL, planned_bounce
+from dmp_cpg_ros.core.gait.lags import stance_groups
 from dmp_cpg_ros.core.gait.transition import GaitTransition
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.studies.walking_trials import relative_error, steady

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.com_height import two_sided
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.lags import two_sided
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.suite import load_gait

@@ -247,6 +247,6 @@ def test_a_blend_takes_the_place_of_a_gait() -> None:
     """Whoever reads phases asks both the same questions."""
     blend = GaitTransition(GAITS['trot'], GAITS['walk']).at(0.5, 0.1)
     for name in ('omega', 'duty', 'own_omegas', 'oscillator_omegas', 'following', 'moving_phases',
-                 'rest_rate', 'phases', 'highest_speed', 'pace',
+                 'rest_rate', 'phases', 'highest', 'pace',
                  'cycle_position', 'scalar_cycle_position', 'scaled', 'name'):
         assert hasattr(blend, name) and hasattr(GAITS['trot'], name)

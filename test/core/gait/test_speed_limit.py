@@ -6,6 +6,7 @@ where it must.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -19,7 +20,7 @@ from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
 from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, limiting_gaits
-from dmp_cpg_ros.core.gait.speed_limit import blended_limit
+from dmp_cpg_ros.core.gait.speed_limit import blended_limit, swing_acceleration
 from dmp_cpg_ros.core.gait.transition import (
     CHANGING,
     BlendedGait,
@@ -29,6 +30,7 @@ from dmp_cpg_ros.core.gait.transition import (
 from dmp_cpg_ros.core.inhibition.caution import changing_share
 from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters
+from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.leg import (
     LegFeedback,
     LegParameters,
@@ -81,6 +83,51 @@ def test_every_gait_of_the_package_has_a_limit_that_its_tables_reach() -> None:
         assert gait.scaled(1.2).highest_speed == gait.highest_speed
 
 
+@given(u=st.floats(0.1, 3.0), f=st.floats(0.5, 5.0), duty=st.floats(0.2, 0.9))
+def test_the_swing_is_as_hard_at_its_ends_as_the_foot_path_is_bent(
+        u: float, f: float, duty: float) -> None:
+    """The formula against second differences of the path itself, in both directions of time."""
+    path, swing, h = FootPath((0.0, 0.0, -0.3), u, 0.0, 0.0, 2.0 * np.pi * f, duty, 0.05), (
+        1.0 - duty), 1e-4
+    for end in (-1.0, 1.0):
+        c = end * swing * (0.5 - h * np.arange(1, 6))  # cycle positions, inwards
+        slopes = np.array([path.at(at)[1][0] * f for at in c])
+        rates = np.gradient(slopes, c / f)
+        assert abs(np.polyval(np.polyfit(c, rates, 1), end * 0.5 * swing)) == pytest.approx(
+            swing_acceleration(u, f, duty), rel=2e-3)
+
+
+@pytest.mark.parametrize('gait', GAITS)
+@given(swing=st.floats(5.0, 1e4), factor=st.floats(0.5, 2.0))
+def test_a_robot_is_never_asked_to_swing_its_legs_harder_than_its_hips_can(
+        gait: str, swing: float, factor: float) -> None:
+    scale, of = replace(SCALE, swing=swing), GAITS[gait]
+
+    def needed(u: float) -> float:
+        cadence, duty = (np.interp(u, of.speed, table) for table in (of.cadence, of.duty_factor))
+        return swing_acceleration(u, float(cadence), float(duty)) * GRAVITY
+
+    most = of.highest(scale)
+    assert 0.0 < most <= of.highest_speed
+    assert max(needed(u) for u in np.linspace(0.0, most, 50)) <= swing * (1.0 + 1e-9)
+    assert most == of.highest_speed or needed(most * 1.001) > swing
+    assert of.scaled(factor).highest(scale) == most
+    assert of.highest(replace(scale, swing=2.0 * swing)) >= most
+    assert of.highest(replace(scale, swing=inf)) == of.highest_speed
+    velocity, *_ = of.pace(np.array(FAST), scale)
+    assert scale.foot_speed(*velocity) <= scale.speed(most) * (1.0 + 1e-9)
+
+
+def test_a_blend_is_limited_between_its_gaits_on_any_robot() -> None:
+    way = GaitTransition(GAITS['trot'], GAITS['bound'])
+    scale = replace(SCALE, swing=160.0)
+    ends = [GAITS[name].highest(scale) for name in ('trot', 'bound')]
+    assert ends[1] < GAITS['bound'].highest_speed
+    limits = [way.at(share, 0.1).highest(scale) for share in (0.0, 0.3, 0.7, 1.0)]
+    assert limits == sorted(limits, reverse=True)
+    assert [limits[0], limits[-1]] == pytest.approx(ends)
+
+
 @pytest.mark.parametrize('wrong', [0.5, -1.0, float('nan'), 'fast'])
 def test_an_impossible_limit_is_refused(wrong: object) -> None:
     values = {'lag': dict(fl=0.0, fr=0.5, rl=0.5, rr=0.0), 'speed': [0.0, 0.6],
@@ -118,7 +165,7 @@ def test_commands_are_followed_up_to_the_gait_or_the_fastest_that_may_be_chosen(
     0.4, 1.0)])
 def test_legs_posture_and_cadence_take_the_same_velocity(gait: object) -> None:
     """What exceeds the limit is as if the limit had been asked for."""
-    short = SCALE.limited(FAST, gait.highest_speed)  # type: ignore[attr-defined]
+    short = SCALE.limited(FAST, gait.highest(SCALE))  # type: ignore[attr-defined]
     speeds = [SCALE.foot_speed(*velocity) for velocity in (FAST, short)]
     assert speeds[1] < 0.99 * speeds[0]
     assert np.allclose(*([gait.omega(u, SCALE), gait.duty(u, SCALE)] for u in speeds))  # type: ignore[attr-defined]
@@ -180,7 +227,7 @@ def test_a_change_to_a_slower_gait_slows_down_first_and_does_not_fall(speed: flo
         before = SCALE.foot_speed(*run.loop.r.tolist())
         assert run.walk(0.004)
     assert run.loop.network.gait.name == 'trot>walk'
-    most = HASTE * changing_speed(GAITS['trot'], GAITS['walk']) * ROOT
+    most = HASTE * changing_speed(GAITS['trot'], GAITS['walk'], SCALE) * ROOT
     assert inf > before > most  # or it would have waited too long
     assert SCALE.foot_speed(*run.loop.r.tolist()) <= most
     assert run.walk(4.0)
@@ -197,7 +244,7 @@ def test_gaits_change_at_a_speed_that_is_neithers_limit_and_walk_on(
     run = Walk(before)
     assert run.reach((speed, 0.0, 0.0)) and run.walk(3.0)
     assert not run.loop.change_gait(after)
-    most, fastest = changing_speed(GAITS[before], GAITS[after]) * ROOT, 0.0
+    most, fastest = changing_speed(GAITS[before], GAITS[after], SCALE) * ROOT, 0.0
     for _ in range(1500):
         assert run.walk(0.004)
         if isinstance(run.loop.network.gait, BlendedGait):
@@ -211,12 +258,12 @@ def test_gaits_change_at_a_speed_that_is_neithers_limit_and_walk_on(
 
 def test_who_has_the_gait_that_is_wanted_follows_all_of_the_command() -> None:
     trot, walk = GAITS['trot'], GAITS['walk']
-    assert changing_speed(trot, trot) == inf
-    assert changing_speed(trot, walk) == changing_speed(walk, trot) == (
+    assert changing_speed(trot, trot, SCALE) == inf
+    assert changing_speed(trot, walk, SCALE) == changing_speed(walk, trot, SCALE) == (
         CHANGING * walk.highest_speed)
     way = GaitTransition(trot, walk).at(0.5, 0.1)
     for wanted in (trot, walk):  # it is on its way there, or back again
-        assert changing_speed(way, wanted) == CHANGING * walk.highest_speed
+        assert changing_speed(way, wanted, SCALE) == CHANGING * walk.highest_speed
     network = Walk('trot').loop.network
     command = (2.0, 0.1, -0.3)
     assert changing_share(network, network.gait, command) == 1.0
