@@ -69,7 +69,6 @@ STUDY_ARGS ?=
 BENCHMARK_ARGS ?=
 DUEL_ARGS ?=
 FIGURE_ARGS ?=
-PAGE_ARGS ?=
 
 .PHONY: help demo test study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images view-image paper-figures paper-page bench bench-ros doc deb lint install clean
 .DELETE_ON_ERROR:
@@ -126,8 +125,8 @@ view-image: $(INSTALLED) ## draw the picture of the live view; needs Chromium
 paper-figures: $(INSTALLED) ## draw the figures of the paper into build/paper_figures/ (FIGURE_ARGS=...)
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.paper_figures --out build/paper_figures $(FIGURE_ARGS)
 
-paper-page: $(INSTALLED) ## the paper to touch, build/paper/index.html; needs npm (PAGE_ARGS='--numpy WHEEL')
-	$(ACTIVATED) python -m dmp_cpg_ros.studies.paper_page --out build/paper $(PAGE_ARGS)
+paper-page: $(INSTALLED) ## the paper to touch, build/paper/index.html; needs npm
+	$(ACTIVATED) python -m dmp_cpg_ros.studies.paper_page --out build/paper
 
 bench: $(INSTALLED) ## measure the cost of the core and of its messages (BENCH_ARGS=...)
 	$(ACTIVATED) python -m dmp_cpg_ros.studies.bench $(BENCH_ARGS)

@@ -4,6 +4,7 @@
 // before it and everything into one file.
 
 const SETTLED_MS = 150;            // time without another input after which is computed
+const PLACE = 'https://page.invalid/';   // where Pyodide believes that the parts of the page are
 const SLOWED = 2;                  // the film runs this much slower than the robot
 const STATES = { waiting: '#f0a32f', captured: '#e5484d', at_rest: '#7a2a33', releasing: '#2f6fb0' };
 
@@ -36,13 +37,12 @@ async function run(name) {
 async function start() {
   window.fetch = (address) => {
     const name = String(address.url || address).split('/').pop();
-    return part(name.startsWith('numpy-') ? 'numpy.whl' : name,
-      name.endsWith('.wasm') ? 'application/wasm' : 'application/octet-stream');
+    return part(name, name.endsWith('.wasm') ? 'application/wasm' : 'application/octet-stream');
   };
   await run('pyodide.asm.js');
   await run('pyodide.js');
-  const python = await window.loadPyodide({ indexURL: 'https://page.invalid/' });
-  await python.loadPackage('numpy', { checkIntegrity: false });
+  const python = await window.loadPyodide({ indexURL: PLACE });
+  await python.loadPackage(PLACE + document.querySelector('[id^=numpy-]').id);
   python.unpackArchive(await (await part('core.zip', 'application/zip')).arrayBuffer(), 'zip',
     { extractDir: '/core' });
   python.globals.set('given', await (await part('given.json', 'application/json')).text());
@@ -69,11 +69,17 @@ function changed() {
   waiting = setTimeout(compute, SETTLED_MS);
 }
 
+/** What Python computes of values; in the browser's console too. */
+function answer(what, asked) {
+  return JSON.parse(computer.answer(what, JSON.stringify(asked)));
+}
+window.answer = answer;
+
 function compute() {
-  const asked = JSON.stringify(values());
+  const asked = values();
   try {
-    showCertificate(JSON.parse(computer.answer('certificate', asked)));
-    episode = JSON.parse(computer.answer('episode', asked));
+    showCertificate(answer('certificate', asked));
+    episode = answer('episode', asked);
   } catch (error) {
     find('verdict').textContent = String(error.message).trim().split('\n').pop();
     find('verdict').className = 'fails';
@@ -84,7 +90,7 @@ function compute() {
   circles.trails = [[], [], [], []];
   if (episode) showTimes();
   find('busy').textContent = '';
-  document.body.dataset.shown = asked;
+  document.body.dataset.shown = JSON.stringify(asked);
 }
 
 const digits = (value) => (value === null ? '∞' : String(Number(value.toPrecision(4))));

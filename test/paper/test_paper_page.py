@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import base64
 import gzip
-import hashlib
 import io
 import json
 import re
@@ -21,7 +20,6 @@ import numpy as np
 import pytest
 from browser import Page as BrowserPage
 from browser import browser, find_browser
-from checkout import ROOT
 
 from dmp_cpg_ros.commands.certify import running_parameters
 from dmp_cpg_ros.core.certificates.certify import certify
@@ -30,8 +28,7 @@ from dmp_cpg_ros.paper.interactive import Page
 from dmp_cpg_ros.studies import paper_page
 from dmp_cpg_ros.suite import load_suite
 
-BUILT = ROOT / 'build' / 'paper' / 'index.html'
-PATIENCE_S = 300.0
+PATIENCE_S, NPM_PATIENCE_S = 300.0, 60.0
 
 GIVEN = json.loads(paper_page.given())
 PAGE = Page(**GIVEN)
@@ -106,7 +103,7 @@ def test_what_is_packed_runs_on_numpy_alone(tmp_path: Path) -> None:
 
 
 def test_a_page_holds_its_parts_and_names_no_other_place() -> None:
-    parts = {name: name.encode() * 3 for name in (*paper_page.TAKEN, 'numpy.whl')}
+    parts = {name: name.encode() * 3 for name in (*paper_page.TAKEN, paper_page.WHEEL)}
     html = paper_page.page(parts)
     found = blocks(html)
     assert {name: found[name] for name in parts} == parts
@@ -116,36 +113,46 @@ def test_a_page_holds_its_parts_and_names_no_other_place() -> None:
     assert set(re.findall(r'https?://[^\s\'"]+', shell)) == {'https://page.invalid/'}
 
 
-def test_another_wheel_than_the_one_that_pyodide_names_is_refused(tmp_path: Path) -> None:
-    named = {'file_name': 'numpy.whl', 'sha256': hashlib.sha256(b'right').hexdigest()}
-    lock = json.dumps({'packages': {'numpy': named}}).encode()
-    (tmp_path / 'numpy.whl').write_bytes(b'right')
-    assert paper_page.wheel(lock, tmp_path) == b'right'
-    (tmp_path / 'numpy.whl').write_bytes(b'wrong')
-    with pytest.raises(DataError, match='is not the wheel'):
-        paper_page.wheel(lock, tmp_path)
+def test_an_archive_that_is_not_the_one_that_is_meant_is_refused(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('PATH', str(tmp_path))
+    for name, version, _ in paper_page.PACKAGES.values():
+        (tmp_path / f'{name.strip("@").replace("/", "-")}-{version}.tgz').write_bytes(b'another')
+    with pytest.raises(DataError, match=r"'.*pyodide-.*\.tgz' is not the archive"):
+        paper_page.parts(paper_page.download(tmp_path))
+
+
+def test_a_wheel_is_what_a_package_of_conda_installs_without_its_tests() -> None:
+    conda = {'lib/python3.12/site-packages/numpy/__init__.py': b'1', 'info/index.json': b'{}',
+             'lib/python3.12/site-packages/numpy/_core/tests/test_it.py': b'',
+             'lib/python3.12/site-packages/numpy-2.0.1.dist-info/LICENSE.txt': b'BSD'}
+    wheel = paper_page.wheel(conda)
+    with zipfile.ZipFile(io.BytesIO(wheel)) as archive:
+        assert archive.namelist() == ['numpy-2.0.1.dist-info/LICENSE.txt', 'numpy/__init__.py']
+    assert wheel == paper_page.wheel(dict(reversed(conda.items())))
 
 
 def test_without_npm_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('PATH', str(tmp_path))
-    with pytest.raises(DataError, match='npm pack pyodide@'):
-        paper_page.pyodide(tmp_path)
+    with pytest.raises(DataError, match='npm pack .*pyodide@'):
+        paper_page.download(tmp_path)
 
 
 # --- in a browser -------------------------------------------------------------------------------
 
 @pytest.fixture(scope='module')
 def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BrowserPage]:
-    """A page with the present sources and the Pyodide of the one that was built, offline."""
+    """The page, offline; npm has its own store, so that only the first time takes a download."""
     executable = find_browser()
     if executable is None:
         pytest.skip('there is no Chromium here (Debian: apt-get install chromium)')
-    if not BUILT.is_file():
-        pytest.skip('there is no page, for nothing is downloaded here: make paper-page')
-    parts = blocks(BUILT.read_text(encoding='utf-8'))
-    file = tmp_path_factory.mktemp('page') / 'index.html'
-    file.write_text(paper_page.page({
-        name: parts[name] for name in (*paper_page.TAKEN, 'numpy.whl')}), encoding='utf-8')
+    folder = tmp_path_factory.mktemp('page')
+    try:
+        archives = paper_page.download(folder, NPM_PATIENCE_S)
+    except DataError as error:
+        pytest.skip(f'there is no npm, or what it says: {error}')
+    file = folder / 'index.html'
+    file.write_text(paper_page.page(paper_page.parts(archives)), encoding='utf-8')
     with browser(executable) as page:
         page.call('Network.enable')
         page.call('Network.emulateNetworkConditions', offline=True, latency=0,
@@ -161,6 +168,19 @@ def shown(page: BrowserPage, name: str, value: float | str) -> None:
                   f"input.value = '{value}'; input.dispatchEvent(new Event('input')); }})()")
     page.until(f"JSON.parse(document.body.dataset.shown)['{name}'] === {json.dumps(value)} "
                "&& document.querySelector('#busy').textContent === ''", PATIENCE_S)
+
+
+def leaves(value: Any) -> Iterator[float | str | None]:
+    """Numbers and words of a JSON value with the keys, in order; every number as a float."""
+    if isinstance(value, dict):
+        for key in sorted(value):
+            yield key
+            yield from leaves(value[key])
+    elif isinstance(value, list):
+        for item in value:
+            yield from leaves(item)
+    else:
+        yield float(value) if isinstance(value, int) else value
 
 
 def text(page: BrowserPage, selector: str) -> list[str]:
@@ -188,6 +208,18 @@ def test_in_a_browser_without_a_network_the_line_that_breaks_is_the_one_of_pytho
     assert page.problems == []
 
 
+@pytest.mark.parametrize('changes', [
+    {}, {'gait': 'trot', 'leg': 'auto'}, {'coupling_graph': 'directed_ring', 'leg': 'rr'},
+    {'inhibition_gain': 20.0}, {'cadence_scale': 2.5, 'coupling_gain': 7.0}])
+def test_in_a_browser_every_number_is_that_of_python(
+        page: BrowserPage, changes: dict[str, Any]) -> None:
+    for what in ('certificate', 'episode'):
+        found = page.evaluate(f"answer('{what}', {json.dumps({**VALUES, **changes})})")
+        assert list(leaves(found)) == [
+            pytest.approx(leaf, rel=1e-12, abs=1e-12) if isinstance(leaf, float) else leaf
+            for leaf in leaves(answer(what, **changes))]
+
+
 def test_in_a_browser_every_graph_leg_and_gait_is_answered_as_by_python(page: BrowserPage) -> None:
     changes: dict[str, float | str] = {}
     for name, value in (('inhibition_gain', 400), ('coupling_graph', 'star'), ('leg', 'rr'),
@@ -197,4 +229,6 @@ def test_in_a_browser_every_graph_leg_and_gait_is_answered_as_by_python(page: Br
         changes[name] = value
         assert text(page, '#broken li') == answer('certificate', **changes)['broken'], changes
     assert page.problems == []
+    (contents,) = text(page, '#contents')
+    assert paper_page.CONTENTS in contents
     assert len(page.picture()) > 10_000
