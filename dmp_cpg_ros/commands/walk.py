@@ -140,16 +140,17 @@ def _walk(plan: _Plan, server: ForkServer) -> int:
     print(f'certificate: {plan.certificate.explained()}; {plan.certificate.contraction_grade} '
           f'grade; at rest at most {plan.certificate.time_to_rest:.3f} s after a request',
           flush=True)
+    made = 'metrics' if options.no_report else 'report'
     status = _run(plan, folder, server)
     try:
         if (folder / 'bag').is_dir():
             if status > INTERRUPTED:
-                print('walk: making the report, which a second Ctrl-C skips', file=sys.stderr)
+                print(f'walk: making the {made}, which a second Ctrl-C skips', file=sys.stderr)
             status = max(status, _analyze(plan, folder))
             if options.video is not None:
                 _film(folder, options.video)
     except KeyboardInterrupt:
-        print(f'walk: report skipped; make it with: analyze {folder}', file=sys.stderr)
+        print(f'walk: {made} skipped; to make the {made}: analyze {folder}', file=sys.stderr)
         status = INTERRUPTED + signal.SIGINT
     print(f'{folder.name}: {time.monotonic() - begin:.0f} s in all')
     return status

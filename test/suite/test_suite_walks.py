@@ -292,18 +292,20 @@ def test_a_dead_node_ends_the_run_and_is_named(
     assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
 
 
+@pytest.mark.parametrize(('options', 'made'), [((), 'report'), (('--no-report',), 'metrics')])
 def test_ctrl_c_ends_the_run_with_a_readable_bag(
-    processes: Processes, scenario: Path, tmp_path: Path
+    processes: Processes, scenario: Path, tmp_path: Path, options: tuple[str, ...], made: str
 ) -> None:
-    process = start_walk(processes, scenario, tmp_path / 'run', '--lock-step', '--composed')
+    process = processes.executable('walk', str(scenario), '--out', str(tmp_path / 'run'),
+                                   '--lock-step', '--composed', *options)
     process.wait_for_output('walking', RUN_S)
     process.interrupt()
-    process.wait_for_output('making the report, which a second Ctrl-C skips', RUN_S)
+    process.wait_for_output(f'making the {made}, which a second Ctrl-C skips', RUN_S)
     process.interrupt()
     # Python itself ends by the signal when it came while it ran generated code.
     assert process.wait(RUN_S) in (130, -signal.SIGINT), process.output
     # or the work was done when the second signal came
-    assert 'report skipped' in process.output or 'in all\n' in process.output, process
+    assert f'{made} skipped' in process.output or 'in all\n' in process.output, process
     assert 'Traceback' not in process.output, process
     assert len(load_recording(tmp_path / 'run' / 'bag').joints.time) > 50
 
