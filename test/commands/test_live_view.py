@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -20,6 +21,7 @@ pytest.importorskip('rclpy')
 
 import ros_processes
 from browser import Page, browser, find_browser
+from checkout import needs_make, recipe
 from ros_processes import (
     NodeProcess,
     Processes,
@@ -405,18 +407,22 @@ def test_a_gamepad_drives_and_stops_the_robot(client: Client, page: Page, ros: R
     assert not page.problems
 
 
-def test_one_command_gives_an_address_at_which_the_robot_is_driven_pushed_and_stopped(
+def test_make_demo_gives_an_address_at_which_the_robot_is_driven_pushed_and_stopped(
         page: Page, tmp_path: Path) -> None:
+    needs_make()
+    quick = f'--no-report --out {tmp_path} --rate {ros_processes.SHARED_HZ}'
+    command = recipe('demo', f'WALK_ARGS=--view {quick}')
+    assert command.endswith(f'&& walk --view {quick}'), command
     with reserved_domain() as domain, joined(domain) as ros:
         processes = Processes(domain)
         try:
-            walk = processes.executable('walk', '--view', '--no-report', '--out', str(tmp_path),
-                                        '--rate', str(ros_processes.SHARED_HZ))
+            walk = processes.start('bash', '-c', command)
             page.open(walk.wait_for_output(ADDRESS, PATIENCE_S)[1], 900, 640)
             drive(page, ros)
             page.open('about:blank')  # which asks nobody who has ended
-            walk.interrupt()
+            os.killpg(walk.pid, signal.SIGINT)  # as a terminal does
             assert walk.wait(PATIENCE_S) == 130, str(walk)
+            assert (tmp_path / 'metrics.json').is_file(), walk
         finally:
             processes.end()
 

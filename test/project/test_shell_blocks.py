@@ -16,7 +16,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from checkout import ROOT
+from checkout import ROOT, needs_make, recipe
 from demonstrations import straight_reach
 from ros_processes import SHARED_HZ, NodeProcess, Processes, reserved_domain
 from test_readme import DOCUMENTS, blocks, commands
@@ -178,12 +178,8 @@ class Reader:
         per node takes three times as long for it.
         """
         assert words == ['demo'], words
-        recipe = self.processes.start('make', '--dry-run', '--directory', str(ROOT), *words)
-        assert recipe.wait() == 0, recipe
-        lines = [line for line in recipe.output.splitlines() if '/bin/activate && ' in line]
-        assert len(lines) == 1, recipe
         process = self.processes.start(
-            'bash', '-c', f'cd {self.folder}; {lines[0]} --composed')
+            'bash', '-c', f'cd {self.folder}; {recipe(*words)} --composed')
         assert process.wait(PATIENCE_S) == 0, process
         assert (self.folder / 'runs' / 'latest' / 'report.html').is_file(), process
 
@@ -240,9 +236,8 @@ def test_every_command_is_typed() -> None:
 @pytest.mark.parametrize('name', BLOCKS)
 def test_every_command_of_a_block_runs(reader: Reader, name: str) -> None:
     lines = to_type(name)
-    if any(line.split()[0] in ('make', '.') for line in lines) and not (
-            ROOT / '.venv' / '.installed').exists():
-        pytest.skip('make has not installed it here')
+    if any(line.split()[0] in ('make', '.') for line in lines):
+        needs_make()
     for line in lines:
         reader.type(line)
     reader.finish()

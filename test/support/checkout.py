@@ -1,13 +1,16 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the checkout as text: setup.py's tables, the modules and their imports; runs nothing."""
+"""Reads the checkout as text: setup.py's tables, the modules and their imports, the Makefile."""
 
 from __future__ import annotations
 
 import ast
+import subprocess
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = 'dmp_cpg_ros'
@@ -31,6 +34,20 @@ def setup_argument(name: str) -> object:
         if isinstance(node, ast.keyword) and node.arg == name:
             return ast.literal_eval(node.value)
     raise AssertionError(f'setup() has no argument {name}')
+
+
+def needs_make() -> None:
+    """Skip a test where make has not installed the package."""
+    if not (ROOT / '.venv' / '.installed').exists():
+        pytest.skip('make has not installed it here')
+
+
+def recipe(*words: str) -> str:
+    """The one line that ``make WORDS`` runs in the environment that it has made."""
+    done = subprocess.run(['make', '--dry-run', '--directory', str(ROOT), *words], check=True,
+                          capture_output=True, text=True, timeout=60)
+    (line,) = (line for line in done.stdout.splitlines() if '/bin/activate && ' in line)
+    return line
 
 
 @cache
