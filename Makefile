@@ -70,7 +70,7 @@ BENCHMARK_ARGS ?=
 DUEL_ARGS ?=
 FIGURE_ARGS ?=
 
-.PHONY: help demo test study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images view-image paper-figures paper-page bench bench-ros doc deb lint install clean
+.PHONY: help demo test test-install study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images view-image paper-figures paper-page bench bench-ros doc deb lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -83,6 +83,9 @@ demo: $(INSTALLED) ## walk, stop and start as in the paper; leaves runs/latest/ 
 
 test: $(INSTALLED) ## run the whole test suite (PYTEST_ARGS=...)
 	$(ACTIVATED) cd test && python -m pytest -p xdist -n $(TEST_WORKERS) --dist worksteal --durations=20 --durations-min=8 $(PYTEST_ARGS)
+
+test-install: $(INSTALLED) ## install the wheel with the extra ros into a fresh environment, and walk
+	$(ACTIVATED) cd test && FRESH_INSTALL=1 python -m pytest -rs project/test_packaging.py -k fresh_environment
 
 study-stops: $(INSTALLED) ## stop and start at 16 phases x 3 speeds x amble, walk, trot (STUDY_ARGS=...)
 	$(ACTIVATED) study_stops $(STUDY_ARGS)

@@ -339,6 +339,50 @@ def test_colcon_installs_the_same_files_as_a_wheel(checkout: Path, tmp_path: Pat
     assert by_colcon == by_pip
 
 
+SHORT_WALK = """\
+duration: 5.0
+events:
+  - {at: 0.5, inhibit: false}
+  - {at: 0.5, command: {v_x: 0.5}}
+  - {at: 3.0, inhibit: true}
+"""
+
+
+@pytest.mark.skipif('FRESH_INSTALL' not in os.environ,
+                    reason='installs 0.7 GB, which takes minutes: make test-install')
+def test_a_fresh_environment_with_the_extra_ros_alone_walks_and_reports(
+        checkout: Path, tmp_path: Path) -> None:
+    pytest.importorskip('rclpy')
+    from ros_processes import reserved_domain
+
+    own = ('PYTHONPATH', 'LD_LIBRARY_PATH', 'VIRTUAL_ENV', 'AMENT_PREFIX_PATH', 'ROS_DISTRO',
+           '_ROS_WHEELS_BOOTSTRAP_COMPLETE')
+    clean = {name: value for name, value in os.environ.items() if name not in own}
+
+    def run(*command: str, **more: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(command, cwd=tmp_path, env={**clean, **more}, check=False,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    fresh = tmp_path / 'fresh' / 'bin'
+    made = run(sys.executable, '-m', 'venv', str(fresh.parent))
+    assert made.returncode == 0, made.stdout
+    pip = (str(fresh / 'python'), '-m', 'pip', '--quiet', 'install')
+    asked = run(*pip, '--dry-run', '--no-deps', 'ros-jazzy-rclpy')
+    if asked.returncode != 0:
+        pytest.skip(f'no package index has the wheels of ROS for this machine: {asked.stdout}')
+    got = run(*pip, '--constraint', str(ROOT / 'constraints.txt'),
+              f'{built(checkout, "wheel")}[ros]')
+    assert got.returncode == 0, got.stdout
+    (tmp_path / 'short.yaml').write_text(SHORT_WALK, encoding='utf-8')
+    with reserved_domain() as domain:
+        walk = run(str(fresh / 'walk'), 'short.yaml', '--lock-step', '--view', '--out', 'run',
+                   ROS_DOMAIN_ID=str(domain))
+    assert walk.returncode == 0, walk.stdout
+    assert 'live view: http://127.0.0.1:' in walk.stdout, walk.stdout
+    assert '[ok] Every stop came to rest: 1 of 1' in walk.stdout, walk.stdout
+    assert (tmp_path / 'run' / 'report.html').is_file(), walk.stdout
+
+
 @installed
 def test_no_other_distribution_has_files_of_the_package() -> None:
     # A package that pip built in the build folder of this one had all of it in its wheel.
