@@ -88,6 +88,10 @@ class CouplingGraph:
             the gain as the locked coordinates x̃_i = R(φ_i)ᵀ x_i see it; K̃ = K for every K = a I
             + b S, such as k I.
         """
+        return self._locked.copy()
+
+    @cached_property
+    def _locked(self) -> Array:
         turns = [phase_rotation(float(phi)) for phi in self.phases]
         turned = [turns[i].T @ gain @ turns[i]
                   for (i, _), gain in zip(self.edges, self.gains, strict=True)]

@@ -40,6 +40,9 @@ class Oscillators(Protocol):
         ...
 
 
+_GENERATOR, _UNIT = phase_generator(), np.eye(2)
+
+
 @dataclass(frozen=True)
 class AndronovHopf:
     """Andronov-Hopf oscillators ẋ = ω S x + ρ (r² − |x|²) x (paper eqs. hopf1, hopf2).
@@ -105,8 +108,9 @@ class AndronovHopf:
         -------
         ndarray (..., 2, 2)
         """
-        growth = np.asarray(self.rho * (self.radius**2 - np.sum(x * x, axis=-1)))
+        squared = x * x
+        growth = np.asarray(self.rho * (self.radius**2 - (squared[..., 0] + squared[..., 1])))
         return (
-            np.asarray(omega)[..., None, None] * phase_generator()
-            + growth[..., None, None] * np.eye(2)
+            np.asarray(omega)[..., None, None] * _GENERATOR
+            + growth[..., None, None] * _UNIT
             - 2.0 * np.asarray(self.rho)[..., None, None] * x[..., :, None] * x[..., None, :])

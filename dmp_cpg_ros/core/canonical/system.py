@@ -51,6 +51,7 @@ class CanonicalSystem:
             if target is None
             else np.asarray(target, dtype=float))
         self._coupling = graph.coupling_matrix()
+        self._own = np.kron(np.eye(graph.size, dtype=bool), np.ones((2, 2), dtype=bool))
         self._steps: dict[tuple[bytes, float], ExponentialStep] = {}
         self._linear: dict[bytes, tuple[Array, Array]] = {}
 
@@ -106,13 +107,7 @@ class CanonicalSystem:
         ndarray (N, 2)
             [1/s]
         """
-        key = gains.tobytes()
-        linear = self._linear.get(key)
-        if linear is None:
-            if len(self._linear) > MOST_KEPT:
-                self._linear.clear()
-            linear = self._linear[key] = self.linear_part(gains)
-        (M, c), state = linear, x.ravel()
+        (M, c), state = self._kept_linear_part(gains), x.ravel()
         return (M.dot(state) + c).reshape(x.shape) + self.oscillators.field(x, omega)
 
     def jacobian(self, x: Array, omega: float | Array, gains: Array) -> Array:
@@ -122,11 +117,19 @@ class CanonicalSystem:
         -------
         ndarray (2N, 2N)
         """
-        matrix, _ = self.linear_part(gains)
+        matrix = self._kept_linear_part(gains)[0].copy()
         own = self.oscillators.jacobian(x, np.broadcast_to(omega, (self.graph.size,)))
-        for i, block in enumerate(own):
-            matrix[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += block
+        matrix[self._own] += own.ravel()
         return matrix
+
+    def _kept_linear_part(self, gains: Array) -> tuple[Array, Array]:
+        key = gains.tobytes()
+        linear = self._linear.get(key)
+        if linear is None:
+            if len(self._linear) > MOST_KEPT:
+                self._linear.clear()
+            linear = self._linear[key] = self.linear_part(gains)
+        return linear
 
     def newton_step(self, x: Array, omega: float | Array, gains: Array) -> Array:
         """States (N, 2) one of Newton's steps nearer to an equilibrium; LinAlgError where the

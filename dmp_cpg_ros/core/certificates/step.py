@@ -15,12 +15,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.certificates.network import NetworkAnalysis, Setting
 from dmp_cpg_ros.core.contraction.capture import radius_tolerance
@@ -34,7 +32,6 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
 from dmp_cpg_ros.core.gait.network import LONGEST_STEP
 from dmp_cpg_ros.core.inhibition.step_timing import QUICKEST
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.maths.step_comparison import StepBounds, StepComparison
 
@@ -93,11 +90,14 @@ def cycle_radius_error(rho: float, radius: float, omega: float, tick_s: float) -
     float
         |R/r − 1|; infinite when the step has no cycle near r.
     """
-    step = ExponentialStep(np.zeros((2, 2)), np.zeros(2), tick_s)
-    field = partial(AndronovHopf(rho, radius).field, omega=omega)
+    def rate(z: complex) -> complex:
+        return complex(rho * (radius**2 - abs(z) ** 2), -omega) * z
 
     def change(R: float) -> float:
-        return float(np.hypot(*step(np.array((R, 0.0)), field))) - R
+        first = rate(R)
+        middle = rate(R + 0.5 * tick_s * first)
+        last = rate(R + tick_s * (2.0 * middle - first))
+        return abs(R + tick_s / 6.0 * (first + 4.0 * middle + last)) - R
 
     low, high = 0.5 * radius, 1.5 * radius
     if not change(low) > 0.0 > change(high):

@@ -39,7 +39,7 @@ DELAY_TICKS = 6
 LONGEST_STOP = 10.0
 """Time within which a stop and a start must be bounded; predictions look as far ahead [s]."""
 
-_STEP = 0.01  # [s]
+_STEP, _BLOCK = 0.01, 32  # [s], and steps that are taken at once
 _HORIZON = 10.0  # [s] beyond it a bound is of no use
 
 
@@ -267,24 +267,59 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
     away = span.omega_slope * speed * r                      # |∂f/∂ω| |ω − ω_rest| at first
     of = _falling(s, capture, turning, away) if step is None else _falling_in_steps(
         s, capture, step)
-    bounds = of.start
-    fade, swing_fade = math.exp(-alpha_r * of.cell), math.exp(
-        -s.parameters.leg.activity_rate * of.cell)
-    activity = np.ones(N)
-    for k in range(int(_HORIZON / of.cell)):
-        v, e = bounds[-2 * N:-N], bounds[-N:]
+    fade = math.exp(-alpha_r * of.cell)
+    swings = _filtered(math.exp(-s.parameters.leg.activity_rate * of.cell))
+    carried, fed = _in_a_block(of)
+    bounds, activity = of.start, np.ones(N)
+    for begin in range(0, int(_HORIZON / of.cell), _BLOCK):
+        speeds, driven = [], []
+        for _ in range(_BLOCK):
+            speeds.append(speed)
+            driven += [turning, away]
+            if a_b > 0.0:
+                speed = max(0.0, min(speed * fade, speed - a_b * of.cell))
+                turning = span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r
+                away = span.omega_slope * speed * r
+            else:
+                speed, turning, away = speed * fade, turning * fade, away * fade
+        within = (carried @ bounds + fed @ np.array(driven)).reshape(_BLOCK + 1, -1)
+        v, e = within[:-1, -2 * N:-N], within[:-1, -N:]
         inner = np.maximum(of.inner, rest.radius - e)
         phase_rate = np.divide(v, inner, out=np.full_like(v, np.inf), where=inner > 1e-12)
-        if (phase_rate.max() <= supervisor.REST_PHASE_RATE and speed <= supervisor.REST_SPEED
-                and activity.max() <= supervisor.REST_ACTIVITY):
-            return k * of.cell
         wanted = np.minimum(1.0, phase_rate / span.omega_armed[0])
-        activity = wanted + (activity - wanted) * swing_fade
-        bounds = of.carry @ bounds + of.turning * turning + of.away * away
-        if a_b > 0.0:
-            speed = max(0.0, min(speed * fade, speed - a_b * of.cell))
-            turning = span.omega_slope * max(alpha_r * speed, 2.0 * a_b * (speed > 0.0)) * r
-            away = span.omega_slope * speed * r
-        else:
-            speed, turning, away = speed * fade, turning * fade, away * fade
+        swinging = swings @ np.concatenate([activity[None], wanted])
+        resting = np.flatnonzero(
+            (phase_rate.max(axis=1) <= supervisor.REST_PHASE_RATE)
+            & (np.array(speeds) <= supervisor.REST_SPEED)
+            & (swinging[:-1].max(axis=1) <= supervisor.REST_ACTIVITY))
+        if len(resting) > 0:
+            cells = begin + int(resting[0])
+            return cells * of.cell if cells < int(_HORIZON / of.cell) else math.inf
+        bounds, activity = within[-1], swinging[-1]
     return math.inf
+
+
+def _in_a_block(of: _Falling) -> tuple[Array, Array]:
+    """Matrices that make of bounds, and of what feeds them in each cell of a block, the bounds at
+    the ends of all its cells, the first included.
+    """
+    n, powers = len(of.start), [np.eye(len(of.start))]
+    for _ in range(_BLOCK):
+        powers.append(of.carry @ powers[-1])
+    feed = np.stack([of.turning, of.away], axis=1)
+    fed = np.zeros((_BLOCK + 1, n, _BLOCK, 2))
+    for late in range(_BLOCK):
+        fed[np.arange(late + 1, _BLOCK + 1), :, np.arange(_BLOCK - late)] = powers[late] @ feed
+    return np.concatenate(powers), fed.reshape((_BLOCK + 1) * n, 2 * _BLOCK)
+
+
+def _filtered(kept: float) -> Array:
+    """Matrix that makes of the first value of a filter and what it follows in each cell of a block
+    its values at the ends of all cells, the first included.
+    """
+    weights = np.zeros((_BLOCK + 1, _BLOCK + 1))
+    weights[0, 0] = 1.0
+    for k in range(_BLOCK):
+        weights[k + 1] = kept * weights[k]
+        weights[k + 1, k + 1] = 1.0 - kept
+    return weights

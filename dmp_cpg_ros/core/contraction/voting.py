@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations, permutations
 
 import numpy as np
@@ -94,9 +95,12 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
     float
         Sufficient for a stop [1/s]; infinite when no weight is certified.
     """
+    box = capture_set(system, omega, _votes(system, voters, 1.0), region_radius)
+
     def certified(alpha: float) -> bool:
         capture = shared_capture(system, omega, capture_set(
-            system, omega, _votes(system, voters, alpha), region_radius), region_radius)
+            system, omega, _votes(system, voters, alpha), region_radius, known=box),
+            region_radius)
         return capture.holds and inhibited_contraction(system, capture).reach != NONE
 
     return _threshold(certified, _scale(system, omega, region_radius))
@@ -174,15 +178,18 @@ def different_voters(system: CanonicalSystem, count: int) -> list[tuple[int, ...
     return chosen
 
 
+@lru_cache(8)
 def _symmetries(system: CanonicalSystem) -> list[tuple[int, ...]]:
     """Permutations of the nodes that leave couplings and oscillators as they are."""
     size = system.graph.size
     L = system.graph.block_laplacian().reshape(size, 2, size, 2)
     kinds = np.stack([system.rho, system.radius], axis=1)
     scale = 1e-9 * (1.0 + float(np.abs(L).max()))
-    return [turn for turn in permutations(range(size))
-            if np.array_equal(kinds[list(turn)], kinds)
-            and np.abs(L[list(turn)][:, :, list(turn)] - L).max() <= scale]
+    turns = np.array(list(permutations(range(size))))                         # (N!, N)
+    turned = L.transpose(0, 2, 1, 3)[turns[:, :, None], turns[:, None, :]]    # (N!, N, N, 2, 2)
+    alike = np.all(kinds[turns] == kinds, axis=(1, 2)) & (
+        np.abs(turned - L.transpose(0, 2, 1, 3)).max(axis=(1, 2, 3, 4)) <= scale)
+    return [tuple(turn) for turn in turns[alike].tolist()]
 
 
 def _votes(system: CanonicalSystem, voters: Sequence[int], alpha: float) -> Array:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.canonical.system import MOST_KEPT, CanonicalSystem
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
 from dmp_cpg_ros.core.contraction.voting import MajorityClamp, majority_clamp
-from dmp_cpg_ros.core.gait.network import GaitNetwork
+from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork, network_system
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import OperatingRange, operating_range
@@ -89,8 +90,8 @@ def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: V
         The computed clamp is the geometric mean of the window; without a window a little over what
         is certified for the majority, and the whole k_inh where nothing is.
     """
-    window = majority_clamp(network.system, span.omega_armed[1], inhibition.region_radius,
-                            voting.majority, span.omega[0])
+    window = _window(replace(network.parameters, cadence_scale=1.0), network.gait.phases.tobytes(),
+                     span.omega_armed[1], inhibition.region_radius, voting.majority, span.omega[0])
     k_inh = inhibition.inhibition_gain
     if voting.vote_limit > 0.0 or k_inh == 0.0:
         return VoteClamp(voting.vote_limit * k_inh, voting.vote_limit, window)
@@ -99,6 +100,11 @@ def vote_clamp(network: GaitNetwork, inhibition: InhibitionParameters, voting: V
     gain = float(np.sqrt(window.lowest * min(window.highest, ROOM**2 * window.lowest)))
     gain = gain if window.possible else LEAST_ROOM * window.lowest
     return VoteClamp(gain, gain / k_inh, window)
+
+
+@lru_cache(maxsize=MOST_KEPT)
+def _window(parameters: CanonicalParameters, phases: bytes, *of: Any) -> MajorityClamp:
+    return majority_clamp(network_system(parameters, np.frombuffer(phases)), *of)
 
 
 def holds_at_rest(network: GaitNetwork, gains: Array, region_radius: float) -> bool:
