@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -35,6 +36,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return LONG.index(folder) if folder in LONG else len(LONG)
 
     items.sort(key=rank)
+
+
+def pytest_collection_finish() -> None:
+    """Spare what has been imported from the garbage collector, which would look through it again
+    and again: a fifth of the time of tests that walk.
+    """
+    gc.collect()
+    gc.freeze()
 
 
 _crashed: set[str] = set()
