@@ -222,8 +222,7 @@ def _benchmark(options: argparse.Namespace, _: RosArguments) -> int:
             table = TABLES[name](workers, options.seeds, options.phases)
             print(f'{table.title}\n\n{output.markdown_table(table.columns, table.rows)}\n',
                   flush=True)
-            results[name] = [case | (outcome if isinstance(outcome, dict) else vars(outcome))
-                             for case, outcome in table.results]
+            results[name] = [{'case': case, 'outcome': outcome} for case, outcome in table.results]
     output.write_results(options.json, results)
     return 0
 

@@ -239,10 +239,8 @@ def _duel(options: argparse.Namespace, _: RosArguments) -> int:
             table = TABLES[name](walkers, options.phases, run)
             print(f'{table.title}\n\n{output.markdown_table(table.columns, table.rows)}\n',
                   flush=True)
-            results[name] = [
-                {**case, 'walker': case['walker'].name,
-                 **(outcome if isinstance(outcome, dict) else vars(outcome))}
-                for case, outcome in table.results]
+            results[name] = [{'case': {**case, 'walker': case['walker'].name}, 'outcome': outcome}
+                             for case, outcome in table.results]
     output.write_results(options.json, results)
     return 0
 

@@ -9,7 +9,6 @@ works is found by simulation.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -39,7 +38,7 @@ from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.filter import ReferenceSystem
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.paper.entry_tube import entry_tube
-from dmp_cpg_ros.studies.output import markdown_table
+from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
 from dmp_cpg_ros.suite import load_gait
 
 COUPLING = {'all_to_all': 100.0, 'ring': 100.0, 'path': 200.0, 'star': 100.0,
@@ -96,7 +95,7 @@ class Row:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; returns the exit status."""
-    parser = argparse.ArgumentParser(prog='tightness', description=__doc__.splitlines()[0])
+    parser = parser_of('tightness', __doc__.splitlines()[0], 'every row', jobs=False)
     parser.add_argument('--graphs', nargs='+', choices=COUPLING, default=list(COUPLING),
                         help='graphs to look at (default: all)')
     options = parser.parse_args(arguments)
@@ -109,6 +108,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for condition in dict.fromkeys(row.condition for row in found):
         ratios = [row.ratio for row in found if row.condition == condition]
         print(f'- {condition} ({min(ratios):.2f} to {max(ratios):.2f}): {REASONS[condition]}')
+    write_results(options.json, [vars(row) for row in found])
     return 0
 
 
