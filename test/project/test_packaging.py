@@ -381,6 +381,7 @@ def test_a_fresh_environment_with_the_extra_ros_alone_walks_and_reports(
     assert 'live view: http://127.0.0.1:' in walk.stdout, walk.stdout
     assert '[ok] Every stop came to rest: 1 of 1' in walk.stdout, walk.stdout
     assert (tmp_path / 'run' / 'report.html').is_file(), walk.stdout
+    shutil.rmtree(fresh.parent)  # pytest keeps folders of the last runs
 
 
 @installed

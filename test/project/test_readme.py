@@ -4,17 +4,21 @@
 
 from __future__ import annotations
 
+import io
 import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import redirect_stdout
 from functools import cache
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
-from checkout import PACKAGE, ROOT, setup_constant
+from checkout import PACKAGE, ROOT, recipe, setup_constant
 
 DOCUMENTS = (ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', ROOT / 'QUALITY_DECLARATION.md',
              ROOT / 'SECURITY.md',
@@ -179,6 +183,45 @@ def test_options_and_parameters_of_commands_exist(document: Path) -> None:
                     assert option in shown, line
                 elif assigned:
                     assert name in every_parameter, line
+
+
+def studies(document: Path) -> Iterator[list[str]]:
+    """Words of the studies that a document runs, by ``python -m`` or ``make`` with arguments."""
+    module = rf'{PACKAGE}\.studies\.'
+    for command in re.findall(rf'`(python -m {module}[^`]*)`', text(document)):
+        yield shlex.split(command)[2:]
+    for target, variable, words in re.findall(
+            r"`make ([a-z-]+) ([A-Z_]+)='([^']*)'`", text(document)):
+        line = given(target, variable).partition('GIVEN')[0].split()
+        name = line[line.index('-m') + 1] if '-m' in line else line[-1]
+        if name != 'pytest':
+            yield [name, *shlex.split(words)]
+
+
+@cache
+def given(target: str, variable: str) -> str:
+    """Line that make runs with arguments, in whose place it says so."""
+    return recipe(target, f'{variable}=GIVEN')
+
+
+@cache
+def options_of(module: str) -> str:
+    """What a module of the package answers to ``--help``, in one process with the others."""
+    shown = io.StringIO()
+    with redirect_stdout(shown), pytest.raises(SystemExit):
+        import_module(module).main(['--help'])
+    return shown.getvalue()
+
+
+@pytest.mark.parametrize('document', DOCUMENTS, ids=lambda document: document.name)
+def test_options_of_studies_exist(document: Path) -> None:
+    """They run for hours; that they run at all is seen in ``test/studies``."""
+    pytest.importorskip('rclpy')
+    for name, *words in studies(document):
+        shown = (help_of(name) if '.' not in name else options_of(name)) + ' --help'
+        tables = [word for flag, word in pairwise(words) if flag == '--tables']
+        for word in [*(word for word in words if word.startswith('--')), *tables]:
+            assert re.search(rf'{re.escape(word)}\b', shown), (name, words)
 
 
 @pytest.mark.parametrize('document', DOCUMENTS, ids=lambda document: document.name)

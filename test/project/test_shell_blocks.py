@@ -84,6 +84,7 @@ AT_HAND: dict[str, Callable[[Path], object]] = {
     'first.csv': demonstration(1.0), 'second.csv': demonstration(1.1),
     'my_robot.xml': copied(Path(package).parent / 'models' / 'mini_quadruped.xml'),
     'my_robot.yaml': copied(find_config('robots/mini_quadruped')),
+    'my_suite.yaml': copied(find_config('suite.yaml')),
     'monday': latest, 'tuesday': latest, 'wednesday': latest}
 """Files that a reader has, and how they are made."""
 

@@ -43,11 +43,10 @@ def needs_make() -> None:
 
 
 def recipe(*words: str) -> str:
-    """The one line that ``make WORDS`` runs in the environment that it has made."""
+    """The last line that ``make WORDS`` runs in the environment that it has made."""
     done = subprocess.run(['make', '--dry-run', '--directory', str(ROOT), *words], check=True,
                           capture_output=True, text=True, timeout=60)
-    (line,) = (line for line in done.stdout.splitlines() if '/bin/activate && ' in line)
-    return line
+    return [line for line in done.stdout.splitlines() if f'{ROOT}/.venv/bin/' in line][-1]
 
 
 @cache
