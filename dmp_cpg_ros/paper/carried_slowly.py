@@ -31,6 +31,10 @@ from dmp_cpg_ros.core.maths.roots import last_that_holds
 _PARTS = 8  # steps in an age
 _STEPS = 320  # at most, until solutions with and without delay are told to stay together
 _PASSES = 80  # at most, for what samples of a step may be
+_ROOM = 0.02  # of r0, added to what solutions have departed by where bounds are looked for
+
+Bounds = Callable[[Array], tuple[Array, Array]]
+"""Decay κ − e, and |(1 − dκ)I + dF'|, within a distance of the solution without delay."""
 
 
 def slowly_carried_margin(capture: Capture, omega_rate: float) -> float:
@@ -193,10 +197,9 @@ def _follows(capture: Capture, age: float, omega_rate: float) -> bool:
     path, taken = Undelayed(capture, h, omega_rate), [nothing] * _PARTS
     bends = apart = [nothing] * (_PARTS + 1)
     weights = h * h * (np.arange(_PARTS, 0.0, -1.0) - 0.5)                   # the oldest first
-    D, X, room = nothing, nothing, 0.02 * r0
+    D = X = nothing
 
     def bounds(departed: Array) -> tuple[Array, Array]:
-        """Decay κ − e, and |(1 − dκ)I + dF'|, within a distance of ȳ."""
         reach = 2.0 * rho * (R + departed) ** 2
         grows = growth(system.rho, system.radius, np.maximum(
             0.0, found.smallest_radius - departed))
@@ -212,26 +215,11 @@ def _follows(capture: Capture, age: float, omega_rate: float) -> bool:
         before = np.minimum(2.0 * bent + 3.0 * age * off + age * age * path.drive
                             + path.moved + weights @ apart[1:] + age * h * apart[0],
                             entry + u) if n <= _PARTS else nothing
-        within = 1.5 * D + room
-        for _ in range(_PASSES):
-            sigma = np.maximum(np.maximum(old, X) + missed, before)
-            decay, norm = bounds(within)
-            if not decay.min() > 0.0:
-                return False
-            faded = np.exp(-decay * h)
-            end = faded * D + (1.0 - faded) / decay * (k @ sigma)
-            most = np.maximum(D, end)
-            new = np.maximum(most, norm * most + age * (k @ sigma))
-            if np.all(new <= X) and np.all(most <= within):
-                settled, X = bool(np.all(new > 0.999 * X)), new  # no more than what X allows
-                if settled:
-                    break
-                continue
-            X, within = 1.0005 * np.maximum(X, new) + 1e-12, np.maximum(within, 1.05 * most)
-            if X.max() > 5.0 * r:
-                return False
-        else:
+        known = np.maximum(old + missed, before)
+        departed = _departed(capture, age, (D, X), (known, missed), bounds)
+        if departed is None:
             return False
+        end, X = departed
         seen = np.maximum(u + np.maximum(old, X) + missed, entry if n <= _PARTS else 0.0)
         if not np.all(capture.room(k @ seen - degree * r0) > 0.0):
             return False
@@ -242,15 +230,53 @@ def _follows(capture: Capture, age: float, omega_rate: float) -> bool:
     return False
 
 
+def _departed(capture: Capture, age: float, so_far: tuple[Array, Array],
+              samples: tuple[Array, Array], bounds: Bounds) -> tuple[Array, Array] | None:
+    """How far solutions have departed at the end of a step, D, and X within it; None where no X is
+    found.
+
+    Parameters
+    ----------
+    capture, age
+        As for :func:`_follows`.
+    so_far : tuple of ndarray (N,)
+        D and X at the end of the step before.
+    samples : tuple of ndarray (N,)
+        How far samples received are off at least, and what they miss beyond X.
+    bounds : callable
+        Decay and norm within a distance of ȳ.
+    """
+    (D, X), (known, missed), k, h = so_far, samples, capture.coupling, age / _PARTS
+    within = 1.5 * D + _ROOM * capture.region_radius
+    for _ in range(_PASSES):
+        pull = k @ np.maximum(known, X + missed)
+        decay, norm = bounds(within)
+        if not decay.min() > 0.0:
+            return None
+        faded = np.exp(-decay * h)
+        end = faded * D + (1.0 - faded) / decay * pull
+        most = np.maximum(D, end)
+        new = np.maximum(most, norm * most + age * pull)
+        if np.all(new <= X) and np.all(most <= within):
+            settled, X = bool(np.all(new > 0.999 * X)), new  # no more than what X allows
+            if settled:
+                return end, X
+            continue
+        X, within = 1.0005 * np.maximum(X, new) + 1e-12, np.maximum(within, 1.05 * most)
+        if X.max() > 5.0 * capture.radius:
+            return None
+    return None
+
+
 def _stay_together(capture: Capture, age: float, path: Undelayed, bend: Array, D: Array,
-                   taken: list[Array], bounds: Callable[[Array], tuple[Array, Array]]) -> bool:
+                   taken: list[Array], bounds: Bounds) -> bool:
     """Whether what solutions with and without delay have departed by now is within a multiple of
     what they can for ever, and C is not left then.
     """
     k, old = capture.coupling, np.max(taken, axis=0)
     u, later = path.ever()
     missed, none = 0.5 * age * age * np.maximum(bend, later), np.zeros(len(k))
-    within = 1.5 * np.maximum(D, old) + 0.02 * capture.region_radius
+    within = 1.5 * np.maximum(D, old) + _ROOM * capture.region_radius
     decay, norm = bounds(within)
     if not decay.min() > 0.0:
         return False
