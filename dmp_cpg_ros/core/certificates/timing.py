@@ -267,11 +267,13 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
     away = span.omega_slope * speed * r                      # |∂f/∂ω| |ω − ω_rest| at first
     of = _falling(s, capture, turning, away) if step is None else _falling_in_steps(
         s, capture, step)
-    fade = math.exp(-alpha_r * of.cell)
+    fade, cells = math.exp(-alpha_r * of.cell), int(_HORIZON / of.cell)
+    if a_b == 0.0 and not speed * fade ** (cells - 1) <= 1.001 * supervisor.REST_SPEED:
+        return math.inf
     swings = _filtered(math.exp(-s.parameters.leg.activity_rate * of.cell))
     carried, fed = _in_a_block(of)
     bounds, activity = of.start, np.ones(N)
-    for begin in range(0, int(_HORIZON / of.cell), _BLOCK):
+    for begin in range(0, cells, _BLOCK):
         speeds, driven = [], []
         for _ in range(_BLOCK):
             speeds.append(speed)
@@ -293,8 +295,8 @@ def _settling(s: Setting, capture: CaptureSet, rest: InhibitedEquilibrium, speed
             & (np.array(speeds) <= supervisor.REST_SPEED)
             & (swinging[:-1].max(axis=1) <= supervisor.REST_ACTIVITY))
         if len(resting) > 0:
-            cells = begin + int(resting[0])
-            return cells * of.cell if cells < int(_HORIZON / of.cell) else math.inf
+            cell = begin + int(resting[0])
+            return cell * of.cell if cell < cells else math.inf
         bounds, activity = within[-1], swinging[-1]
     return math.inf
 

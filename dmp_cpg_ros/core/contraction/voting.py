@@ -11,7 +11,7 @@ not. The nodes must be in their places when they vote, so that they enter their 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations, permutations
 
@@ -20,7 +20,7 @@ import numpy as np
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.contraction.capture import capture_set, shared_capture
 from dmp_cpg_ros.core.contraction.equilibrium import inhibited_equilibrium
-from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
+from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, inhibited_contraction
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.maths import Array
 
@@ -98,10 +98,15 @@ def certified_threshold(system: CanonicalSystem, omega: float | Array, voters: S
     box = capture_set(system, omega, _votes(system, voters, 1.0), region_radius)
 
     def certified(alpha: float) -> bool:
-        capture = shared_capture(system, omega, capture_set(
-            system, omega, _votes(system, voters, alpha), region_radius, known=box),
-            region_radius)
-        return capture.holds and inhibited_contraction(system, capture).reach != NONE
+        gains = _votes(system, voters, alpha)
+        capture = shared_capture(system, omega, replace(box, gains=gains, rate=-np.inf),
+                                 region_radius)
+        if not capture.holds:
+            return False
+        if inhibited_contraction(system, capture).reach == GLOBAL:
+            return True
+        rate = capture_set(system, omega, gains, region_radius, known=box).rate
+        return inhibited_contraction(system, replace(capture, rate=rate)).reach != NONE
 
     return _threshold(certified, _scale(system, omega, region_radius))
 
