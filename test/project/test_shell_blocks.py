@@ -7,7 +7,7 @@ from __future__ import annotations
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -38,8 +38,14 @@ report is seen in ``make demo``.
 """
 
 LIGHT = (*SHORT, '--rate', str(SHARED_HZ))
-"""Options of all but those of the README, which are at the usual rate: the machine has less to do,
-and what they show is the same.
+"""Options of all walks but the bare ``walk`` of the README, which has the usual rate: the machine
+has less to do, and what they show is the same.
+"""
+
+SPREAD = {'--composed', '--respawn'}
+"""Options about processes. Walks with none of them are typed with the first, but for a bare
+``walk``: in one process they publish the same, bit for bit (``test_suite_walks.py``), and take a
+third of the time.
 """
 
 CLIENTS = ('robot_client', 'live_view')
@@ -98,9 +104,9 @@ class Reader:
     """A reader in a folder who types one line after the other."""
 
     def __init__(self, domain: int, folder: Path, recorded: Callable[[], Path],
-                 options: Sequence[str] = ()) -> None:
+                 usual_rate: bool) -> None:
         self.processes, self.folder, self.recorded = Processes(domain), folder, recorded
-        self.options = options
+        self.usual_rate = usual_rate
         self.suites: list[NodeProcess] = []
         self.beside: list[NodeProcess] = []
 
@@ -162,7 +168,7 @@ class Reader:
             else:
                 self.suites[0].wait_for_output('  walking\n', PATIENCE_S)
         elif name == 'walk':
-            walk = self.start(shlex.join((*shlex.split(command), *self.options)))
+            walk = self.start(shlex.join((name, *words, *self.options(words))))
             self.suites.append(walk)
             waits = 'stand_by.yaml' in words or ('--view' in words and 'start_stop' not in words)
             walk.wait_for_output('  at rest\n' if waits else '  walking\n', PATIENCE_S)
@@ -172,15 +178,17 @@ class Reader:
             process = self.run(command)
             assert process.wait() == 0, process
 
-    def make(self, words: list[str]) -> None:
-        """Run what ``make`` would run, in the reader's folder.
+    def options(self, words: list[str]) -> list[str]:
+        """Options that are typed with those of a walk."""
+        light = LIGHT if words or not self.usual_rate else SHORT
+        return [*light, *(['--composed'] if words and not SPREAD & set(words) else [])]
 
-        In one process, which publishes the same, bit for bit (``test_suite_walks.py``): a process
-        per node takes three times as long for it.
-        """
+    def make(self, words: list[str]) -> None:
+        """Run what ``make`` would run, in the reader's folder, as any other walk with options."""
         assert words == ['demo'], words
         process = self.processes.start(
-            'bash', '-c', f'cd {self.folder}; {recipe(*words)} --composed')
+            'bash', '-c',
+            f'cd {self.folder}; {recipe(*words)} --composed --rate {SHARED_HZ}')
         assert process.wait(PATIENCE_S) == 0, process
         assert (self.folder / 'runs' / 'latest' / 'report.html').is_file(), process
 
@@ -204,7 +212,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def reader(name: str, tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Reader]:
     with reserved_domain() as domain:
         started = Reader(domain, tmp_path, lambda: request.getfixturevalue('recorded'),
-                         SHORT if name.startswith('README') else LIGHT)
+                         name.startswith('README'))
         try:
             yield started
         finally:
