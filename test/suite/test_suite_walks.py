@@ -20,7 +20,7 @@ from dmp_cpg_ros.core.gait.known_gaits import shares_of
 pytest.importorskip('rclpy')
 
 import ros_processes
-from ros_processes import NodeProcess, Processes, reserved_domain
+from ros_processes import SHARED_HZ, NodeProcess, Processes, reserved_domain
 
 from dmp_cpg_ros.analysis.bag import opened, payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -144,7 +144,8 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
         for name, options in kinds.items():
             own = Processes(domains.enter_context(reserved_domain()))
             domains.callback(own.end)
-            started.append(start_walk(own, scenario, tmp_path / name, '--lock-step', *options))
+            started.append(start_walk(own, scenario, tmp_path / name, '--lock-step',
+                                      '--rate', str(SHARED_HZ), *options))
             os.sched_setaffinity(started[-1].pid, {min(os.sched_getaffinity(0))})
         for process in started:
             assert process.wait(3.0 * RUN_S) == 0, str(process)
@@ -163,8 +164,9 @@ def test_lock_step_runs_agree_bit_for_bit_however_they_are_run(
         counts = load_recording(run / 'bag').counts
         assert counts['/inhibition_gains'] == counts['/canonical_state'], run.name
 
-    recording, (states, ticks) = load_recording(first / 'bag'), plain_run(scenario)
-    assert len(recording.joints.time) == len(ticks) == 1250
+    recording, (states, ticks) = load_recording(first / 'bag'), plain_run(
+        scenario, control_rate=SHARED_HZ)
+    assert len(recording.joints.time) == len(ticks) == 500
     np.testing.assert_array_equal(
         recording.joints.position, [state.joint_position for state in states[:-1]]
     )

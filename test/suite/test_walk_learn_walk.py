@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 import ros_processes
-from ros_processes import Processes
+from ros_processes import SHARED_HZ, Processes
 from walked_feet import Walk
 
 from dmp_cpg_ros.analysis.loading import load_recording
@@ -44,7 +44,7 @@ def test_a_walk_is_learned_from_its_recording_and_walked_again(
 
     def walk(name: str, *options: str) -> int:
         return processes.executable(
-            'walk', str(scenario), '--no-report', '--lock-step',
+            'walk', str(scenario), '--no-report', '--lock-step', '--rate', str(SHARED_HZ),
             '--composed', '--out', str(tmp_path / name), *options).wait(RUN_S)
 
     assert walk('shown') == 0
@@ -56,13 +56,15 @@ def test_a_walk_is_learned_from_its_recording_and_walked_again(
     assert played['robot']['distance_m'] == pytest.approx(shown['robot']['distance_m'], rel=0.05)
     assert played['stop']['measured_s'] == pytest.approx(played['stop']['predicted_s'], abs=1e-9)
 
-    loop = Walk({**motion_overrides(str(file)), 'cmd_vel_timeout': 0.5})
+    loop = Walk({**motion_overrides(str(file)), 'cmd_vel_timeout': 0.5,
+                 'control_rate': SHARED_HZ})
 
     def step() -> RobotState:
-        loop.go(0.004)
+        loop.go(loop.tick_s)
         return loop.state
 
-    play(load_scenario(scenario), 4_000_000, step, {**loop.loop.takers, **loop.robot.takers})
+    play(load_scenario(scenario), loop.robot.tick_ns, step,
+         {**loop.loop.takers, **loop.robot.takers})
     np.testing.assert_array_equal(
         load_recording(tmp_path / 'played' / 'bag').targets.position,
         [tick.targets.position for tick in loop.ticks])

@@ -40,6 +40,7 @@ class Walk:
 
     def __init__(self, overrides: Mapping[str, Any]) -> None:
         suite = load_suite(overrides={'cmd_vel_timeout': 0.0, **overrides})
+        self.tick_s = suite.tick_ns * 1e-9
         self.robot = MujocoRobot(suite.robot_file, suite.tick_ns, sensors=suite.sensors)
         self.loop = WalkingLoop(
             self.robot.description, suite.gait, suite.parameters, load_gaits())
@@ -49,7 +50,7 @@ class Walk:
     def go(self, duration: float) -> float:
         """Walk on; returns the mean forward speed [m/s]."""
         speeds = []
-        for _ in range(round(duration / 0.004)):
+        for _ in range(round(duration / self.tick_s)):
             self.states.append(self.state)
             self.ticks.append(self.loop.tick(self.state))
             self.state = self.robot.step(self.ticks[-1].targets)
@@ -63,13 +64,13 @@ class Walk:
             self.robot.description, self.loop.network.gait, self.loop.network.scale)
         feet = []
         for i, leg in enumerate(control.primitive for control in self.loop.legs):
-            rows, last = [], -round(seconds / 0.004)
+            rows, last = [], -round(seconds / self.tick_s)
             joints = slice(3 * i, 3 * i + 3)
             targets = [tick.targets for tick in self.ticks[last - 1 :]]
             goals = leg.transformation.goals(
                 np.array([target.position[joints] for target in targets]),
                 np.array([target.velocity[joints] for target in targets]),
-                np.full(-last, 0.004))
+                np.full(-last, self.tick_s))
             for tick, state, goal in zip(
                 self.ticks[last:], self.states[last:], goals, strict=True
             ):
