@@ -70,7 +70,7 @@ BENCHMARK_ARGS ?=
 DUEL_ARGS ?=
 FIGURE_ARGS ?=
 
-.PHONY: help demo test test-install study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images view-image paper-figures paper-page bench bench-ros doc deb lint install clean
+.PHONY: help demo test test-install study-stops study-recovery study-faults study-starts study-adversary study-commands study-files benchmark-walking duel doc-images headlines view-image paper-figures paper-page bench bench-ros doc deb lint install clean
 .DELETE_ON_ERROR:
 
 help: ## list these targets
@@ -121,6 +121,9 @@ doc-images: $(INSTALLED) ## make the pictures of the documents
 	cp $(addprefix build/doc_images/figures/,walking.png canonical_states.png footfall.png phase_portrait.png) doc/images/
 	$(ACTIVATED) python -m dmp_cpg_ros.commands.film build/doc_images doc/images/stop_and_start.gif \
 	  --start 12.5 --end 20.5 --fps 12.5 --width 480
+
+headlines: $(INSTALLED) ## write the headlines of the README from the files of the studies in doc/results/
+	$(ACTIVATED) cd test && python support/headlines.py
 
 view-image: $(INSTALLED) ## draw the picture of the live view; needs Chromium
 	$(ACTIVATED) cd test && python support/view_picture.py $(CURDIR)/doc/images/live_view.png

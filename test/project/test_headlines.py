@@ -1,0 +1,64 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers of the README are those of the files that the commands have written."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from headlines import README, STUDIES, headlines, missing, section, table_of_studies, tables
+
+from dmp_cpg_ros.configuration import find_config, load_yaml
+
+ROWS = table_of_studies()
+NUMBER = r'\d+(?:,\d{3})*(?:\.\d+)?'
+
+
+def numbers(text: str) -> list[str]:
+    return [number.replace(',', '') for number in re.findall(NUMBER, text)]
+
+
+def told(text: str) -> set[str]:
+    """Numbers of a text, what they are when they are rounded, and the sums of its tables' columns.
+    """
+    found = numbers(text)
+    for table in tables(text):
+        for name in table[0]:
+            cells = [row.get(name, '').replace(',', '') for row in table]
+            if all(map(str.isdigit, cells)):
+                found.append(str(sum(map(int, cells))))
+    return {*found, *(f'{float(number):.{digits}f}' for number in found for digits in (0, 1))}
+
+
+def test_headlines_are_what_their_files_say() -> None:
+    found = headlines()
+    assert found == {anchor: ROWS[anchor][1] for anchor in found}
+
+
+@pytest.mark.parametrize('study', STUDIES)
+def test_the_table_of_a_study_is_what_its_file_says(study: str) -> None:
+    assert missing(study) == []
+
+
+@pytest.mark.parametrize('study', ROWS)
+def test_a_headline_has_no_number_that_its_document_has_not(study: str) -> None:
+    title, headline, command = ROWS[study]
+    links = re.findall(r'\]\(([^)]+#[^)]+)\)', title + command)
+    assert set(numbers(headline)) <= told('\n'.join(map(section, links)))
+
+
+def test_the_other_numbers_of_the_readme_are_those_of_the_scenarios() -> None:
+    text = README.read_text(encoding='utf-8')
+    events = load_yaml(find_config('scenarios/start_stop.yaml'))['events']
+    requests = [(event['inhibit'], event['at']) for event in events if 'inhibit' in event]
+    begin, end = re.findall(r'inhibited at ([\d.]+) s, and released at ([\d.]+) s', text)[0]
+    assert {(True, float(begin)), (False, float(end))} <= set(requests)
+    assert 'five minutes for your commands' in text
+    assert load_yaml(find_config('scenarios/stand_by.yaml'))['duration'] == 5 * 60.0
+
+
+def test_a_number_that_nobody_has_measured_is_noticed() -> None:
+    text = '| kills | fell |\n|---|---|\n| 1,200 | 0 |\n| 300 | 1 |\n\nIn 12.46 s.\n'
+    assert {'1200', '300', '1500', '12.46', '12.5', '12', '1'} <= told(text)
+    assert not {'1501', '12.4', '13', '2'} & told(text)

@@ -1,0 +1,299 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the documents say of studies, made from the files that their commands write.
+
+``python headlines.py`` (``make headlines``) writes the headlines of the README anew, and prints
+what ``doc/results.md`` should say and does not.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from statistics import median
+from typing import Any
+
+from checkout import ROOT
+
+from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, relative_error
+
+README = ROOT / 'README.md'
+
+FOLDER = ROOT / 'doc' / 'results'
+"""Where the files are, named as the sections: ``COMMAND --json doc/results/SECTION.json``."""
+
+STOPS = ROOT / 'doc' / 'stops.md'
+"""The table that ``study_stops`` prints."""
+
+
+def table_of_studies() -> dict[str, list[str]]:
+    """Rows of the README's table by the anchor of their first link: cells with their marks."""
+    rows = README.read_text(encoding='utf-8').partition('| study | headline | command |\n')[2]
+    found = {}
+    for line in rows.partition('\n\n')[0].splitlines()[1:]:
+        cells = line.strip('| ').split(' | ')
+        found[re.findall(r'\]\([^)]*#([^)]+)\)', cells[0])[0]] = cells
+    return found
+
+
+def section(link: str) -> str:
+    """Text of a document below a heading, up to the next of its rank; of ``FILE#anchor``."""
+    name, _, anchor = link.partition('#')
+    lines, rank = [], 0
+    for line in (ROOT / name).read_text(encoding='utf-8').splitlines():
+        here = len(line) - len(line.lstrip('#'))
+        if here and rank:
+            if here <= rank:
+                break
+        elif here and slug(line) == anchor:
+            rank = here
+        if rank:
+            lines.append(line)
+    return '\n'.join(lines)
+
+
+def slug(heading: str) -> str:
+    """What a link to a heading ends with."""
+    return re.sub(r'[^\w -]', '', heading.lstrip('# ')).strip().lower().replace(' ', '-')
+
+
+def tables(text: str) -> Iterator[list[dict[str, str]]]:
+    """Tables of a text, each as rows by the names of the columns."""
+    for block in re.findall(r'(?:^\|.*\|\n?)+', text, re.MULTILINE):
+        head, _, *rows = ([cell.strip() for cell in line.strip().strip('|').split('|')]
+                          for line in block.splitlines())
+        yield [dict(zip(head, cells, strict=False)) for cells in rows]
+
+
+# --- headlines of the README ------------------------------------------------------------------
+
+
+def experiment(metrics: Any) -> str:
+    """Of ``metrics.json`` of ``make demo``."""
+    stop, start = (as_predicted(metrics[what]) for what in ('stop', 'start'))
+    return f'stop in {stop} (bound {metrics["stop"]["bound_s"]:.3f} s), resume in {start}'
+
+
+def as_predicted(episodes: Any) -> str:
+    """Duration of the worst of some episodes, and whether it was that which was predicted."""
+    measured, predicted = episodes['measured_s'], episodes['predicted_s']
+    assert episodes['completed'] == episodes['count'] > 0, episodes
+    return f'{measured:.3f} s as predicted' if abs(measured - predicted) < 0.5e-3 else (
+        f'{measured:.3f} s, {predicted:.3f} s predicted')
+
+
+def stops(rows: Sequence[dict[str, str]]) -> str:
+    """Of the table of ``doc/stops.md``."""
+    of = {way: [row for row in rows if row['gait'] != 'all' and row['stopped by'] == way]
+          for way in ('inhibition', 'freeze')}
+    count, fell = (sum(int(row[name]) for row in of['inhibition']) for name in ('cases', 'fell'))
+    over = sum(int(row['over bound'].partition('/')[0]) for row in of['inhibition'])
+    least = [min(int(row[name].removesuffix(' %')) for row in of['inhibition'])
+             for name in ('stood', 'walked on')]
+    fate = 'all stood and walked on' if least == [100, 100] else (
+        f'stood {least[0]} %, walked on {least[1]} % at worst')
+    return (f'{count:,} stops: {fell} falls, {fate}, bound {over or "never"} exceeded; freezing '
+            f'all phases instead: {sum(int(row["fell"]) for row in of["freeze"])} falls')
+
+
+def speeds(results: Any) -> str:
+    """Of ``benchmark_walking --tables speeds``."""
+    held = [(one['case'], errors(one)) for one in results['speeds']]
+    most = {gait: max(case['velocity'][0] for case, _ in held if case['gait'] == gait)
+            for gait in ('amble', 'trot')}
+    worst = max(error for _, error in held)
+    return (f'amble to {most["amble"]:.1f} m/s, trot to {most["trot"]:.1f} m/s: speed error at '
+            f'most {100.0 * worst:.1f} %')
+
+
+def errors(one: Any) -> float:
+    """Relative error of a velocity that was held; without a fall it is a number."""
+    outcome = SteadyOutcome(**{name: value if value is not None else float('nan')
+                               for name, value in one['outcome'].items()})
+    assert not outcome.fell, one
+    return relative_error(outcome, tuple(one['case']['velocity']))
+
+
+def gaits(results: Any) -> str:
+    """Of ``benchmark_walking --tables gaits``."""
+    outcomes = [one['outcome'] for one in results['gaits']]
+    names = {one['case']['before'] for one in results['gaits']}
+    number = ('no', 'one', 'two', 'three', 'four', 'five', 'six')[len(names)]
+    digits, power = f'{max(one["phase_error"] for one in outcomes):.0e}'.split('e')
+    sign = str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))
+    return (f'{len(outcomes)} changes between {number} gaits: '
+            f'{sum(one["fell"] for one in outcomes) or "no"} fall, largest phase error '
+            f'{digits}·10{sign} rad')
+
+
+def tightness(rows: Any) -> str:
+    """Of ``tightness``."""
+    def span(*conditions: str, digits: int = 2) -> str:
+        ratios = [ratio(row) for row in rows if row['condition'] in conditions]
+        low, high = (f'{of(ratios):.{digits}f}' for of in (min, max))
+        return low if low == high else f'{low} to {high}'
+
+    tubes, slow = 'contraction along tubes', ', slow gait'
+    return (f'certified over smallest gain: {span("synchronisation")} synchronisation, '
+            f'{span("capture")} capture, {span("vote of two")} votes; contraction '
+            f'{span(tubes, tubes + slow)} along tubes, '
+            f'{span("contraction", "contraction" + slow, digits=1)} in a constant norm')
+
+
+def ratio(row: Any) -> float:
+    """How much more a certificate asks for than what works."""
+    return max(row['certified'] / row['works'], row['works'] / row['certified'])
+
+
+def falls(results: Any) -> str:
+    """Of ``study_recovery``."""
+    (of,) = results.values()
+    stood = [fall for fall in of if fall['stands']]
+    return (f'{len(stood)} of {len(of)} recovered to standing, '
+            f'{median(fall["seconds"] for fall in stood):.1f} s in the median')
+
+
+# --- tables of doc/results.md -----------------------------------------------------------------
+
+
+def experiment_rows(metrics: Any) -> list[str]:
+    """What the section about the experiment says, in pieces."""
+    stop, start = (as_predicted(metrics[what]) for what in ('stop', 'start'))
+    moved = max(one['body_speed_at_rest_m_s'] for one in metrics['stop']['all'])
+    return [f'speed error of at most {100.0 * metrics["tracking"]["v_error_max"]:.1f} %, '
+            f'{metrics["robot"]["distance_m"]:.1f} m in all',
+            f'stopped by the service in {stop} (bound {metrics["stop"]["bound_s"]:.3f} s',
+            f'the body below {1e3 * moved:.1f} mm/s; resumed in {start}',
+            f'Yaw drift {abs(metrics["robot"]["yaw_drift_deg_per_10m"]):.1f}° per 10 m',
+            f'off by {abs(metrics["estimation"]["yaw_error_deg_per_10m"]):.1f}° per 10 m']
+
+
+def stop_rows(rows: Sequence[dict[str, str]]) -> list[str]:
+    """Rows of the table of stops: all of them, by each way to stop."""
+    ways = {'inhibition': 'inhibiting one oscillator', 'freeze': 'freezing all phases at once',
+            'finish_swing': 'letting every leg finish its swing'}
+    names = ('fell', 'stood', 'body rest s', 'slip mm', 'moved m', 'tilt deg', 'm/s^2')
+    return [' | '.join((f'| {ways[row["stopped by"]]}', *(row[name] for name in names))) + ' |'
+            for row in rows if row['gait'] == 'all']
+
+
+def speed_rows(results: Any) -> list[str]:
+    """Rows of the table of speeds: straight ahead, gait by gait."""
+    rows = []
+    for gait in dict.fromkeys(one['case']['gait'] for one in results['speeds']):
+        ahead = [one for one in results['speeds'] if one['case']['gait'] == gait
+                 and one['case']['velocity'][0] > 0.0 and not any(one['case']['velocity'][1:])]
+        costs = [one['outcome']['cost_of_transport'] for one in ahead]
+        rows.append(' | '.join((
+            f'| {gait}', ', '.join(f'{one["case"]["velocity"][0]:g}' for one in ahead),
+            f'at most {100.0 * max(map(errors, ahead)):.1f} %',
+            f'at most {max(abs(one["outcome"]["yaw_drift"]) for one in ahead):.1f}°',
+            f'{min(costs):.2f} to {max(costs):.2f} |')))
+    return rows
+
+
+TIGHTNESS = {
+    'synchronisation': 'synchronisation', 'capture': 'capture',
+    'contraction under inhibition, along tubes': 'contraction along tubes',
+    'the same at ω = 3 rad/s': 'contraction along tubes, slow gait',
+    'contraction in a constant norm, what `certify` asks for': 'contraction',
+    'the same at ω = 3 rad/s, too': 'contraction, slow gait',
+    'frequency mismatch': 'frequency mismatch', 'vote of two legs': 'vote of two'}
+"""Conditions of the study by their names in the document."""
+
+
+def tightness_rows(rows: Any) -> list[str]:
+    """Rows of the table of tightness: a condition, and its ratio on every graph."""
+    return [' | '.join((f'| {name}', *(f'{ratio(row):.2f}' for row in rows
+                                       if row['condition'] == condition))) + ' |'
+            for name, condition in TIGHTNESS.items()]
+
+
+def fall_rows(results: Any) -> list[str]:
+    """Sentence about falls, as the only row."""
+    (of,) = results.values()
+    rolls = [sum(fall['tries'] == n for fall in of) for n in (0, 1, 2)]
+    return [f'{len(of)} of {len(of)} falls recovered to standing, {rolls[0]} without rolling, '
+            f'{rolls[1]} with one roll, {rolls[2]} with two; '
+            f'{median(fall["seconds"] for fall in of):.1f} s in the median, '
+            f'{max(fall["seconds"] for fall in of):.1f} s at most.']
+
+
+def gait_rows(results: Any) -> list[str]:
+    """Sentence about changes of gait, as the only row."""
+    outcomes = [one['outcome'] for one in results['gaits']]
+    durations = [one['duration'] for one in outcomes]
+    worst = gaits(results).rpartition(', ')[2]
+    return [f'{len(outcomes)} changes: no fall, {worst}, done after {min(durations):.1f} to '
+            f'{max(durations):.1f} s.']
+
+
+# --- both ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is said of a study.
+
+    Attributes
+    ----------
+    headline : callable
+        Content of its file → headline of the README.
+    rows : callable
+        Content of its file → lines of ``doc/results.md``.
+    """
+
+    headline: Callable[[Any], str]
+    rows: Callable[[Any], list[str]]
+
+
+STUDIES = {
+    'the-experiment': Study(experiment, experiment_rows),
+    'speeds': Study(speeds, speed_rows), 'changes-of-gait': Study(gaits, gait_rows),
+    'tightness-of-the-certificates': Study(tightness, tightness_rows),
+    'falls': Study(falls, fall_rows), 'stops-at-every-phase': Study(stops, stop_rows)}
+"""Studies that have a file, ``doc/results/ANCHOR.json``, by the anchor of their section; that of
+the experiment is a run's ``metrics.json``, and that of stops is :data:`STOPS`.
+"""
+
+
+def content(anchor: str) -> Any:
+    """What the command of a study has written."""
+    if anchor == 'stops-at-every-phase':
+        (rows,) = tables(STOPS.read_text(encoding='utf-8'))
+        return rows
+    return json.loads((FOLDER / f'{anchor}.json').read_text(encoding='utf-8'))
+
+
+def headlines() -> dict[str, str]:
+    """Headlines by the anchor of their row, of all studies that have a file."""
+    return {anchor: study.headline(content(anchor)) for anchor, study in STUDIES.items()}
+
+
+def missing(anchor: str) -> list[str]:
+    """Lines that ``doc/results.md`` should have of a study, and has not."""
+    text = section(f'doc/results.md#{anchor}')
+    return [row for row in STUDIES[anchor].rows(content(anchor)) if row not in text]
+
+
+def main() -> int:
+    """Write the README's headlines; returns the exit status."""
+    text = README.read_text(encoding='utf-8')
+    rows = table_of_studies()
+    for anchor, headline in headlines().items():
+        title, before, command = rows[anchor]
+        text = text.replace(f'| {title} | {before} | {command} |',
+                            f'| {title} | {headline} | {command} |')
+        print(f'{anchor}: {headline}')
+    README.write_text(text, encoding='utf-8')
+    for anchor in STUDIES:
+        for row in missing(anchor):
+            print(f'doc/results.md#{anchor} has not: {row}')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
