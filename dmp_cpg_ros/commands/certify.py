@@ -15,7 +15,8 @@ from dmp_cpg_ros.analysis.strict_json import to_json, write_json
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.configuration import find_config
 from dmp_cpg_ros.core.certificates import inequality, proof, suggest, votes
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.reference.operating_range import operating_range

@@ -24,7 +24,8 @@ from dmp_cpg_ros.configuration import (
     naming,
     unused_sections,
 )
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.errors import DmpCpgError, MissingFileError, ParameterError
 from dmp_cpg_ros.core.scenario.scenario import Scenario
 from dmp_cpg_ros.primitive_files import motion_overrides

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dmp_cpg_ros.core.balance.controller import PostureFeedback
-from dmp_cpg_ros.core.certificates.changes import refused_change
-from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
+from dmp_cpg_ros.core.certificates.gate import Change, Running
 from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError
 from dmp_cpg_ros.core.estimation.estimator import BodyEstimator, EstimatorState, estimated_state
@@ -247,12 +246,11 @@ class WalkingLoop:
         present = self._described(self.parameters, canon.wanted)
         proposed = self._described(present.changed(values).parameters, wanted)
         leading_to = named(canon.leading_to.name)
-        reason = refused_change(
-            proposed.parameters, (leading_to, canon.wanted, wanted), present.scale, self._dt,
-        ) or proposed.refused_now(present, self.network, self.inhibition, self.x)
-        if reason:
-            return reason
-        verdict = CertificateGate().judge(present, present.certificate(), proposed)
+        waits = proposed.refused_now(present, self.network, self.inhibition, self.x)
+        if waits:
+            return waits
+        verdict = Change(present, present.settled.certificate(), proposed,
+                         (leading_to, canon.wanted, wanted)).verdict()
         if verdict.accepted:
             p = proposed.parameters
             self._take(p, wanted)

@@ -103,6 +103,16 @@ def shown(value: Any) -> str:
     return text if len(text) <= LONGEST_SHOWN else f'{text[:LONGEST_SHOWN]}...'
 
 
+def typed(value: Any) -> str:
+    """Value as one types it for a parameter: lists in brackets, floats never as whole numbers."""
+    if isinstance(value, (tuple, list)):
+        return f'[{", ".join(map(str, value))}]'
+    if isinstance(value, float):
+        text = f'{value:g}'
+        return text if set(text) & set('.en') else f'{text}.0'
+    return str(value)
+
+
 def _range(field: dataclasses.Field[Any]) -> tuple[float, float]:
     low, high = field.metadata['minimum'], field.metadata['maximum']
     return -math.inf if low is None else low, math.inf if high is None else high

@@ -102,7 +102,7 @@ class CanonicalOscillators(SuiteNode):
                                   cadence_scale=gait.cadence_scale)
         self._take_inhibition(stamp_ns, values['inhibition_gains'])
         state = self._canonical.step(
-            self._state, r, self._inhibition, dt, force, self.certified.certificate.contact)
+            self._state, r, self._inhibition, dt, force, self.certified.contact)
         message = self._writer.fill(  # refuses what is not finite
             stamp_ns, state.x, state.x_dot, state.gait, self._canonical.cadence_rate(state))
         self._state = state
@@ -144,7 +144,7 @@ class CanonicalOscillators(SuiteNode):
         acting = self._inhibition.gains.any() and network.acting_gains(
             self._inhibition, self._state.x).any()
         former = LOCKED if self._lock is None else self._lock.level
-        limits = self.certified.certificate.contact
+        limits = self.certified.contact
         own = 0.0 if limits is None else limits.own
         self._lock = self._watch.step(self._lock, network, r, self._state.x, not acting, dt, own)
         if self._lock.level > former:

@@ -20,7 +20,8 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
-from dmp_cpg_ros.core.certificates.certify import GROUND, Certificate, spring_damper_contraction
+from dmp_cpg_ros.core.certificates.certify import GROUND, spring_damper_contraction
+from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP
 from dmp_cpg_ros.core.contraction.capture_anywhere import needed_gain_anywhere
 from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian
@@ -221,7 +222,7 @@ def _judge_hierarchy(description: RobotDescription, case: Case, weaken: bool) ->
     out of it.
     """
     loop, dt = Oscillators(description, case), case['tick_s']
-    found, p = loop.in_force().certificate(), loop.parameters
+    found, p = loop.in_force().certificate(whole=True), loop.parameters
     rate = found['hierarchy'].right
     if weaken:
         rate = min(found['reference'].right, found['transformation'].right,
@@ -251,7 +252,7 @@ def _loop(description: RobotDescription, case: Case, row: str, weaken: bool
           ) -> tuple[Oscillators, Certificate] | None:
     """Loop of a case and its certificate, of which a row that is left out is what fails."""
     loop = Oscillators(description, case)
-    found = loop.in_force().certificate()
+    found = loop.in_force().certificate(whole=True)
     with_it = (row, *_WITH_IT.get(row, ()))
     others = all(one.holds for one in found.inequalities
                  if one.required and one.name not in with_it)
@@ -425,7 +426,7 @@ def _judge_frequencies(description: RobotDescription, case: Case, weaken: bool) 
     differ by what is expected are let through where the row is left out.
     """
     loop = Oscillators(description, case)
-    found = loop.in_force().certificate()
+    found = loop.in_force().certificate(whole=True)
     row = found['frequency_mismatch']
     if not found['synchronisation'].holds or not (row.right > 0.0 or weaken):
         return None
@@ -440,7 +441,7 @@ def _judge_contacts(description: RobotDescription, case: Case, weaken: bool) -> 
     """However the feet touch down, places and radii are those that capture takes for granted."""
     case = {**case, 'parameters': {**case['parameters'], 'contact_feedback': True}}
     loop = Oscillators(description, case)
-    found = loop.in_force().certificate()
+    found = loop.in_force().certificate(whole=True)
     if not found['synchronisation'].holds or not found['contact_feedback'].right > 0.0:
         return None
     share = 3.0 * case['share'] if weaken else min(case['share'], 0.999)

@@ -44,7 +44,7 @@ from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies.loop_recording import LoopRun
 from dmp_cpg_ros.studies.output import parser_of, write_results
 from dmp_cpg_ros.studies.tightness import network
-from dmp_cpg_ros.suite import Suite, load_suite
+from dmp_cpg_ros.suite import Suite, load_gaits, load_suite
 
 TICK, OMEGA, GAIN = 0.004, 9.0, 100.0
 """Tick [s], angular frequency [rad/s] and sum of the gains at each node [1/s] of the networks."""
@@ -153,11 +153,12 @@ def certificates() -> list[Row]:
     loop, new = run.loop, count(1)
     running, voting = running_parameters(suite), suite.parameters.voting
 
-    def change(name: str, value: Callable[[int], object]) -> Callable[[], object]:
+    def change(accepted: bool = True, **values: Callable[[int], object]) -> Callable[[], object]:
         def ask() -> None:
-            refused = loop.change({name: value(next(new))})
-            if refused:
-                raise RuntimeError(refused)
+            number = next(new)
+            refused = loop.change({name: value(number) for name, value in values.items()})
+            if accepted == bool(refused):
+                raise RuntimeError(refused or 'accepted')
 
         return ask
 
@@ -165,9 +166,18 @@ def certificates() -> list[Row]:
         ('', lambda: run.tick(run.tick_s)),
         (f'certificate of the defaults ({suite.gait.name})', lambda: certify(
             **running, voting=voting)),
-        ('another inhibition gain', change('inhibition_gain', lambda n: 400.0 - 1e-3 * n)),
-        ('another coupling gain', change('coupling_gain', lambda n: 100.0 + 1e-3 * n)),
-        ('another cadence', change('cadence_scale', lambda n: 1.0 + 1e-5 * n)),
+        ('another inhibition gain', change(inhibition_gain=lambda n: 400.0 - 1e-3 * n)),
+        ('another coupling gain', change(coupling_gain=lambda n: 100.0 + 1e-3 * n)),
+        ('another gait', change(gait=lambda n: ('trot', 'amble')[n % 2],
+                                coupling_gain=lambda n: 100.0 + 1e-3 * n)),
+        ('a refused inhibition gain, with one that works', change(
+            False, inhibition_gain=lambda n: 10.0 + 1e-3 * n)),
+        ('a refused coupling gain, with one that works', change(
+            False, coupling_gain=lambda n: 1.0 + 1e-4 * n)),
+        ('refused values of three, with some that work', change(
+            False, cadence_scale=lambda n: 4.0 - 1e-4 * n, coupling_gain=lambda n: 50.0,
+            rho=lambda n: 3.0)),
+        ('another cadence', change(cadence_scale=lambda n: 1.0 + 1e-5 * n)),
     ])
     return rows[1:]
 
@@ -182,7 +192,7 @@ def _walking() -> tuple[Suite, LoopRun[WalkingLoop]]:
     """The plain loop, 2 s after it was told to walk, and its parameters."""
     suite = load_suite(overrides={'cmd_vel_timeout': 0.0})
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
-    loop = WalkingLoop(robot.description, suite.gait, suite.parameters)
+    loop = WalkingLoop(robot.description, suite.gait, suite.parameters, load_gaits())
     loop.command(0.5)
     run = LoopRun(robot, loop)
     run.tick(500 * run.tick_s)

@@ -23,6 +23,8 @@ from tempfile import TemporaryDirectory
 from threading import Barrier
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from dmp_cpg_ros.analysis.bag import find_bag, opened, recorded
 from dmp_cpg_ros.analysis.strict_json import write_json
 from dmp_cpg_ros.commands.ros_arguments import run_command
@@ -30,6 +32,7 @@ from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.studies import bench_runs, long_recordings, relays
 from dmp_cpg_ros.studies.bench import parts_of_a_tick, seconds_of, ticks_per_second
 from dmp_cpg_ros.studies.bench_runs import Run, shared
+from dmp_cpg_ros.studies.judged_changes import judged_changes
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of
 from dmp_cpg_ros.suite_table import RECORDER, namespace_rules
 
@@ -38,9 +41,9 @@ SHARING = {'each': 'ten processes', 'blocks': 'blocks', 'composed': 'composed'}
 
 RATE_HZ, TICK_NS, LEAST_CORES, MUJOCO = 250.0, 4_000_000, 0.005, 'mj_step'
 
-RECORDED_RATES, MOST_ROBOTS, FULL = (1, 4, 16), 16, 0.98
+RECORDED_RATES, MOST_ROBOTS, FULL, CHANGES = (1, 4, 16), 16, 0.98, 50
 """Rates of the recorder's row, as multiples; number of robots, and real-time factor, at which no
-further robot is tried."""
+further robot is tried; how many changes are asked for."""
 
 BEGIN, END = '<!-- make bench-ros: begin -->', '<!-- make bench-ros: end -->'
 """Where the document has the table."""
@@ -253,6 +256,21 @@ class Bench:
                          'reading the bytes')
             yield Figure(f'{minutes} min: memory', 'MB', cost.memory_mb, least.memory_mb, '1 min')
 
+    def changes(self) -> Iterator[Figure]:
+        """Parameters that change while it walks: answers, and how long no tick comes meanwhile."""
+        for way in self.ways:
+            _say(f'{SHARING[way]}: {CHANGES} changes')
+            found = judged_changes(
+                bench_runs.FLAGS[way], self._folder / f'changes_{way}', CHANGES)
+            for word, of in (('median', np.median), ('longest', np.max)):
+                yield Figure(f'{SHARING[way]}: answer, {word}', 'ms',
+                             1e3 * float(of(found.answers)), 1e-6 * TICK_NS, 'a tick')
+            for percent in (99.0, 100.0):
+                busy, quiet = (1e3 * float(np.percentile(of, percent))
+                               for of in (found.busy, found.quiet))
+                yield Figure(f'{SHARING[way]}: period while one is judged, {percent:g} %', 'ms',
+                             busy, quiet, 'else')
+
     def robots(self) -> Iterator[Figure]:
         """Composed suites in namespaces, until one does not keep real time."""
         one: Sequence[Run] = ()
@@ -287,7 +305,7 @@ SHORT = ('startup', 'latency', 'cpu', 'wakeups', 'memory', 'jitter', 'lockstep',
          'recorder')
 """Rows that are measured where none are named; the first share their runs."""
 
-ROWS = (*SHORT, 'analyze', 'robots')
+ROWS = (*SHORT, 'analyze', 'robots', 'changes')
 """Rows, each a method of :class:`Bench`."""
 
 
@@ -298,7 +316,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.set_defaults(json=Path('bench_ros.json'))
     add = parser.add_argument
     add('--rows', nargs='+', choices=ROWS, default=SHORT, metavar='ROW',
-        help=f'rows to measure: {", ".join(ROWS)} (default: all but the last two)')
+        help=f'rows to measure: {", ".join(ROWS)} (default: all but the last three)')
     add('--ways', nargs='+', choices=SHARING, default=list(SHARING), metavar='WAY',
         help=f'how processes are shared: {", ".join(SHARING)} (default: all)')
     add('--seconds', type=float, default=10.0, help='length of every window (default: 10)')

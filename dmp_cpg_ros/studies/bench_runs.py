@@ -27,6 +27,9 @@ from dmp_cpg_ros.suite_table import PROCESSES, RECORDER, ROBOT
 SETTLE_S = 1.0
 """What follows the first ticks and is not measured [s]."""
 
+FLAGS = {'each': (), 'blocks': ('--processes', 'blocks'), 'composed': ('--composed',)}
+"""Arguments of ``walk`` by how processes are shared."""
+
 COMPETITOR = 'import os\nparent = os.getppid()\nwhile os.getppid() == parent: pass'
 """A busy loop that ends with its parent."""
 
@@ -134,7 +137,7 @@ def run_suite(way: str, folder: Path, seconds: float, lock_step: bool = False,
     begin, begin_s = time.monotonic(), time.time()
     walk = WalkProcess([
         str(scenario), '--no-report', '--out', str(folder / 'run'), '--namespace', namespace,
-        *{'each': [], 'blocks': ['--processes', 'blocks'], 'composed': ['--composed']}[way],
+        *FLAGS[way],
         *['--lock-step'] * lock_step])
     try:
         walking_s = walk.said('walking')

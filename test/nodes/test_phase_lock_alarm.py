@@ -4,6 +4,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 
 import numpy as np
@@ -13,10 +17,13 @@ pytest.importorskip('rclpy')
 
 import ros_processes
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
+from rclpy.task import Future
 from ros_processes import Ros
 
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
+from dmp_cpg_ros.nodes.framework.judging import judge
 from dmp_cpg_ros.nodes.messages.conversions import ReferenceWriter
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 
@@ -73,25 +80,112 @@ def test_a_disturbed_oscillator_raises_an_alarm_and_its_return_ends_it(ros: Ros)
     node.destroy_node()
 
 
-def test_ticks_go_on_while_a_change_is_judged(ros: Ros) -> None:
-    node = CanonicalOscillators(context=ros.context)
-    node.start()
-    topic, writer = interface('reference'), ReferenceWriter()
-    publisher = ros.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
-    ros.spin_until(lambda: publisher.get_subscription_count() == 1
-                   and node.count_publishers('reference') == 1)
-    sent = 0
+class Walking:
+    """Oscillators that walk, one tick after the other, and the service that changes them."""
 
-    def judged() -> bool:
-        """Nobody spins the node: what runs its ticks is the look for the nearest value."""
-        nonlocal sent
-        sent += 1
-        publisher.publish(writer.fill(sent * TICK_NS, np.zeros(3)).serialized)
-        (result,) = node.set_parameters([Parameter('cadence_scale', value=4.0)])
-        assert not result.successful
-        assert 'nearest value' in result.reason
-        return bool(node.health.ticks > 0)
+    def __init__(self, ros: Ros, **parameters: object) -> None:
+        self._ros, self._sent = ros, 0
+        self.node = CanonicalOscillators(context=ros.context, parameter_overrides=[
+            Parameter(name, value=value) for name, value in
+            {'start_inhibited': False, **parameters}.items()])
+        ros.executor.add_node(self.node)
+        self.node.start()
+        topic, self._writer = interface('reference'), ReferenceWriter()
+        self._publisher = ros.node.create_publisher(topic.type, topic.name, topic.publisher_qos)
+        self._client = ros.node.create_client(
+            SetParametersAtomically, 'canonical_oscillators/set_parameters_atomically')
+        ros.spin_until(lambda: self._publisher.get_subscription_count() == 1
+                       and self.node.count_publishers('reference') == 1
+                       and self._client.service_is_ready())
+        # an answer to a later client proves that the earlier one is heard
+        ros.call(GetParameters, 'canonical_oscillators/get_parameters', GetParameters.Request())
 
-    ros.spin_until(judged)
-    node.close()
-    node.destroy_node()
+    def tick(self, count: int) -> None:
+        for _ in range(count):
+            self._sent += 1
+            self._publisher.publish(
+                self._writer.fill(self._sent * TICK_NS, np.array([0.3, 0.0, 0.0])).serialized)
+            self._ros.spin_until(lambda: self.node.health.ticks == self._sent)
+
+    def ask(self, **values: object) -> Future:
+        return self._client.call_async(SetParametersAtomically.Request(parameters=[
+            Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]))
+
+    def answer(self, asked: Future) -> tuple[bool, str]:
+        self._ros.spin_until(asked.done)
+        result = asked.result().result
+        return result.successful, result.reason
+
+    def change(self, **values: object) -> tuple[bool, str]:
+        return self.answer(self.ask(**values))
+
+
+@pytest.fixture
+def walking(ros: Ros) -> Iterator[Walking]:
+    found = Walking(ros)
+    found.tick(2)
+    yield found
+    ros.executor.remove_node(found.node)
+    found.node.close()
+    found.node.destroy_node()
+
+
+@contextmanager
+def stopped_judge() -> Iterator[None]:
+    """The process that judges does nothing meanwhile: as slow as one can be."""
+    pid = judge().pid
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
+
+
+def test_ticks_go_on_while_a_change_is_judged(walking: Walking) -> None:
+    assert walking.change(coupling_gain=90.0) == (True, '')
+    with stopped_judge():
+        refused, accepted = walking.ask(cadence_scale=4.0), walking.ask(coupling_gain=80.0)
+        walking.tick(50)
+        assert not (refused.done() or accepted.done())
+    successful, reason = walking.answer(refused)
+    assert not successful and 'nearest value' in reason
+    assert walking.answer(accepted) == (True, '')
+    walking.tick(1)
+    assert walking.node.get_parameter('coupling_gain').value == 80.0
+
+
+def test_a_change_is_judged_by_what_the_ones_before_it_have_made(walking: Walking) -> None:
+    assert walking.change(coupling_gain=90.0) == (True, '')
+    with stopped_judge():
+        weaker, path = walking.ask(coupling_gain=30.0), walking.ask(coupling_graph='path')
+        walking.tick(1)
+    assert walking.answer(weaker) == (True, '')
+    successful, reason = walking.answer(path)
+    assert not successful and 'what works: coupling_graph = ' in reason
+    assert walking.change(coupling_gain=100.0, coupling_graph='path') == (True, '')
+
+
+def test_a_verdict_that_comes_late_is_not_applied_to_another_cadence(walking: Walking) -> None:
+    """For the cadence at which it was asked the change would be accepted."""
+    slower = {'cadence_scale': 0.5, 'coupling_gain': 30.0}
+    assert walking.change(**slower) == (True, '')
+    assert walking.change(cadence_scale=1.0, coupling_gain=100.0) == (True, '')
+    walking.tick(400)
+    assert walking.change(cadence_scale=2.0) == (True, '')
+    with stopped_judge():
+        asked = walking.ask(**slower)
+        walking.tick(600)
+    successful, reason = walking.answer(asked)
+    assert not successful and 'capture' in reason
+    assert walking.node.get_parameter('cadence_scale').value == 2.0
+
+
+def test_a_judge_that_dies_costs_ticks_and_no_answer(walking: Walking) -> None:
+    assert walking.change(coupling_gain=90.0) == (True, '')
+    with stopped_judge():
+        asked = walking.ask(coupling_gain=80.0)
+        walking.tick(1)
+        os.kill(judge().pid, signal.SIGKILL)
+    assert walking.answer(asked) == (True, '')
+    assert walking.change(coupling_gain=70.0) == (True, '')

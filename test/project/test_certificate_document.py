@@ -13,7 +13,7 @@ from core_examples import TICK, network, suite_parameters
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS
 
-CONDITIONS = {'in places', 'together', 'holding', 'prediction', 'quickness'}
+CONDITIONS = {'in places', 'together', 'holding', 'prediction', 'quickness', 'applied'}
 
 
 def lines() -> list[list[str]]:
@@ -24,7 +24,7 @@ def lines() -> list[list[str]]:
 
 
 def test_the_proof_has_all_its_lines() -> None:
-    assert [int(line[0]) for line in lines()] == list(range(1, 25))
+    assert [int(line[0]) for line in lines()] == list(range(1, 26))
 
 
 def test_every_line_names_an_inequality_that_certify_prints_or_a_condition() -> None:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,20 +24,18 @@ from dmp_cpg_ros.core.canonical.hopf import AndronovHopf
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.phase import phase
 from dmp_cpg_ros.core.certificates import network as of_network
-from dmp_cpg_ros.core.certificates.inequality import Inequality, discharged, finite
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.step import step_inequalities, stepped_network
 from dmp_cpg_ros.core.certificates.timing import LONGEST_STOP, time_to_rest, time_to_walking
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction import hierarchy
 from dmp_cpg_ros.core.contraction.equilibrium import InhibitedEquilibrium
-from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, PROVED, SAMPLED, weakest
+from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, PROVED
 from dmp_cpg_ros.core.contraction.hopf_bounds import transverse_contraction
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, NONE, REGIONAL
 from dmp_cpg_ros.core.contraction.region import Annulus
 from dmp_cpg_ros.core.contraction.synchronisation import Synchronisation
-from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.entry import SMALLEST_RADIUS, eligible_legs
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR, REST_ACTIVITY
@@ -50,100 +48,6 @@ from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.foot_path import FootPath
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.core.voting.parameters import VotingParameters
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """Inequalities of one set of parameters.
-
-    Attributes
-    ----------
-    inequalities : tuple of Inequality
-        In the order (a) to (j).
-    contraction_grade : str
-        ``global``: the inhibited network contracts from every state; ``regional``: on the set that
-        capture leads into; ``none``.
-    omega_max : float
-        Highest cadence that was considered [rad/s].
-    time_to_rest, time_to_walking : float
-        Bounds on the time from a request to rest and from a release to walking [s]; infinite
-        without a certificate.
-    rest_phase : tuple of float
-        Phase by which each leg rests ahead of its place [rad]; empty without an equilibrium.
-    rest_radius : tuple of float
-        |x_i| of each leg at rest.
-    contact : ContactLimits or None
-        What contact feedback may do; None where it is off.
-    distance_to_rest : float
-        Bound on the way of the reference after a request at the largest speed [m].
-    legs : tuple of str
-        Legs that are inhibited, or of which one is chosen.
-    """
-
-    inequalities: tuple[Inequality, ...]
-    contraction_grade: str
-    omega_max: float
-    time_to_rest: float
-    time_to_walking: float
-    rest_phase: tuple[float, ...]
-    rest_radius: tuple[float, ...]
-    contact: ContactLimits | None = None
-    distance_to_rest: float = math.inf
-    legs: tuple[str, ...] = ()
-
-    def __getitem__(self, name: str) -> Inequality:
-        """Return the inequality of a name; raises ParameterError with the names that exist."""
-        named = {entry.name: entry for entry in self.inequalities}
-        if name not in named:
-            raise ParameterError(f"there is no inequality '{name}'; valid are {', '.join(named)}")
-        return named[name]
-
-    @property
-    def failing(self) -> tuple[Inequality, ...]:
-        """Required inequalities that do not hold."""
-        return tuple(entry for entry in self.inequalities if entry.required and not entry.holds)
-
-    @property
-    def holds(self) -> bool:
-        """Whether every required inequality holds."""
-        return not self.failing
-
-    @property
-    def sampled(self) -> tuple[str, ...]:
-        """Names of the required inequalities that are sampled and not proved."""
-        return self._graded(SAMPLED)
-
-    @property
-    def continuous(self) -> tuple[str, ...]:
-        """Names of those that are proved of the differential equation alone."""
-        return self._graded(CONTINUOUS)
-
-    def _graded(self, grade: str) -> tuple[str, ...]:
-        return tuple(entry.name for entry in self.inequalities
-                     if entry.required and entry.grade == grade)
-
-    @property
-    def grade(self) -> str:
-        """The weakest of the required inequalities."""
-        return weakest(tuple(entry.grade for entry in self.inequalities if entry.required))
-
-    def as_mapping(self) -> dict[str, object]:
-        """Return everything as values that strict JSON can write, for ``metrics.json``."""
-        return {
-            'holds': self.holds, 'grade': self.grade, 'contraction_grade': self.contraction_grade,
-            'omega_max': self.omega_max, 'time_to_rest_s': finite(self.time_to_rest),
-            'time_to_walking_s': finite(self.time_to_walking),
-            'distance_to_rest_m': finite(self.distance_to_rest), 'legs': list(self.legs),
-            'rest_phase_rad': list(self.rest_phase), 'rest_radius': list(self.rest_radius),
-            'sampled': list(self.sampled), 'continuous': list(self.continuous),
-            'failing': [entry.name for entry in self.failing],
-            'inequalities': {entry.name: entry.as_mapping() for entry in self.inequalities}}
-
-    def explained(self) -> str:
-        """One line: that all holds, or the inequalities that fail."""
-        if self.holds:
-            return 'every required inequality holds'
-        return ' | '.join(entry.explained() for entry in self.failing)
 
 
 def certify(network: GaitNetwork, inhibition: InhibitionParameters,
@@ -185,17 +89,25 @@ def certify(network: GaitNetwork, inhibition: InhibitionParameters,
     return certificate_of(Setting.of(network, parts, tick_s, span), required_only=required_only)
 
 
-def certificate_of(s: Setting, legs: Collection[int] = (), *,
-                   required_only: bool = False) -> Certificate:
-    """Certificate of a setting; where the leg is chosen, the worst of those given or eligible."""
+def certificate_of(s: Setting, legs: Collection[int] = (), *, required_only: bool = False,
+                   until_lost: bool = False) -> Certificate:
+    """Certificate of a setting; where the leg is chosen, the worst of those given or eligible.
+
+    With ``until_lost`` rows after a required one that does not hold may be missing: so it is known
+    at a fraction of the cost that the certificate does not hold.
+    """
     p = s.parameters.inhibition
     if not p.auto:
-        return _certificate(s, required_only)
+        return _certificate(s, required_only, until_lost)
     legs = legs or eligible_legs(s.network, p)
     number = degrees(s.network.parameters.coupling_graph, len(LEGS))
-    found = [_certificate(replace(s, parameters=replace(
-        s.parameters, inhibition=replace(p, inhibited_legs=(LEGS[leg],)))), required_only)
-        for leg in {number[leg]: leg for leg in legs}.values()]   # others are alike
+    found = []
+    for leg in {number[leg]: leg for leg in legs}.values():       # others are alike
+        found.append(_certificate(replace(s, parameters=replace(
+            s.parameters, inhibition=replace(p, inhibited_legs=(LEGS[leg],)))),
+            required_only, until_lost))
+        if until_lost and not found[-1].holds:
+            return found[-1]
     rows = [min(same, key=lambda row: (row.holds, row.margin))
             for same in zip(*(each.inequalities for each in found), strict=True)]
     clearance = s.parameters.leg.clearance * REST_ACTIVITY
@@ -210,13 +122,18 @@ def certificate_of(s: Setting, legs: Collection[int] = (), *,
         legs=tuple(LEGS[leg] for leg in sorted(legs)))
 
 
-def _certificate(s: Setting, required_only: bool) -> Certificate:
+def _certificate(s: Setting, required_only: bool, until_lost: bool) -> Certificate:
     p, network = s.network.parameters, s.network
     analysis = of_network.analyse_network(network, s.parameters.inhibition, s.span)
-    found, contraction, rest = analysis.found, analysis.contraction, analysis.rest
+    found, contraction = analysis.found, analysis.contraction
+    rows: list[Inequality] = []
+    for row in of_network.network_inequalities(s, analysis):
+        rows.append(row)
+        if until_lost and not row.holds:
+            return Certificate(tuple(rows), contraction.reach, s.span.omega[1])
+    rest = analysis.rest
     rates = (found.rate, max(contraction.rate, analysis.capture.rate), 2.0 * p.rho * p.radius**2)
     slowest = min(rate for rate in rates if rate > 0.0)       # rates that there are to keep
-    rows = of_network.network_inequalities(s, analysis)
     step = stepped_network(s, analysis) if all(row.holds for row in rows) else None
     stop = time_to_rest(s, analysis.capture, rest, step)
     if stop >= LONGEST_STOP:  # a step that is proved to contract too slowly is of no use
@@ -244,10 +161,12 @@ def _certificate(s: Setting, required_only: bool) -> Certificate:
         Inequality('time_to_rest', stop, LONGEST_STOP, 's', 'bound', 'longest stop', CONTINUOUS,
                    'from a request at any phase of the locked gait, at any speed, to rest'),
         Inequality('time_to_walking', start, LONGEST_STOP, 's', 'bound', 'longest start',
-                   CONTINUOUS, 'from release at rest to locked phases and full swings', False),
-        *vote_inequalities(s)]
+                   CONTINUOUS, 'from release at rest to locked phases and full swings', False)]
+    rows = discharged(rows, alike=s.alike)
+    if not until_lost or all(row.holds or not row.required for row in rows):
+        rows += vote_inequalities(s)
     return Certificate(
-        tuple(discharged(rows, alike=s.alike)), contraction.reach, s.span.omega[1], stop, start,
+        tuple(rows), contraction.reach, s.span.omega[1], stop, start,
         () if rest is None else tuple(rest.phase_ahead.tolist()),
         () if rest is None else tuple(rest.radius.tolist()), contact,
         stop_distance(reference, fastest, fastest, s.tick_s,

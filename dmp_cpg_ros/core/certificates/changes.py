@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from dmp_cpg_ros.core.certificates.certify import Certificate, certificate_of
-from dmp_cpg_ros.core.certificates.inequality import Inequality, discharged
+from dmp_cpg_ros.core.certificates.certify import certificate_of
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality, discharged
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.votes import vote_inequalities
 from dmp_cpg_ros.core.contraction.finding import CONTINUOUS
@@ -35,7 +35,7 @@ from dmp_cpg_ros.core.voting.parameters import VotingParameters
 
 def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
                     tick_s: float, acting_cadence: float | None = None, *,
-                    required_only: bool = False) -> Certificate:
+                    required_only: bool = False, until_lost: bool = False) -> Certificate:
     """Compute the certificate of some gaits and of every change between them.
 
     Parameters
@@ -52,6 +52,8 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
         Factor on the cadence that still acts, on its way to that of the parameters.
     required_only : bool
         Whether inequalities that are not required are left out, which are most of the work.
+    until_lost : bool
+        As for :func:`~dmp_cpg_ros.core.certificates.certify.certificate_of`.
 
     Returns
     -------
@@ -74,14 +76,17 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
                       else max(farthest_way(network, p.inhibition) for network in networks))
     # A gait that changes at rest keeps the leg that holds it.
     legs = set[int]().union(*(eligible_legs(network, p.inhibition) for network in networks))
-    whole = certificate_of(setting, legs, required_only=required_only)
+    whole = certificate_of(setting, legs, required_only=required_only, until_lost=until_lost)
+    if until_lost and not whole.holds:
+        return whole
     pause = 0.0 if not ways else (
         math.log(span.omega[1] / (STANDING * span.omega[0])) / SETTLING_RATE + tick_s)
     bound = whole.time_to_rest + pause + arriving
     rows = [_changed(row, bound, p.leg, 'gait' if ways else 'cadence')
             for row in whole.inequalities]
-    rows = discharged([*rows, *_votes(p, networks, tick_s)],
-                      alike=replace(setting, parameters=p).alike)
+    rows = discharged(rows, alike=replace(setting, parameters=p).alike)
+    if not until_lost or all(row.holds or not row.required for row in rows):
+        rows += _votes(p, networks, tick_s)
     if ways and not required_only:
         rows.append(Inequality(
             'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',

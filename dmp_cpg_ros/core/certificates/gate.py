@@ -3,15 +3,14 @@
 """Parameters that change while the suite runs: may they, and what is the nearest that may.
 
 A change that would lose the certificate is refused with the inequality that fails, both its sides,
-and the nearest value that works: on the straight way from the running values for numbers, the
-other choices for words.
+and what works: near values on the straight way from the running numbers, the other words.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 from typing import Any
@@ -19,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import AUTO, Inhibition
-from dmp_cpg_ros.core.certificates.certify import Certificate, certificate_of
-from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes
+from dmp_cpg_ros.core.certificates.certify import certificate_of
+from dmp_cpg_ros.core.certificates.changes import all_networks, certify_changes, refused_change
+from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.network import Setting
-from dmp_cpg_ros.core.certificates.suggest import nearest_value
+from dmp_cpg_ros.core.certificates.suggest import nearest_values
 from dmp_cpg_ros.core.certificates.timing import later_arming
 from dmp_cpg_ros.core.contraction.capture import RADIUS_TOLERANCE, capture_set
 from dmp_cpg_ros.core.contraction.inhibited import GLOBAL, inhibited_contraction
@@ -32,6 +32,7 @@ from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.inhibition.entry import eligible_legs
 from dmp_cpg_ros.core.inhibition.step_timing import time_to_slow
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.core.parameters import typed
 from dmp_cpg_ros.core.reference.stop_distance import stop_distance
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import UNCERTIFIED_VOTES, VOTE_SOURCES, SuiteParameters
@@ -46,7 +47,8 @@ _CAPTURING = frozenset(('rho', 'radius', 'coupling_gain', 'coupling_graph', 'inh
                         'region_radius', 'inhibited_legs'))
 """Parameters that decide which set inhibition holds the legs in."""
 
-_DIGITS = 4
+_ROUNDS, _FEWER_ROUNDS = 5, 3
+"""How often the way to what is refused is halved: of one gait without votes, and else."""
 
 
 @dataclass(frozen=True)
@@ -77,15 +79,30 @@ class Running:
     others: tuple[Gait, ...] = ()
     acting_cadence: float | None = None
 
-    def certificate(self) -> Certificate:
-        """Compute the certificate, or take it from the last that were; the way of the feet has no
-        part in it.
+    def certificate(self, *, whole: bool = False) -> Certificate:
+        """Compute the inequalities, of those that are not required only where the whole is asked
+        for, or take them from the last that were; the way of the feet has no part in them.
         """
-        return _certificate(self._of_certificate)
+        return _certificate(self._of_certificate, whole)
 
     def holds(self) -> bool:
-        """Whether the certificate holds, from the inequalities that are required."""
-        return _certificate(self._of_certificate, required_only=True).holds
+        """Whether the certificate holds, at less cost where it does not."""
+        return _certificate(self._of_certificate, False, True).holds
+
+    @property
+    def settled(self) -> Running:
+        """The same when the cadence has come to that of the parameters."""
+        return replace(self, acting_cadence=None)
+
+    def covers(self, other: Running) -> bool:
+        """Whether the certificate holds for another in which a cadence acts between those of this
+        one and which does not differ otherwise.
+        """
+        wanted = self.parameters.canonical.cadence_scale
+        here, there = (wanted if running.acting_cadence is None else running.acting_cadence
+                       for running in (self, other))
+        return (self.settled == other.settled
+                and min(here, wanted) <= there <= max(here, wanted))
 
     @property
     def _of_certificate(self) -> Running:
@@ -210,14 +227,15 @@ class Running:
             for part, changes in parts.items() if changes}))
 
 
-@lru_cache(maxsize=16)
-def _certificate(of: Running, required_only: bool = False) -> Certificate:
+@lru_cache(maxsize=32)
+def _certificate(of: Running, whole: bool, until_lost: bool = False) -> Certificate:
     if of.others or of.moving:
-        return certify_changes(of.parameters, (of.gait, *of.others), of.scale, of.tick_s,
-                               of.acting_cadence, required_only=required_only)
+        return certify_changes(
+            of.parameters, (of.gait, *of.others), of.scale, of.tick_s, of.acting_cadence,
+            required_only=not whole, until_lost=until_lost)
     network = GaitNetwork(of.parameters.canonical, of.gait, of.scale)
     return certificate_of(Setting.of(network, of.parameters, of.tick_s),
-                          required_only=required_only)
+                          required_only=not whole, until_lost=until_lost)
 
 
 @dataclass(frozen=True)
@@ -226,8 +244,9 @@ class Verdict:
 
     Attributes
     ----------
-    certificate : Certificate
-        With the change.
+    certificate, settled : Certificate
+        With the change, for every cadence on the way to that of the parameters; and, where it is
+        accepted, for that one.
     accepted : bool
         Whether no inequality is lost by it.
     reason : str
@@ -235,84 +254,88 @@ class Verdict:
     """
 
     certificate: Certificate
+    settled: Certificate
     accepted: bool
     reason: str = ''
 
 
-@dataclass
-class CertificateGate:
-    """Judges changes.
+@dataclass(frozen=True)
+class Change:
+    """A change that is asked for, with everything that the verdict depends on.
 
     Attributes
     ----------
-    pause : callable ()
-        Called between any two certificates, each of which takes some milliseconds: a node lets
-        ticks pass meanwhile.
+    present, held : Running, Certificate
+        What runs, and its certificate when the cadence is settled.
+    proposed : Running
+        What is asked for.
+    gaits : tuple of Gait
+        Gaits among which the change changes, from the one that is walked on; may repeat.
     """
 
-    pause: Callable[[], None] = field(default=lambda: None)
+    present: Running
+    held: Certificate
+    proposed: Running
+    gaits: tuple[Gait, ...] = ()
 
-    def judge(self, present: Running, held: Certificate, proposed: Running) -> Verdict:
-        """Judge a change.
-
-        Parameters
-        ----------
-        present : Running
-            What runs.
-        held : Certificate
-            Its certificate.
-        proposed : Running
-            What is asked for.
-
-        Returns
-        -------
-        Verdict
-            Accepted when every required inequality holds, or, where the running parameters have no
-            certificate to lose, when none gets worse.
+    def verdict(self) -> Verdict:
+        """Judge: accepted when every required inequality holds, or, where the running parameters
+        have no certificate to lose, when none gets worse.
         """
-        certificate = proposed.certificate()
+        certificate, held = self.proposed.certificate(), self.held
+        refused = self.gaits and refused_change(
+            self.proposed.parameters, self.gaits, self.proposed.scale, self.proposed.tick_s)
+        if refused:
+            return Verdict(certificate, certificate, False, refused)
         lost = [entry for entry in certificate.failing
                 if held[entry.name].holds or entry.margin < held[entry.name].margin]
         if not lost:
-            return Verdict(certificate, True)
+            return Verdict(certificate, self.proposed.settled.certificate(), True)
         reason = ' | '.join(entry.explained() for entry in lost)
-        return Verdict(certificate, False, f'{reason}; {self._nearest(present, held, proposed)}')
+        return Verdict(certificate, certificate, False,
+                       f'{reason}; {self._nearest(held.holds)}')
 
-    def _nearest(self, present: Running, held: Certificate, proposed: Running) -> str:
+    def covers(self, other: Change) -> bool:
+        """Whether the verdict on this change is one on another, in which a cadence acts that lies
+        between the one that acts here and the one that is asked for: all between are certified.
+        """
+        return self._settled == other._settled and self.proposed.covers(other.proposed)
+
+    @property
+    def _settled(self) -> Change:
+        return replace(self, present=self.present.settled, proposed=self.proposed.settled)
+
+    def _nearest(self, held: bool) -> str:
         """Nearest values that work, as text."""
-        differences = present.differences(proposed)
+        differences = self.present.differences(self.proposed)
         numbers = {name: pair for name, pair in differences.items() if isinstance(pair[0], float)}
         words = {name: pair[1] for name, pair in differences.items() if name not in numbers}
-        if words and not self._holds(present.changed(words)):
-            return self._choices(proposed, words)
-        if not (held.holds or words) or not numbers:
+        if words and not _holds(self.present.changed(words)):
+            return self._choices(words)
+        if not (held or words) or not numbers:
             return 'nothing nearer is known: the running parameters are not certified themselves'
+        values = nearest_values(
+            numbers, lambda between: _holds(self.present.changed({**words, **between})),
+            _FEWER_ROUNDS if self.present.others or self.proposed.values['voting'] else _ROUNDS)
+        told = ', '.join(f'{name} = {typed(value)}' for name, value in values.items())
+        return f'nearest value{"s that work" if len(values) > 1 else " that works"}: {told}'
 
-        def between(share: float) -> dict[str, Any]:
-            return {**words, **{name: after if share == 1.0 else before + share * (after - before)
-                                for name, (before, after) in numbers.items()}}
-
-        share = nearest_value(lambda at: self._holds(present.changed(between(at))), 0.0, 1.0)
-        values = ', '.join(f'{name} = {shown(_rounded(between(share)[name], before))}'
-                           for name, (before, _) in numbers.items())
-        return f'nearest value{"s that work" if len(numbers) > 1 else " that works"}: {values}'
-
-    def _choices(self, proposed: Running, words: Mapping[str, Any]) -> str:
+    def _choices(self, words: Mapping[str, Any]) -> str:
         """Other words that work in place of those that were asked for."""
         found = []
         for name, asked in words.items():
-            working = [shown(choice) for choice in _alternatives(proposed, name)
-                       if choice != asked and self._holds(proposed.changed({name: choice}))]
+            working = [typed(choice) for choice in _alternatives(self.proposed, name)
+                       if choice != asked and _holds(self.proposed.changed({name: choice}))]
             found.append(f'{name} = {" or ".join(working)}' if working else
                          f'no other {name} with the rest as it is')
         return f'what works: {"; ".join(found)}'
 
-    def _holds(self, running: Running) -> bool:
-        self.pause()
-        try:
-            return running.holds()
-        except DmpCpgError:
-            return False
+
+def _holds(running: Running) -> bool:
+    try:
+        return running.holds()
+    except DmpCpgError:
+        return False
 
 
 def _alternatives(running: Running, name: str) -> list[Any]:
@@ -325,23 +348,3 @@ def _alternatives(running: Running, name: str) -> list[Any]:
     several = [choice for choice in choices if choice != AUTO]
     return [*((choice,) for choice in choices), *(
         some for size in range(2, len(several) + 1) for some in combinations(several, size))]
-
-
-def _rounded(value: float, towards: float) -> float:
-    """Few digits, on the side of a value that works."""
-    if value == towards or value == 0.0:
-        return value
-    step = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - _DIGITS)
-    if towards > value:
-        return min(math.ceil(value / step) * step, towards)
-    return max(math.floor(value / step) * step, towards)
-
-
-def shown(value: Any) -> str:
-    """Value as one types it for a parameter: lists in brackets, floats never as whole numbers."""
-    if isinstance(value, (tuple, list)):
-        return f'[{", ".join(map(str, value))}]'
-    if isinstance(value, float):
-        text = f'{value:g}'
-        return text if set(text) & set('.en') else f'{text}.0'
-    return str(value)

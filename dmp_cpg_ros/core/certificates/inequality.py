@@ -1,6 +1,8 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""One inequality of a certificate: left < right, with its unit, its grade and a sentence."""
+"""One inequality, left < right, with its unit, its grade and a sentence; and the certificate that
+several of them make.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +10,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, GRADES, PROVED
+from dmp_cpg_ros.core.contraction.finding import CONTINUOUS, GRADES, PROVED, SAMPLED, weakest
 from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 
 ROUNDING = 1e-9
 """Share of the larger side by which an inequality must hold, far above all rounding errors."""
@@ -125,3 +128,97 @@ def discharged(rows: Iterable[Inequality], *, alike: bool) -> list[Inequality]:
             row.name in _CARRIED_OVER) else row
 
     return [now(row) for row in rows]
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Inequalities of one set of parameters.
+
+    Attributes
+    ----------
+    inequalities : tuple of Inequality
+        In the order (a) to (j) of :mod:`~dmp_cpg_ros.core.certificates.certify`.
+    contraction_grade : str
+        ``global``: the inhibited network contracts from every state; ``regional``: on the set that
+        capture leads into; ``none``.
+    omega_max : float
+        Highest cadence that was considered [rad/s].
+    time_to_rest, time_to_walking : float
+        Bounds on the time from a request to rest and from a release to walking [s]; infinite
+        without a certificate.
+    rest_phase : tuple of float
+        Phase by which each leg rests ahead of its place [rad]; empty without an equilibrium.
+    rest_radius : tuple of float
+        |x_i| of each leg at rest.
+    contact : ContactLimits or None
+        What contact feedback may do; None where it is off.
+    distance_to_rest : float
+        Bound on the way of the reference after a request at the largest speed [m].
+    legs : tuple of str
+        Legs that are inhibited, or of which one is chosen.
+    """
+
+    inequalities: tuple[Inequality, ...]
+    contraction_grade: str
+    omega_max: float
+    time_to_rest: float = math.inf
+    time_to_walking: float = math.inf
+    rest_phase: tuple[float, ...] = ()
+    rest_radius: tuple[float, ...] = ()
+    contact: ContactLimits | None = None
+    distance_to_rest: float = math.inf
+    legs: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Inequality:
+        """Return the inequality of a name; raises ParameterError with the names that exist."""
+        named = {entry.name: entry for entry in self.inequalities}
+        if name not in named:
+            raise ParameterError(f"there is no inequality '{name}'; valid are {', '.join(named)}")
+        return named[name]
+
+    @property
+    def failing(self) -> tuple[Inequality, ...]:
+        """Required inequalities that do not hold."""
+        return tuple(entry for entry in self.inequalities if entry.required and not entry.holds)
+
+    @property
+    def holds(self) -> bool:
+        """Whether every required inequality holds."""
+        return not self.failing
+
+    @property
+    def sampled(self) -> tuple[str, ...]:
+        """Names of the required inequalities that are sampled and not proved."""
+        return self._graded(SAMPLED)
+
+    @property
+    def continuous(self) -> tuple[str, ...]:
+        """Names of those that are proved of the differential equation alone."""
+        return self._graded(CONTINUOUS)
+
+    def _graded(self, grade: str) -> tuple[str, ...]:
+        return tuple(entry.name for entry in self.inequalities
+                     if entry.required and entry.grade == grade)
+
+    @property
+    def grade(self) -> str:
+        """The weakest of the required inequalities."""
+        return weakest(tuple(entry.grade for entry in self.inequalities if entry.required))
+
+    def as_mapping(self) -> dict[str, object]:
+        """Return everything as values that strict JSON can write, for ``metrics.json``."""
+        return {
+            'holds': self.holds, 'grade': self.grade, 'contraction_grade': self.contraction_grade,
+            'omega_max': self.omega_max, 'time_to_rest_s': finite(self.time_to_rest),
+            'time_to_walking_s': finite(self.time_to_walking),
+            'distance_to_rest_m': finite(self.distance_to_rest), 'legs': list(self.legs),
+            'rest_phase_rad': list(self.rest_phase), 'rest_radius': list(self.rest_radius),
+            'sampled': list(self.sampled), 'continuous': list(self.continuous),
+            'failing': [entry.name for entry in self.failing],
+            'inequalities': {entry.name: entry.as_mapping() for entry in self.inequalities}}
+
+    def explained(self) -> str:
+        """One line: that all holds, or the inequalities that fail."""
+        if self.holds:
+            return 'every required inequality holds'
+        return ' | '.join(entry.explained() for entry in self.failing)

@@ -7,11 +7,14 @@ inhibition, capture, mismatch.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
+from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates.inequality import Inequality
 from dmp_cpg_ros.core.contraction import inhibited
 from dmp_cpg_ros.core.contraction.capture import CaptureSet, capture_set
@@ -108,15 +111,27 @@ class NetworkAnalysis:
         Invariant set under inhibition at the highest cadence.
     contraction : InhibitedContraction
         Of the inhibited network.
-    rest, rest_at_speed : InhibitedEquilibrium or None
-        Equilibria at zero reference and at the highest cadence.
+    system : CanonicalSystem
+        Its oscillators.
+    span : OperatingRange
+        Cadences.
     """
 
     found: Synchronisation
     capture: CaptureSet
     contraction: InhibitedContraction
-    rest: InhibitedEquilibrium | None
-    rest_at_speed: InhibitedEquilibrium | None
+    system: CanonicalSystem
+    span: OperatingRange
+
+    @cached_property
+    def rest(self) -> InhibitedEquilibrium | None:
+        """Equilibrium at zero reference."""
+        return inhibited_equilibrium(self.system, self.span.omega_at_rest, self.capture.gains)
+
+    @cached_property
+    def rest_at_speed(self) -> InhibitedEquilibrium | None:
+        """Equilibrium at the highest cadence."""
+        return inhibited_equilibrium(self.system, self.span.omega[1], self.capture.gains)
 
 
 def free_synchronisation(network: GaitNetwork) -> Synchronisation:
@@ -133,22 +148,19 @@ def analyse_network(network: GaitNetwork, inhibition: InhibitionParameters,
     acting = replace(
         inhibition, inhibition_gain=max(inhibition.inhibition_gain, 1e-9)).armed_gains
     capture = capture_set(system, span.omega[1], acting, inhibition.region_radius)
-    return NetworkAnalysis(
-        free_synchronisation(network), capture, inhibited.inhibited_contraction(system, capture),
-        inhibited_equilibrium(system, span.omega_at_rest, acting),
-        inhibited_equilibrium(system, span.omega[1], acting))
+    return NetworkAnalysis(free_synchronisation(network), capture,
+                           inhibited.inhibited_contraction(system, capture), system, span)
 
 
-def network_inequalities(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
-    """Required inequalities of the oscillators: (a), (b) and (c)."""
+def network_inequalities(s: Setting, analysis: NetworkAnalysis) -> Iterator[Inequality]:
+    """Required inequalities of the oscillators: (a), (b) and (c); those that cost least first."""
     found = analysis.found
-    return [
-        Inequality('synchronisation', found.growth, found.connectivity, '1/s', 'rho r^2',
-                   'connectivity of L_K', CONTINUOUS,
-                   f'from every state the legs find their places, at {found.rate:.4g} 1/s '
-                   f'({found.method} bound)'),
-        _contraction(analysis.contraction),
-        *_capture(s, analysis)]
+    yield Inequality('synchronisation', found.growth, found.connectivity, '1/s', 'rho r^2',
+                     'connectivity of L_K', CONTINUOUS,
+                     f'from every state the legs find their places, at {found.rate:.4g} 1/s '
+                     f'({found.method} bound)')
+    yield _contraction(analysis.contraction)
+    yield from _capture(s, analysis)
 
 
 def mismatch_inequality(s: Setting, found: Synchronisation) -> Inequality:
@@ -183,22 +195,21 @@ def _contraction(found: InhibitedContraction) -> Inequality:
                       f'the inhibited network contracts {where}')
 
 
-def _capture(s: Setting, analysis: NetworkAnalysis) -> list[Inequality]:
+def _capture(s: Setting, analysis: NetworkAnalysis) -> Iterator[Inequality]:
     """Inequalities (c): C is not left again by those in their places."""
     p, span = s.parameters.inhibition, s.span
     held, gain, r0 = analysis.capture.gains > 0.0, p.inhibition_gain, p.region_radius
     needed = float(analysis.capture.needed_gain[held].max())
+    cadence = f'at the highest cadence, {span.omega[1]:.4g} rad/s'
+    yield Inequality('capture', needed, gain, '1/s', 'N omega r/r0 made exact', 'k_inh',
+                     CONTINUOUS,
+                     f'legs that enter C in their places cannot leave it again, {cadence}')
     rest = analysis.rest_at_speed
     distance = float('inf') if rest is None or not rest.slowest_rate > 0.0 else float(
         rest.distance[held].max())
     exists = '' if np.isfinite(distance) else '; there is none, the other legs break free'
-    cadence = f'at the highest cadence, {span.omega[1]:.4g} rad/s'
-    return [
-        Inequality('capture', needed, gain, '1/s', 'N omega r/r0 made exact', 'k_inh',
-                   CONTINUOUS,
-                   f'legs that enter C in their places cannot leave it again, {cadence}'),
-        Inequality('rest_in_region', distance, r0, '', '|x_1* - x_d|', 'r0', PROVED,
-                   f'the inhibited equilibrium lies inside C, {cadence}{exists}')]
+    yield Inequality('rest_in_region', distance, r0, '', '|x_1* - x_d|', 'r0', PROVED,
+                     f'the inhibited equilibrium lies inside C, {cadence}{exists}')
 
 
 def capture_anywhere(s: Setting, analysis: NetworkAnalysis) -> Inequality:

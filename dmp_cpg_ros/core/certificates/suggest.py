@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
-from dmp_cpg_ros.core.errors import ParameterError
+from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.gait.network import GaitNetwork
 from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
@@ -25,7 +26,7 @@ GAIN_ROWS = ('synchronisation', 'contraction', 'capture', 'rest_in_region', 'tim
 """Inequalities that the two gains decide; the others depend on other parameters."""
 
 _LARGEST_COUPLING, _LARGEST_INHIBITION = 1e4, 1e5
-_HALVINGS = 10  # of the way to a wanted value
+_DIGITS = 4  # of a nearest value
 
 
 @dataclass(frozen=True)
@@ -90,31 +91,42 @@ def suggest_gains(network: GaitNetwork, inhibition: InhibitionParameters,
     return None
 
 
-def nearest_value(holds: Callable[[float], bool], working: float, wanted: float) -> float:
-    """Value nearest to a wanted one, on the way from one that works, that still works.
+def nearest_values(numbers: Mapping[str, tuple[float, float]],
+                   holds: Callable[[dict[str, float]], bool], rounds: int) -> dict[str, float]:
+    """Values nearest to the wanted ones, on the straight way from those that run, that still work.
 
     Parameters
     ----------
+    numbers : mapping of str to (float, float)
+        Names with the value that runs, which works, and the one that is asked for.
     holds : callable
-        Whether a value works.
-    working, wanted : float
-        A value that works, and the one that is asked for.
+        Whether values work.
+    rounds : int
+        How often the way is halved.
 
     Returns
     -------
-    float
-        The wanted value when it works, else found by bisection to 0.1 % of the way.
-
-    Raises
-    ------
-    ParameterError
-        If the first value does not work.
+    dict of str → float
+        The wanted values when they work, else found by bisection of the way, and rounded towards
+        those that run.
     """
-    if not holds(working):
-        raise ParameterError(f'{working:g} does not hold a certificate to start from')
-    if holds(wanted):
-        return wanted
-    return last_that_holds(holds, working, wanted, _HALVINGS)
+    def between(share: float) -> dict[str, float]:
+        return {name: after if share == 1.0 else before + share * (after - before)
+                for name, (before, after) in numbers.items()}
+
+    share = 1.0 if holds(between(1.0)) else last_that_holds(
+        lambda at: holds(between(at)), 0.0, 1.0, rounds)
+    return {name: _shortened(value, numbers[name][0]) for name, value in between(share).items()}
+
+
+def _shortened(value: float, towards: float) -> float:
+    """Few digits, on the side of a value that works."""
+    if value == towards or value == 0.0:
+        return value
+    step = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - _DIGITS)
+    if towards > value:
+        return min(math.ceil(value / step) * step, towards)
+    return max(math.floor(value / step) * step, towards)
 
 
 def _rounded(gain: float) -> float:

@@ -24,17 +24,24 @@ from rclpy.task import Future
 from dmp_cpg_ros.core import suite_parameters as suite
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.certificates import gate
-from dmp_cpg_ros.core.certificates.certify import Certificate
-from dmp_cpg_ros.core.certificates.changes import refused_change
+from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.errors import DataError, ParameterError
+from dmp_cpg_ros.core.gait.contact_feedback import ContactLimits
 from dmp_cpg_ros.core.gait.gait import Gait
 from dmp_cpg_ros.core.gait.network import CanonicalParameters, GaitNetwork
-from dmp_cpg_ros.core.gait.running import GaitChoiceParameters, RunningGait, limiting_gaits
+from dmp_cpg_ros.core.gait.running import (
+    CADENCE_RATE,
+    GaitChoiceParameters,
+    RunningGait,
+    limiting_gaits,
+)
 from dmp_cpg_ros.core.gait.transition import BlendedGait, GaitChangeParameters, GaitInForce
+from dmp_cpg_ros.core.parameters import typed
 from dmp_cpg_ros.core.reference.filter import CommandGate, ReferenceParameters, ReferenceSystem
 from dmp_cpg_ros.core.reference.governor import Governor
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.nodes.framework.gaits import description_of, known_gaits
+from dmp_cpg_ros.nodes.framework.judging import Step
 from dmp_cpg_ros.nodes.framework.parameters import plain
 from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.nodes.messages.conversions import read_twist
@@ -52,6 +59,8 @@ JUDGED = (*suite.OWNER, 'allow_uncertified')
 PROBLEM = 'certificate'
 """Key of the warning on ``/diagnostics``."""
 
+AHEAD_S = 0.25
+"""Time within which a verdict is expected, for which the moving cadence is looked ahead [s]."""
 
 ASK_EVERY_S = 5.0
 """Period of asking the owners [s]: what an event did not tell, because a node was not there yet or
@@ -189,8 +198,8 @@ class Certified:
         self.gaits, self._scale = known_gaits(node), body_scale(description_of(node))
         self._held: Certificate | None = None
         self._held_in: dict[str, Certificate] = {}
-        self._judged: gate.Verdict | None = None
-        self._gate = gate.CertificateGate(node.let_ticks_pass)
+        self._verdict: gate.Verdict | None = None
+        self._judged: tuple[gate.Change, gate.Verdict] | None = None
         self._follower = ParameterFollower(node)
 
     def end(self) -> None:
@@ -203,9 +212,14 @@ class Certified:
     def certificate(self) -> Certificate:
         """Certificate of the parameters that were accepted last."""
         if self._held is None:
-            accepted = self._running(self._node.accepted)
-            self._held = replace(accepted, acting_cadence=None).certificate()
+            self._held = self._running(self._node.accepted).settled.certificate()
         return self._held
+
+    @property
+    def contact(self) -> ContactLimits | None:
+        """What contact feedback may do; None where it is off."""
+        on = self._node.accepted[CanonicalParameters].contact_feedback
+        return self.certificate.contact if on else None
 
     def certificate_in(self, gait: GaitInForce) -> Certificate:
         """Certificate of a gait in force, or of a change between two, with the same parameters."""
@@ -257,59 +271,113 @@ class Certified:
         ParameterError
             With the valid names, or with the inequality that fails and what is nearest.
         """
-        node, self._judged = self._node, None
-        if not node.configured:
+        self._verdict = None
+        asked = self._asked(sets)
+        if asked is None:
             return
-        acting, changed = self._acting(), node.changed_values(sets)
-        if acting.gaits:
-            self._check_gait(acting.gaits, sets)
-        if not changed or gate.UNCERTIFIED.issuperset(changed):
-            return
-        running = self._running(sets)
-        if node.following:
-            return
-        present = self._running(node.accepted)
-        waits = running.refused_now(present, *acting.stop) if acting.stop else ''
+        changed, change = asked
+        waits = self._waits(change)
         if waits:
             raise ParameterError(waits)
-        verdict = self._gate.judge(present, self.certificate, running)
+        if self._judged is None or not self._judged[0].covers(change):
+            self._judged = change, change.verdict()
+        verdict = self._judged[1]
         if not verdict.accepted and not sets[suite.CertificateParameters].allow_uncertified:
-            asked = ', '.join(f'{name} = {gate.shown(value)}' for name, value in changed.items())
+            told = ', '.join(f'{name} = {typed(value)}' for name, value in changed.items())
             raise ParameterError(
-                f'{asked} would lose the certificate: {verdict.reason} '
+                f'{told} would lose the certificate: {verdict.reason} '
                 '(allow_uncertified:=true changes it all the same)')
-        self._judged = verdict
+        self._verdict = verdict
 
-    def _check_gait(self, walked: tuple[Gait, ...], sets: Sets) -> None:
-        """Refuse gaits that are not known, or whose changes are not certified."""
+    def to_judge(self, sets: Sets) -> Step | None:
+        """What has to be computed, and who is to be told, before :meth:`check` can judge a change
+        at once; None where nothing has to be.
+
+        Meanwhile the cadence that acts goes on towards the accepted one. The change is judged for
+        where it will be, and :meth:`check` asks whether it still lies in what was judged.
+        """
+        asked = self._asked(sets)
+        if asked is None or self._waits(asked[1]) or (
+                self._judged is not None and self._judged[0].covers(asked[1])):
+            return None
+        change = self._ahead(asked[1])
+
+        def learn(verdict: gate.Verdict) -> None:
+            self._judged = change, verdict
+
+        return change.verdict, learn
+
+    def _asked(self, sets: Sets) -> tuple[dict[str, Any], gate.Change] | None:
+        """Values that change, and the change; None where there is nothing to judge: no inequality
+        depends on it, or its owner has accepted it. Raises ParameterError for unknown gaits.
+        """
+        node = self._node
+        if not node.configured:
+            return None
+        changed = node.changed_values(sets)
+        gaits = self._changing_gaits(sets)
+        if not changed or gate.UNCERTIFIED.issuperset(changed):
+            return None
+        proposed = self._running(sets)
+        if node.following:
+            return None
+        return changed, gate.Change(
+            self._running(node.accepted), self.certificate, proposed, gaits)
+
+    def _waits(self, change: gate.Change) -> str:
+        """Why the change has to wait; empty when it has not."""
+        stop = self._acting().stop
+        return change.proposed.refused_now(change.present, *stop) if stop else ''
+
+    def _ahead(self, change: gate.Change) -> gate.Change:
+        """The change for the cadence that acts now or soon, whichever is farther from the one that
+        is asked for.
+        """
+        now = change.proposed.acting_cadence
+        if now is None:
+            return change
+        wanted, accepted = (running.parameters.canonical.cadence_scale
+                            for running in (change.proposed, change.present))
+        reach = CADENCE_RATE * AHEAD_S
+        soon = now + min(max(accepted - now, -reach), reach)
+        farther = max(now, soon, key=lambda cadence: abs(cadence - wanted))
+        return replace(change, proposed=replace(change.proposed, acting_cadence=farther))
+
+    def _changing_gaits(self, sets: Sets) -> tuple[Gait, ...]:
+        """Gaits among which a change of the gait changes, the one that is walked included; empty
+        where it does not change. Raises ParameterError for one that there is not.
+        """
+        walked, named = self._acting().gaits, self.gaits.named
         name, choice = sets[suite.GaitParameters].gait, sets[GaitChoiceParameters]
-        named = self.gaits.named
         asked = name != self._node.accepted[suite.GaitParameters].gait
         chosen = choice.auto_gait and choice != self._node.accepted[GaitChoiceParameters]
+        if not walked or not (asked or chosen):
+            return ()
         if asked:
             named(name)
             if choice.auto_gait:
                 raise ParameterError(
                     f"gait = '{name}' cannot be set while auto_gait chooses among "
                     f'{", ".join(choice.auto_gaits)}; set auto_gait to false first')
-        if not (asked or chosen):
-            return
         news = choice.auto_gaits if chosen else (name,)
-        gaits = [named(gait) for gait in (*(gait.name for gait in walked), *news)]
-        reason = refused_change(suite.SuiteParameters.of(sets), gaits, self._scale,
-                                sets[suite.TickParameters].tick_ns * 1e-9)
-        if reason and not sets[suite.CertificateParameters].allow_uncertified:
-            raise ParameterError(f'{reason} (allow_uncertified:=true changes all the same)')
+        return tuple(named(gait) for gait in (*(gait.name for gait in walked), *news))
 
     def accept(self) -> None:
         """Take over what :meth:`check` has let pass, and tell of the certificate."""
         self._held_in = {}
-        if self._judged is not None:
-            moving = self._running(self._node.accepted).moving
-            self._held = None if moving else self._judged.certificate
+        if self._verdict is not None:
+            self._held = self._verdict.settled
             self.report()
         elif self._node.following:
-            self._held = None
+            needed, self._held = self._held is not None, None
+            if self._watches or (needed and not self._node.lock_step):
+                running = self._running(self._node.accepted).settled
+                self._node.beside_ticks(running.certificate, partial(self._learn, running))
+
+    def _learn(self, running: gate.Running, certificate: Certificate) -> None:
+        """Take the certificate of what was accepted, unless that is something else by now."""
+        if running == self._running(self._node.accepted).settled:
+            self._held = certificate
             if self._watches:
                 self.report()
 

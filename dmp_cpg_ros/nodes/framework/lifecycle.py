@@ -27,6 +27,7 @@ from rclpy.timer import Timer
 
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError
 from dmp_cpg_ros.nodes.framework.health import NodeHealth
+from dmp_cpg_ros.nodes.framework.judging import sends_later
 from dmp_cpg_ros.nodes.framework.strangers import Strangers
 
 CHANGES, CHANGES_HZ = 20.0, 2.0
@@ -238,8 +239,14 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
         if srv_type in (SetParameters, SetParametersAtomically):
             callback = self._limited(srv_name, callback)
         who = partial(self.strangers.asking, srv_name)
-        return super().create_service(
+        service = super().create_service(
             srv_type, srv_name, self.guarded(srv_name, callback, who), *arguments, **options)
+        sends_later(service)
+        return service
+
+    def change(self, make: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Answer a request to change parameters, at once or later; rclpy makes the change."""
+        return make(request, response)
 
     def _limited(self, service: str, callback: Callable[..., Any]) -> Callable[..., Any]:
         """Refuse changes of parameters that come so often that ticks would starve."""
@@ -250,7 +257,7 @@ class GuardedLifecycleNode(LifecycleNode):  # type: ignore[misc]
             heard = (self.waited_for or left >= 1.0) and len(request.parameters) <= MOST_CHANGES
             self._changes = max(0.0, left - heard), now
             if heard:
-                return callback(request, response)
+                return self.change(callback, request, response)
             refusal = SetParametersResult(successful=False, reason=(
                 'too many changes of parameters; ask again in a few seconds'))
             if self.health.reject('set_parameters',

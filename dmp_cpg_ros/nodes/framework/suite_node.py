@@ -20,15 +20,15 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from dmp_cpg_ros.core.certificates.gate import shown
 from dmp_cpg_ros.core.clock import TickClock
 from dmp_cpg_ros.core.errors import DataError, DmpCpgError, ParameterError
 from dmp_cpg_ros.core.gait.known_gaits import KnownGaits
-from dmp_cpg_ros.core.parameters import Parameters
+from dmp_cpg_ros.core.parameters import Parameters, typed
 from dmp_cpg_ros.core.suite_parameters import OWNER
 from dmp_cpg_ros.nodes.framework import parameters
 from dmp_cpg_ros.nodes.framework.certified import Certified, Sets
 from dmp_cpg_ros.nodes.framework.health import missing_connections
+from dmp_cpg_ros.nodes.framework.judging import Compute, InTurn, Step, Use, judge
 from dmp_cpg_ros.nodes.framework.lifecycle import GuardedLifecycleNode
 from dmp_cpg_ros.nodes.framework.local_delivery import LocalDelivery, SuitePublisher
 from dmp_cpg_ros.nodes.framework.ticks import TickInputs, drain
@@ -56,6 +56,9 @@ LOOK_AFTER_S = 0.02
 FRESH_NS = 20_000_000
 """Age up to which a memory of the gait is where a restarted node goes on [ns]: within it the robot
 has not moved, which waits in lock-step."""
+
+MOST_VERDICTS = 8
+"""How often a change is judged anew because what runs has become another meanwhile."""
 
 P = TypeVar('P', bound=Parameters)
 Readers = Mapping[str, Callable[[Any], Any]]
@@ -118,6 +121,7 @@ class SuiteNode(GuardedLifecycleNode):
         self.add_post_set_parameters_callback(self._accept_change)
         self._undo: list[Callable[[], object]] = []
         self._said: list[Callable[[], None]] = []
+        self._changes_in_turn = InTurn(self.beside_ticks)
         self._commands: list[Subscription] = []
         self._not_waking: dict[str, Subscription] = {}
         self._commands_taken: dict[str, int] = {}
@@ -229,6 +233,38 @@ class SuiteNode(GuardedLifecycleNode):
             return SetParametersResult(successful=True)
         return super().set_parameters_atomically(news)
 
+    def change(self, make: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
+        """Change parameters when what the certificate says of it has been found beside the ticks;
+        changes take their turn.
+        """
+        return self._changes_in_turn.take(self._changing(make, request, response), response)
+
+    def _changing(self, make: Callable[[Any, Any], Any], request: Any, response: Any
+                  ) -> Iterator[Step]:
+        make = self.guarded('set_parameters', make)
+        entries, one_by_one = list(request.parameters), hasattr(response, 'results')
+        for group in [[entry] for entry in entries] if one_by_one else [entries]:
+            for _ in range(MOST_VERDICTS):
+                asked = self._to_judge(group)
+                if asked is None:
+                    break
+                yield asked
+            made = make(type(request)(parameters=group), type(response)())
+            if one_by_one:
+                response.results.extend(made.results)
+            else:
+                response.result = made.result
+
+    def _to_judge(self, entries: Sequence[Any]) -> Step | None:
+        """What has to be computed before a change can be judged at once."""
+        if self.certified is None or self.lock_step:
+            return None
+        try:
+            sets = self._changed([Parameter.from_parameter_msg(entry) for entry in entries])
+            return self.certified.to_judge(sets)
+        except Exception:  # noqa: BLE001 - whatever it is, the change itself will say so
+            return None
+
     def changed_values(self, sets: Sets) -> dict[str, Any]:
         """New values of the parameters in which sets differ from those accepted last."""
         before = self._table.values(self.accepted)
@@ -244,7 +280,7 @@ class SuiteNode(GuardedLifecycleNode):
                 if owner != self.KIND:
                     raise ParameterError(
                         f"'{name}' belongs to {owner}, which the other nodes follow; set it "
-                        f'there: ros2 param set /{owner} {name} {shown(value)}')
+                        f'there: ros2 param set /{owner} {name} {typed(value)}')
             self.check_parameters(sets)
         except DmpCpgError as error:
             return SetParametersResult(successful=False, reason=str(error))
@@ -502,11 +538,23 @@ class SuiteNode(GuardedLifecycleNode):
             self._watch_command_types()
             self.report(periodic=True)
 
-    def let_ticks_pass(self) -> None:
-        """Take waiting messages in the middle of something that takes long."""
-        for entry in self._inputs if self.active else ():
-            if entry in self._inputs:  # the first tick ends what it needs no more
-                drain(entry[1])
+    def beside_ticks(self, compute: Compute, use: Use) -> None:
+        """Have something computed that takes longer than a tick, and use it between two ticks.
+
+        In lock-step, where the robot waits, and without an executor it is computed at once; so it
+        is where it cannot be done elsewhere.
+        """
+        if self.lock_step or self.executor is None:
+            use(compute())
+        else:
+            judge().ask(compute, partial(self._computed, compute, use))
+
+    def _computed(self, compute: Compute, use: Use, result: Any) -> None:
+        """Pass on, from another thread, what was computed."""
+        executor = self.executor
+        if executor is not None:  # else the node has ended
+            executor.create_task(self.guarded('beside ticks', lambda: use(
+                compute() if isinstance(result, Exception) else result)))
 
     def _run_tick(self, stamp_ns: int, values: dict[str, Any]) -> None:
         self.elapsed = self._clock_of_ticks.step(stamp_ns)

@@ -13,9 +13,9 @@ from core_examples import GAITS, TICK, network
 
 from dmp_cpg_ros.core.balance.controller import PostureParameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify, spring_damper_contraction
-from dmp_cpg_ros.core.certificates.inequality import Inequality
-from dmp_cpg_ros.core.certificates.suggest import nearest_value, suggest_gains
+from dmp_cpg_ros.core.certificates.certify import certify, spring_damper_contraction
+from dmp_cpg_ros.core.certificates.inequality import Certificate, Inequality
+from dmp_cpg_ros.core.certificates.suggest import nearest_values, suggest_gains
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.reference.filter import ReferenceParameters
 from dmp_cpg_ros.core.reference.operating_range import operating_range
@@ -169,12 +169,11 @@ def test_gains_that_hold_are_kept_and_what_gains_cannot_mend_is_not_promised() -
 
 
 def test_the_nearest_value_that_works_works_and_a_little_further_does_not() -> None:
-    def holds(gain: float) -> bool:
-        return certificate(suite=with_inhibition(inhibition_gain=gain)).holds
+    def holds(values: dict[str, float]) -> bool:
+        return certificate(suite=with_inhibition(**values)).holds
 
-    nearest = nearest_value(holds, 400.0, 100.0)
-    assert holds(nearest) and not holds(nearest - 1.0)
-    assert nearest_value(holds, 400.0, 300.0) == 300.0
-    with pytest.raises(ParameterError, match='to start from'):
-        nearest_value(holds, 100.0, 50.0)
+    found = nearest_values({'inhibition_gain': (400.0, 100.0)}, holds, 8)
+    assert holds(found) and not holds({'inhibition_gain': found['inhibition_gain'] - 1.2})
+    kept = {'inhibition_gain': 300.0}
+    assert nearest_values({'inhibition_gain': (400.0, 300.0)}, holds, 8) == kept
     assert PostureParameters() == SuiteParameters().posture

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from core_examples import GAITS, TICK, TICK_NS, network, quadruped, standing_state
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition, InhibitionParameters
-from dmp_cpg_ros.core.certificates.gate import CertificateGate, Running
+from dmp_cpg_ros.core.certificates.gate import Change, Running
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.known_gaits import GaitShares, KnownGaits, shares_of
 from dmp_cpg_ros.core.gait.network import CanonicalParameters
@@ -31,7 +32,7 @@ SLOW = RUNNING.changed({'max_speed': 0.2, 'max_lateral_speed': 0.0, 'max_turn_ra
 
 
 def judge(values: dict[str, object], running: Running = RUNNING):
-    return CertificateGate().judge(running, running.certificate(), running.changed(values))
+    return Change(running, running.certificate(), running.changed(values)).verdict()
 
 
 @pytest.mark.parametrize(('name', 'value', 'inequality'), [
@@ -61,7 +62,7 @@ def test_a_refusal_names_inequality_sides_and_a_nearest_value_that_works(
     nearest = float(found[1])
     assert min(present, value) <= nearest <= max(present, value)
     assert judge({name: nearest}, running).accepted
-    further = float(np.clip(nearest + 0.005 * (value - present), min(present, value),
+    further = float(np.clip(nearest + 0.035 * (value - present), min(present, value),
                             max(present, value)))
     assert not judge({name: further}, running).accepted
 
@@ -85,6 +86,34 @@ def test_several_changes_are_judged_together() -> None:
         r'nearest values that work: inhibition_gain = (\S+), cadence_scale = (\S+)$',
         verdict.reason)
     assert found, verdict.reason
+
+
+def test_what_is_known_early_not_to_hold_is_what_does_not_hold() -> None:
+    rng, seen = np.random.default_rng(5), set[bool]()
+    for number in range(40):
+        others = (GAITS['trot'],) if number % 4 == 0 else ()
+        running = replace(RUNNING, others=others, acting_cadence=rng.choice([0.7, 1.0])).changed({
+            'coupling_gain': 10.0 ** rng.uniform(1.0, 2.5), 'rho': rng.uniform(1.0, 30.0),
+            'coupling_graph': str(rng.choice(['all_to_all', 'ring', 'path', 'directed_ring'])),
+            'inhibition_gain': 10.0 ** rng.uniform(2.0, 3.3), 'voting': number % 5 == 0,
+            'inhibited_legs': ('auto',) if number % 3 == 0 else ('rr',),
+            'alpha_r': 10.0 ** rng.uniform(-0.7, 1.0)})
+        seen.add(running.holds())
+        assert running.holds() == running.certificate().holds
+    assert seen == {True, False}
+
+
+def test_a_verdict_covers_the_cadences_between_that_act_and_no_other_change() -> None:
+    def change(acting: float, **values: object) -> Change:
+        present = replace(RUNNING, acting_cadence=acting)
+        return Change(present, RUNNING.certificate(), present.changed(values))
+
+    judged = change(1.5, cadence_scale=0.8)
+    for acting, covered in ((0.8, True), (1.0, True), (1.5, True), (0.79, False), (1.51, False)):
+        assert judged.covers(change(acting, cadence_scale=0.8)) == covered
+    assert not judged.covers(change(1.0, cadence_scale=0.8, rho=7.0))
+    assert not judged.covers(replace(judged, gaits=(GAITS['amble'], GAITS['trot'])))
+    assert not judged.covers(replace(judged, present=judged.present.changed({'rho': 7.0})))
 
 
 def test_without_a_certificate_only_what_makes_it_worse_is_refused() -> None:

@@ -25,8 +25,8 @@ from dmp_cpg_ros.core.canonical.coupling import Edges, graph_from_edges
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.canonical.system import CanonicalSystem
 from dmp_cpg_ros.core.certificates import check_proof
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
-from dmp_cpg_ros.core.certificates.inequality import STEP_ROWS
+from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.inequality import STEP_ROWS, Certificate
 from dmp_cpg_ros.core.certificates.proof import proof_of
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork

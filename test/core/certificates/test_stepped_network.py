@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from core_examples import TICK, network, suite_parameters
 
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
-from dmp_cpg_ros.core.certificates.inequality import STEP_ROWS
+from dmp_cpg_ros.core.certificates.certify import certify
+from dmp_cpg_ros.core.certificates.inequality import STEP_ROWS, Certificate
 from dmp_cpg_ros.core.contraction.hopf_bounds import largest_radial, largest_shifted
 from dmp_cpg_ros.core.maths.exponential import ExponentialStep
 from dmp_cpg_ros.core.maths.step_comparison import StepComparison

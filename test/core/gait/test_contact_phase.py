@@ -12,8 +12,8 @@ import pytest
 
 from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.canonical.phase import phase, phase_rotation, wrapped
-from dmp_cpg_ros.core.certificates.certify import Certificate
 from dmp_cpg_ros.core.certificates.gate import Running
+from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.contraction.capture import PLACE_TOLERANCE, RADIUS_TOLERANCE
 from dmp_cpg_ros.core.gait.contact_feedback import (
     LOADED,
@@ -50,7 +50,8 @@ def suite_with(**values: object) -> Suite:
 def network_and_certificate(**values: object) -> tuple[GaitNetwork, Certificate]:
     suite = suite_with(**values)
     scale = body_scale(load_description(suite.robot_file))
-    certificate = Running(suite.parameters, suite.gait, scale, TICK).certificate()
+    running = Running(suite.parameters, suite.gait, scale, TICK)
+    certificate = running.certificate(whole=True)
     return GaitNetwork(suite.parameters.canonical, suite.gait, scale), certificate
 
 
@@ -176,7 +177,7 @@ def test_the_certificate_says_what_share_of_the_margin_is_used() -> None:
     assert most['contact_feedback'].left == pytest.approx(0.9 * row.right)
     without = Running(replace(suite_with().parameters, canonical=replace(
         suite_with().parameters.canonical, contact_feedback=False)), load_gait('amble'),
-        body_scale(load_description(suite_with().robot_file)), TICK).certificate()
+        body_scale(load_description(suite_with().robot_file)), TICK).certificate(whole=True)
     assert without.contact is None
     assert half.time_to_rest > without.time_to_rest
     assert [entry.name for entry in without.inequalities] == [

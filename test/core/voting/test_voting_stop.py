@@ -13,8 +13,9 @@ from core_examples import GAITS, TICK, TICK_NS, network
 from test_core_supervisor import Run, walking
 
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
-from dmp_cpg_ros.core.certificates.certify import Certificate, certify
+from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.certificates.changes import certify_changes
+from dmp_cpg_ros.core.certificates.inequality import Certificate
 from dmp_cpg_ros.core.certificates.network import Setting
 from dmp_cpg_ros.core.certificates.suggest import suggest_gains
 from dmp_cpg_ros.core.certificates.votes import vote_bound, votes_needed

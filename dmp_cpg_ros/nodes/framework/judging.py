@@ -1,0 +1,207 @@
+# Copyright 2026 The dmp_cpg_ros authors
+# SPDX-License-Identifier: Apache-2.0
+"""What takes longer than a tick, computed beside the ticks; requests that wait for it.
+
+A verdict on a change of parameters takes several ticks. It is a function of values alone, so that
+another process can find it while the node goes on: threads of one interpreter would share its
+lock, and a tick would wait for it at every product of matrices. The process is started when it is
+first needed, yields to the nodes, and ends with the one that started it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import queue
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from functools import lru_cache, partial
+from typing import IO, Any
+
+Compute = Callable[[], Any]
+"""What is computed: a function without arguments that can be pickled."""
+
+Use = Callable[[Any], None]
+
+Step = tuple[Compute, Use]
+"""What has to be computed before something goes on, and who takes the result."""
+
+NICENESS = 5
+"""How far the process yields to those with ticks."""
+
+
+class JudgeError(Exception):
+    """It could not be computed beside the ticks."""
+
+
+class Judge:
+    """A process that computes one thing after the other."""
+
+    def __init__(self) -> None:
+        """Start nothing yet."""
+        self._asked: queue.SimpleQueue[tuple[Compute, Use]] = queue.SimpleQueue()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._thread: threading.Thread | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Of the process; None while there is none."""
+        return None if self._process is None else self._process.pid
+
+    def ask(self, compute: Compute, use: Use) -> None:
+        """Have something computed.
+
+        Parameters
+        ----------
+        compute : callable () → object
+            What; it and its result go through :mod:`pickle`.
+        use : callable (object)
+            Called in a thread with the result, or with what was raised; a :class:`JudgeError`
+            where the process did not answer.
+        """
+        self._asked.put((compute, use))
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._work, daemon=True)
+            self._thread.start()
+
+    def _work(self) -> None:
+        while True:
+            compute, use = self._asked.get()
+            use(self._computed(compute))
+
+    def _computed(self, compute: Compute) -> Any:
+        try:
+            process = self._started()
+            assert process.stdin is not None and process.stdout is not None
+            process.stdin.write(pickle.dumps(compute))
+            process.stdin.flush()
+            return pickle.load(process.stdout)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the node can compute it itself
+            if self._process is not None:
+                self._process.kill()
+                self._process.wait()
+                self._process = None
+            return JudgeError(f'{type(error).__name__}: {error}')
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        if self._process is None:
+            self._process = subprocess.Popen(
+                [sys.executable, '-c', f'import sys; sys.path[:] = {sys.path!r}; '
+                 f'from {__name__} import main; main()'],
+                stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        return self._process
+
+
+@lru_cache(maxsize=1)
+def judge() -> Judge:
+    """The one of this process, whatever nodes it has."""
+    return Judge()
+
+
+def main() -> None:
+    """Compute what comes on standard input until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for whoever asks
+    os.nice(NICENESS)
+    answers, questions = os.fdopen(os.dup(1), 'wb'), sys.stdin.buffer
+    os.dup2(2, 1)  # nothing else gets between the answers
+    with contextlib.suppress(EOFError, BrokenPipeError):
+        while True:
+            _answer(pickle.load(questions), answers)
+
+
+def _answer(compute: Compute, answers: IO[bytes]) -> None:
+    try:
+        result = compute()
+    except Exception as error:  # noqa: BLE001 - it is an answer too
+        result = error
+    answers.write(pickle.dumps(result))
+    answers.flush()
+
+
+class Later:
+    """Stands for the response of a service that is not there yet."""
+
+    def __init__(self) -> None:
+        """Wait for both the response and where it goes."""
+        self._send: Callable[[Any], None] | None = None
+
+    def bound_for(self, send: Callable[[Any], None]) -> None:
+        """Take note of what sends the response."""
+        self._send = send
+
+    def deliver(self, response: Any) -> None:
+        """Send the response."""
+        if self._send is not None:
+            self._send(response)
+
+
+def sends_later(service: Any) -> None:
+    """Let a service's callback return :class:`Later`."""
+    send = service.send_response
+
+    def send_or_wait(response: Any, header: Any) -> None:
+        if isinstance(response, Later):
+            response.bound_for(lambda known: send(known, header))
+        else:
+            send(response, header)
+
+    service.send_response = send_or_wait
+
+
+class InTurn:
+    """Requests of which each begins when the one before it is answered.
+
+    Parameters
+    ----------
+    beside : callable (compute, use)
+        Has something computed beside the ticks, and the result used between two of them.
+    """
+
+    def __init__(self, beside: Callable[[Compute, Use], None]) -> None:
+        """Start without requests."""
+        self._beside = beside
+        self._waiting: deque[tuple[Iterator[Step], Any, Later]] = deque()
+
+    def take(self, steps: Iterator[Step], response: Any) -> Any:
+        """Answer a request.
+
+        Parameters
+        ----------
+        steps : iterator of Step
+            What has to be computed before it goes on, each time; fills the response meanwhile.
+        response : object
+            Of the service.
+
+        Returns
+        -------
+        object
+            The response, or :class:`Later`.
+        """
+        if not self._waiting:
+            first = next(steps, None)
+            if first is None:
+                return response
+            self._waiting.append((steps, response, later := Later()))
+            self._compute(*first)
+            return later
+        self._waiting.append((steps, response, later := Later()))
+        return later
+
+    def _compute(self, compute: Compute, use: Use) -> None:
+        self._beside(compute, partial(self._go_on, use))
+
+    def _go_on(self, use: Use, result: Any) -> None:
+        use(result)
+        while self._waiting:
+            steps, response, later = self._waiting[0]
+            step = next(steps, None)
+            if step is not None:
+                self._compute(*step)
+                return
+            self._waiting.popleft()
+            later.deliver(response)
