@@ -296,6 +296,9 @@ class Certified:
         Meanwhile the cadence that acts goes on towards the accepted one. The change is judged for
         where it will be, and :meth:`check` asks whether it still lies in what was judged.
         """
+        if self._held is None and self._node.configured:
+            present = self._running(self._node.accepted).settled
+            return present.certificate, partial(self._learn, present)
         asked = self._asked(sets)
         if asked is None or self._waits(asked[1]) or (
                 self._judged is not None and self._judged[0].covers(asked[1])):

@@ -31,7 +31,7 @@ Use = Callable[[Any], None]
 Step = tuple[Compute, Use]
 """What has to be computed before something goes on, and who takes the result."""
 
-NICENESS = 5
+NICENESS = 10
 """How far the process yields to those with ticks."""
 
 
