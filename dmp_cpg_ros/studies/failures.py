@@ -14,15 +14,16 @@ import sys
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from functools import cache
+from math import acos
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from dmp_cpg_ros.analysis.motion import tilt
 from dmp_cpg_ros.commands.ros_arguments import run_command
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets
+from dmp_cpg_ros.core.maths.vec3 import upward
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.scenario.fault import (
     COMPONENTS,
     KINDS,
@@ -161,10 +162,11 @@ class FailingWalk:
         if injector.acting and not taken:
             self.named.add('stamps')
         for leg, stamp, targets in injector.sent(self._sent):
-            sound = all(np.isfinite(values).all() for values in vars(targets).values())
+            sound = np.isfinite((targets.position, targets.velocity, targets.effort)).all()
             if stamp <= state.time_ns and sound:  # as the robot's reader takes them
                 guard.accept(leg, stamp, targets)
-        self.tilt = max(self.tilt, float(tilt(state.base_quaternion[None])[0]))
+        vertical = upward(state.base_quaternion.tolist())[2]
+        self.tilt = max(self.tilt, acos(min(1.0, max(-1.0, vertical))))
         estimator = self.loop.estimator_state
         if injector.acting:
             self.named.update(f'targets of {leg}' for leg in guard.silent(state.time_ns))
@@ -176,11 +178,8 @@ class FailingWalk:
         self.state = self.robot.step(injector.driven(targets))
 
     def _on_tick(self, stamp_ns: int, inputs: Mapping[str, Any]) -> None:
-        tick = self.loop.tick(inputs['robot'])
-        parts = np.split(np.array(
-            (tick.targets.position, tick.targets.velocity, tick.targets.effort)), 4, axis=1)
-        self._sent = [(leg, stamp_ns, JointTargets(*part))
-                      for leg, part in zip(LEGS, parts, strict=True)]
+        targets = self.loop.tick(inputs['robot']).targets.by_leg()
+        self._sent = [(leg, stamp_ns, of_leg) for leg, of_leg in targets.items()]
 
 
 @cache

@@ -60,13 +60,12 @@ class LateWalk(Walk):
         if self._guard is None:
             self._guard = CommandWatchdog(
                 self.robot.description, TARGET_TIMEOUT_NS, self._lead_ms * 1_000_000)
-        sent = np.split(np.array(tuple(vars(tick.targets).values())), len(LEGS), axis=1)
-        for i, (leg, of_leg) in enumerate(zip(LEGS, sent, strict=True)):
+        for i, (leg, of_leg) in enumerate(tick.targets.by_leg().items()):
             queue, at_ns = self._on_the_way[i], self.arrives_ns(
                 i, tick.time_ns, self._guard.stamps[i] is None)
             if at_ns is not None:
                 self._arrival_ns[i] = max(self._arrival_ns[i], at_ns)
-                queue.append((self._arrival_ns[i], tick.time_ns, JointTargets(*of_leg)))
+                queue.append((self._arrival_ns[i], tick.time_ns, of_leg))
             while queue and queue[0][0] <= tick.time_ns:
                 self._guard.accept(leg, *queue.pop(0)[1:])
         return self._guard.targets(self.state)

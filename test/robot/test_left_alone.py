@@ -48,12 +48,9 @@ class Walk:
         for _ in range(ticks):
             tick = self.loop.tick(self.state)
             self.phase = scalar_phase(*tick.x[0])
-            for place, leg in enumerate(LEGS):
-                joints, targets = slice(3 * place, 3 * place + 3), tick.targets
+            for leg, targets in tick.targets.by_leg().items():
                 if leg not in silent:
-                    self.guard.accept(leg, self.state.time_ns, JointTargets(
-                        targets.position[joints], targets.velocity[joints],
-                        targets.effort[joints]))
+                    self.guard.accept(leg, self.state.time_ns, targets)
             self.state = self.robot.step(self.guard.targets(self.state))
         return self
 

@@ -36,10 +36,8 @@ def make_guard(description: RobotDescription, lead_ns: int = 0) -> CommandWatchd
 
 
 def accept(guard: CommandWatchdog, stamp_ns: int, targets: JointTargets) -> None:
-    for place, leg in enumerate(LEGS):
-        joints = slice(3 * place, 3 * place + 3)
-        guard.accept(leg, stamp_ns, JointTargets(
-            targets.position[joints], targets.velocity[joints], targets.effort[joints]))
+    for leg, of_leg in targets.by_leg().items():
+        guard.accept(leg, stamp_ns, of_leg)
 
 
 @pytest.fixture(scope='module')

@@ -26,7 +26,7 @@ from dmp_cpg_ros.analysis.bag import opened, payload_digests
 from dmp_cpg_ros.analysis.loading import load_recording
 from dmp_cpg_ros.commands.walk import load_scenario
 from dmp_cpg_ros.core.loop import WalkingLoop
-from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.scenario.scenario import play
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.robot.watchdog import CommandWatchdog
@@ -124,9 +124,8 @@ def plain_run(scenario_file: Path, **values: Any) -> tuple[list[RobotState], lis
 
     def step() -> RobotState:
         ticks.append(loop.tick(states[-1]))
-        sent = np.split(np.array(tuple(vars(ticks[-1].targets).values())), 4, axis=1)
-        for leg, targets in zip(LEGS, sent, strict=True):
-            guard.accept(leg, states[-1].time_ns, JointTargets(*targets))
+        for leg, targets in ticks[-1].targets.by_leg().items():
+            guard.accept(leg, states[-1].time_ns, targets)
         states.append(robot.step(guard.targets(states[-1])))
         return states[-1]
 

@@ -100,3 +100,9 @@ class JointTargets:
     position: Array
     velocity: Array
     effort: Array
+
+    def by_leg(self) -> dict[str, JointTargets]:
+        """Those of each leg, where these are all."""
+        parts = {leg: slice(3 * place, 3 * place + 3) for place, leg in enumerate(LEGS)}
+        return {leg: JointTargets(self.position[part], self.velocity[part], self.effort[part])
+                for leg, part in parts.items()}
