@@ -26,172 +26,27 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from math import ceil, isnan, nan, pi
+from math import ceil, isnan, nan
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.errors import MissingFileError
-from dmp_cpg_ros.core.robot_model.state import JOINT_NAMES
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies import late_walks, output
+from dmp_cpg_ros.studies import benchmark_cases as given
+from dmp_cpg_ros.studies import late_walks, output, push_trials
 from dmp_cpg_ros.studies import walking_trials as trials
-from dmp_cpg_ros.studies.loop_recording import StopSummary
+from dmp_cpg_ros.studies.loop_recording import StopSummary, suite_of
 from dmp_cpg_ros.studies.study_stops import StopCase, run_trials
 from dmp_cpg_ros.studies.workers import Workers
-from dmp_cpg_ros.suite import load_gaits, load_suite
+from dmp_cpg_ros.suite import load_gaits
+
+Cell = TypeVar('Cell')
 
 Results = list[tuple[dict[str, Any], Any]]
 """Cases, as the arguments of their trials, with the outcomes."""
-
-DIRECTIONS = {'ahead': 0.0, 'ahead left': 0.25 * pi, 'left': 0.5 * pi, 'back left': 0.75 * pi,
-              'back': pi, 'back right': 1.25 * pi, 'right': 1.5 * pi, 'ahead right': 1.75 * pi}
-"""Directions of the pushes [rad]."""
-
-PUSHED = (('amble', 0.5), ('trot', 0.5), ('trot', 1.0))
-"""Gaits and speeds that are pushed."""
-
-Ground = tuple[str, dict[str, float]]
-"""A world with some of its parameters."""
-
-ROUGH: tuple[Ground, ...] = (
-    ('blocks', {'height': 0.05}), ('slope', {'degrees': 15.0}), ('slope', {'degrees': -15.0}),
-    ('steps', {'height': 0.08}), ('low_friction', {'friction': 0.3}))
-"""Grounds that are crossed."""
-
-STAIRS = {'count': 5, 'depth': 0.3, 'platform': 1.5}
-"""Five stairs up and five down within ``FINISH``."""
-
-ROUGHER: tuple[Ground, ...] = (
-    ('steps', {'height': 0.1, **STAIRS}), ('slope', {'degrees': 20.0}),
-    ('slope', {'degrees': -20.0}), ('low_friction', {'friction': 0.2}),
-    ('rough_slope', {'degrees': 12.0, 'height': 0.04}), ('hills', {'degrees': 15.0}),
-    ('blocks', {'height': 0.07}), ('gaps', {'width': 0.1, 'count': 5, 'depth': 0.5}))
-"""Harder grounds."""
-
-HIGHER: tuple[Ground, ...] = (('steps', {'height': 0.15, **STAIRS}),)
-"""Grounds for a robot with longer legs, ``CLIMBER``."""
-
-CLIMBER = 'robots/go2.yaml'
-
-UNTUNED = 100
-"""First seed on harder grounds: those below were looked at in between."""
-
-OBSTACLES = (0.13, 0.16, 0.2, 0.25, 1.0)
-"""Heights of steps that the package's own robot does not cross [m]."""
-
-OBSTACLE_SPEEDS = (0.3, 0.5)
-"""Speeds at which it walks at them [m/s]."""
-
-ROUGH_GAITS = ('amble', 'trot')
-
-FELT_GROUNDS: tuple[Ground, ...] = (
-    *(('blocks', {'height': height}) for height in (0.03, 0.05, 0.07)),
-    *(('steps', {'height': height}) for height in (0.05, 0.08)))
-"""Grounds that are crossed with and without feeling them."""
-
-FEELING: dict[trials.Values, str] = {
-    (('contact_feedback', felt), ('stumble_lift', lift)): words for felt, lift, words in (
-        (False, 0.0, 'nothing'), (True, 0.0, 'touchdown, in the phase'),
-        (False, 0.13, 'obstacles, in the swing'), (True, 0.13, 'both'))}
-"""Parameters, and what they make the legs feel."""
-
-STRAIGHT = {
-    'amble': (0.1, 0.2, 0.5, 0.8, 1.0, 1.25, 1.5), 'walk': (0.1, 0.2, 0.5, 0.8),
-    'trot': (0.1, 0.2, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0), 'pace': (0.2, 0.5, 0.8),
-    'bound': (0.2, 0.5, 0.8), 'pronk': (0.2, 0.5, 0.8)}
-"""Speeds forwards of the table ``speeds`` by gait [m/s]."""
-
-OTHERS: tuple[tuple[str, trials.Velocity], ...] = (
-    ('amble', (-0.3, 0.0, 0.0)), ('trot', (-0.5, 0.0, 0.0)), ('amble', (0.0, 0.3, 0.0)),
-    ('trot', (0.0, 0.5, 0.0)), ('amble', (0.0, 0.0, 1.0)), ('trot', (0.0, 0.0, 1.0)),
-    ('trot', (0.0, 0.0, 2.0)), ('amble', (0.5, 0.0, 0.5)), ('trot', (1.0, 0.0, 1.0)))
-"""Velocities of the table ``speeds`` that are not straight ahead."""
-
-ROBOTS = tuple(f'robots/{name}.yaml' for name in (
-    'mini_quadruped', 'mini_cheetah', 'go1', 'go2', 'aliengo', 'a2', 'spot', 'pegasus', 'b2',
-    'hyqreal1', 'hyqreal2'))
-"""Robots by their files; all but the first need the extra ``robots``."""
-
-RESTARTED = (('amble', 0.5), ('trot', 1.0), ('trot', 2.0), ('pace', 0.5), ('bound', 0.5),
-             ('pronk', 0.6))
-"""Walks whose posture control begins anew."""
-
-TIMED: tuple[dict[str, Any], ...] = (
-    *({'gait': gait, 'speed': speed} for gait, speed in (
-        ('amble', 0.5), ('trot', 0.5), ('trot', 1.5), ('walk', 0.5), ('pace', 0.5),
-        ('bound', 0.5))),
-    {'gait': 'amble', 'speed': 0.5, 'ground': 'blocks'},
-    *({'gait': 'trot', 'speed': 0.5, 'robot': f'robots/{name}.yaml'}
-      for name in ('mini_cheetah', 'go1', 'go2')))
-"""Walks that are pushed with and without quicker steps."""
-
-TIMED_CHANGES = (1.6, 2.4)
-"""Speed changes by their pushes [m/s]."""
-
-STOPPED = ('at rest', 'stopping')
-"""Manoeuvres in which a stop is in force, and steps may catch a push."""
-
-PUSHED_IN = (
-    ('at rest', (1.2, 1.4, 1.6), (False,)), ('at rest', (0.6, 0.8, 1.0, 1.2, 1.4, 1.6), (True,)),
-    *((name, (0.8, 1.2, 1.6), (True,)) for name in trials.MANOEUVRES if 'stopping' in name),
-    *((name, (1.2,), (True,)) for name in trials.MANOEUVRES if not name.startswith(STOPPED)))
-"""Manoeuvres, speed changes by pushes [m/s], and whether the pushes are drawn."""
-
-UNPUSHED: tuple[tuple[str, tuple[float, float], str, dict[str, float], float], ...] = (
-    *((gait, span, 'flat', {}, 0.0) for gait, span in (
-        ('amble', (0.3, 1.2)), ('trot', (0.3, 1.5)), ('walk', (0.2, 0.8)), ('pace', (0.2, 0.8)),
-        ('bound', (0.2, 0.8)))),
-    *(('amble', (0.3, 0.6), 'slope', {'degrees': degrees}, 0.0)
-      for degrees in (-12.0, -6.0, 6.0, 12.0)),
-    ('trot', (0.3, 1.0), 'low_friction', {}, 0.0), ('amble', (0.3, 0.8), 'low_friction', {}, 0.0),
-    ('amble', (0.3, 0.8), 'flat', {}, 0.3), ('trot', (0.3, 1.5), 'flat', {}, 0.3),
-    ('amble', (0.3, 0.5), 'blocks', {'height': 0.05}, 0.0))
-"""Gaits, speeds [m/s], grounds and payloads of stops that nobody pushes against."""
-
-SIDES = (0.5 * pi, 1.5 * pi)
-"""Directions of the pushes of each robot [rad]."""
-
-LATE_WALKS = (('amble', 0.5), ('amble', 1.2), ('trot', 1.0), ('trot', 2.0))
-"""Gaits and speeds of walks whose targets arrive late."""
-
-DELAYS_MS = ((0.0, 0.0), (16.0, 16.0), (20.0, 20.0), (24.0, 24.0), (40.0, 40.0), (5.0, 30.0),
-             (5.0, 50.0))
-"""Least and longest delays of their targets [ms]."""
-
-STARVED = (late_walks.Stalls(300.0, 150.0), late_walks.Stalls(150.0, 200.0),
-           late_walks.Stalls(300.0, 250.0, 0.2, 0.3))
-"""Stalls of walks whose controllers starve."""
-
-STARVED_WALKS = (('amble', 0.5), ('trot', 1.0))
-"""Gaits and speeds of those."""
-
-WEAK = 0.4
-"""Share of its torque that a weak drive has."""
-
-MISMATCHED: dict[str, Callable[[int], trials.Values]] = {
-    'nothing': lambda seed: (),
-    "payload of the robot's mass": lambda seed: (('payload', 1.0),),
-    f'one drive at {WEAK:.0%}, each in turn': lambda seed: (('joint_strength', tuple(
-        WEAK if k == seed % len(JOINT_NAMES) else 1.0 for k in range(len(JOINT_NAMES)))),),
-    'friction and damping of the joints times 10': lambda seed: (('joint_friction', 10.0),),
-    'noise and biases of the sensors times 10': lambda seed: (('sensor_noise', 10.0),),
-    "trunk's centre of mass 3 cm aside, to either side": lambda seed: (
-        ('mass_offset', (0.0, 0.03 - 0.06 * (seed % 2))),),
-}
-"""What a robot's controllers do not know of it, by the seed of the walk."""
-
-MISMATCHED_WALKS = (('amble', 0.5), ('trot', 1.0))
-"""Gaits and speeds [m/s] of robots that are not as their controllers know them."""
-
-TOP_SPEEDS = (1.0, 1.5, 2.0, 2.5, 3.0)
-"""Speeds that are tried in a trot, one after the other [m/s]."""
-
-TOP_ERROR = 0.05
-"""Share of the commanded speed that counts as having reached it."""
-
 
 @dataclass(frozen=True)
 class Table:
@@ -236,9 +91,17 @@ def _tried(trial: Callable[..., Any], case: dict[str, Any]) -> Any:
     return trial(**case)
 
 
+def _by_cell(cells: Sequence[Cell], results: Results) -> Iterator[tuple[Cell, list[Any]]]:
+    """Every cell of a table with its outcomes, as many of each."""
+    count = len(results) // len(cells)
+    for k, cell in enumerate(cells):
+        yield cell, [outcome for _, outcome in results[k * count:(k + 1) * count]]
+
+
 def speeds(workers: Workers, seeds: int, phases: int) -> Table:
     """Steady velocities in all gaits."""
-    walks = [*((gait, (v, 0.0, 0.0)) for gait, vs in STRAIGHT.items() for v in vs), *OTHERS]
+    walks = [*((gait, (v, 0.0, 0.0)) for gait, vs in given.STRAIGHT.items() for v in vs),
+             *given.OTHERS]
     results = _run(workers, trials.steady, [{'gait': gait, 'velocity': v} for gait, v in walks])
     rows = [(case['gait'], _velocity(case['velocity']), *steady_cells(case['velocity'], outcome))
             for case, outcome in results]
@@ -270,52 +133,50 @@ def _number(value: float, digits: int) -> str:
 def pushes(workers: Workers, seeds: int, phases: int) -> Table:
     """Largest pushes survived, the least and the median over the phases."""
     cases = [{'gait': gait, 'speed': speed, 'phase': i / phases,
-              'directions': tuple(DIRECTIONS.values())}
-             for (gait, speed), i in product(PUSHED, range(phases))]
-    survived = [changes for _, changes in _run(workers, trials.survived_pushes, cases)]
-    rows = []
-    for k, (gait, speed) in enumerate(PUSHED):
-        of = np.array(survived[k * phases:(k + 1) * phases])
-        rows.append((f'{gait} {speed:g} m/s', *(
-            f'{low:.1f} / {middle:.1f}'
-            for low, middle in zip(of.min(axis=0), np.median(of, axis=0), strict=True))))
-    results = [(case, {'speed_change': of}) for case, of in zip(cases, survived, strict=True)]
+              'directions': tuple(given.DIRECTIONS.values())}
+             for (gait, speed), i in product(given.PUSHED, range(phases))]
+    results = _run(workers, push_trials.survived_pushes, cases)
+    rows = [(f'{gait} {speed:g} m/s', *(
+        f'{low:.1f} / {middle:.1f}'
+        for low, middle in zip(np.min(of, axis=0), np.median(of, axis=0), strict=True)))
+        for (gait, speed), of in _by_cell(given.PUSHED, results)]
     return Table(f'Pushes: speed change in m/s that is survived at every one of {phases} phases / '
                  'at half of them; times the mass it is the impulse in N s',
-                 ('walking', *DIRECTIONS), rows, results)
+                 ('walking', *given.DIRECTIONS), rows,
+                 [(case, {'speed_change': of}) for case, of in results])
 
 
 def timing(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls by drawn pushes, without and with quicker steps; as many pushes as ``phases``."""
-    walks = [walk for walk in TIMED if 'robot' not in walk or _is_there(walk['robot'])]
-    results = _run(workers, trials.caught, [
+    walks = [walk for walk in given.TIMED if 'robot' not in walk or _is_there(walk['robot'])]
+    results = _run(workers, push_trials.caught, [
         {**walk, 'speed_change': change, 'case': case, 'quick': quick}
-        for walk in walks for quick in (False, True) for change in TIMED_CHANGES
+        for walk in walks for quick in (False, True) for change in given.TIMED_CHANGES
         for case in range(phases)])
     fell = [sum(not upright for _, upright in results[k:k + phases])
             for k in range(0, len(results), phases)]
-    count = len(TIMED_CHANGES)
+    count = len(given.TIMED_CHANGES)
     rows = [(f'{walk["gait"]} {walk["speed"]:g} m/s', Path(walk.get('robot', 'its own')).stem,
              walk.get('ground', 'flat'), *(
                  f'{fell[2 * count * k + i]} / {fell[2 * count * k + count + i]}'
                  for i in range(count))) for k, walk in enumerate(walks)]
     return Table(f'Falls of {phases} drawn pushes without / with quicker steps',
-                 ('walking', 'robot', 'ground', *(f'{change:g} m/s' for change in TIMED_CHANGES)),
+                 ('walking', 'robot', 'ground',
+                  *(f'{change:g} m/s' for change in given.TIMED_CHANGES)),
                  rows, [(case, {'upright': upright}) for case, upright in results])
 
 
 def manoeuvres(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls by pushes at rest and in manoeuvres, without and with the steps that catch them."""
     cells = [(name, change, drawn, recovery)
-             for name, changes, draws in PUSHED_IN for change, drawn, recovery in product(
-                 changes, draws, (False, True)) if recovery or name.startswith(STOPPED)]
-    results = _run(workers, trials.pushed, [
+             for name, changes, draws in given.PUSHED_IN for change, drawn, recovery in product(
+                 changes, draws, (False, True)) if recovery or name.startswith(given.STOPPED)]
+    results = _run(workers, push_trials.pushed, [
         {'manoeuvre': name, 'speed_change': change, 'case': case, 'cases': phases, 'drawn': drawn,
          'recovery': recovery} for name, change, drawn, recovery in cells
         for case in range(phases)])
     rows = []
-    for k, (name, change, drawn, recovery) in enumerate(cells):
-        of = [outcome for _, outcome in results[k * phases:(k + 1) * phases]]
+    for (name, change, drawn, recovery), of in _by_cell(cells, results):
         rows.append((name, 'drawn' if drawn else 'all around', f'{change:g}',
                      'on' if recovery else 'off', f'{sum(one.fell for one in of)}/{phases}',
                      str(sum(one.rests for one in of)), str(max(one.releases for one in of))))
@@ -327,13 +188,13 @@ def manoeuvres(workers: Workers, seeds: int, phases: int) -> Table:
 
 def unpushed(workers: Workers, seeds: int, phases: int) -> Table:
     """Releases by stops without a push; half as many seeds as ``phases`` on each ground."""
-    results = _run(workers, trials.unpushed, [
+    results = _run(workers, push_trials.unpushed, [
         {'gait': gait, 'speed': low + (high - low) * seed / max(phases // 2 - 1, 1),
          'seed': seed + 1, 'kind': kind, 'numbers': numbers, 'payload': payload}
-        for gait, (low, high), kind, numbers, payload in UNPUSHED for seed in range(phases // 2)])
+        for gait, (low, high), kind, numbers, payload in given.UNPUSHED
+        for seed in range(phases // 2)])
     rows = []
-    for k, (gait, speeds_, kind, numbers, payload) in enumerate(UNPUSHED):
-        of = [outcome for _, outcome in results[k * (phases // 2):(k + 1) * (phases // 2)]]
+    for (gait, speeds_, kind, numbers, payload), of in _by_cell(given.UNPUSHED, results):
         words = ', '.join((kind, *(f'{value:g}' for value in numbers.values()),
                            *([f'payload {payload:g}'] if payload else [])))
         rows.append((gait, '{:g} to {:g}'.format(*speeds_), words, str(len(of)),
@@ -345,25 +206,25 @@ def unpushed(workers: Workers, seeds: int, phases: int) -> Table:
 
 def rough(workers: Workers, seeds: int, phases: int) -> Table:
     """Share of the seeds that cross each ground."""
-    return _crossed('Rough ground', ROUGH, workers, seeds, 0)
+    return _crossed('Rough ground', given.ROUGH, workers, seeds, 0)
 
 
 def rougher(workers: Workers, seeds: int, phases: int) -> Table:
     """The same of harder grounds."""
-    return _crossed('Rougher ground', ROUGHER, workers, seeds, UNTUNED)
+    return _crossed('Rougher ground', given.ROUGHER, workers, seeds, given.UNTUNED)
 
 
 def higher(workers: Workers, seeds: int, phases: int) -> Table:
     """The same of grounds for longer legs, where that robot is there."""
-    there = HIGHER if _is_there(CLIMBER) else ()
-    return _crossed(f'Higher ground, {Path(CLIMBER).stem}', there, workers, seeds, UNTUNED,
-                    CLIMBER)
+    there = given.HIGHER if _is_there(given.CLIMBER) else ()
+    return _crossed(f'Higher ground, {Path(given.CLIMBER).stem}', there, workers, seeds,
+                    given.UNTUNED, given.CLIMBER)
 
 
-def _crossed(title: str, grounds: Sequence[Ground], workers: Workers, seeds: int,
+def _crossed(title: str, grounds: Sequence[given.Ground], workers: Workers, seeds: int,
              first: int, robot: str | None = None) -> Table:
     results, rows = _crossings(
-        workers, seeds, product(grounds, ROUGH_GAITS, [()]), first, robot), []
+        workers, seeds, product(grounds, given.ROUGH_GAITS, [()]), first, robot), []
     for case, words, of, shares in _groups(results, seeds):
         times = [outcome.time for outcome in of if outcome.crossed]
         rows.append((case['kind'], words, case['gait'], *shares,
@@ -377,13 +238,12 @@ def _crossed(title: str, grounds: Sequence[Ground], workers: Workers, seeds: int
 
 def obstacles(workers: Workers, seeds: int, phases: int) -> Table:
     """What becomes of a robot that walks at a step that is too high."""
-    cells = list(product(OBSTACLES, ROUGH_GAITS, OBSTACLE_SPEEDS))
+    cells = list(product(given.OBSTACLES, given.ROUGH_GAITS, given.OBSTACLE_SPEEDS))
     results = _run(workers, trials.obstacle, [
         {'gait': gait, 'height': height, 'seed': seed, 'speed': speed}
         for height, gait, speed in cells for seed in range(seeds)])
     rows = []
-    for k, (height, gait, speed) in enumerate(cells):
-        of = [outcome for _, outcome in results[k * seeds:(k + 1) * seeds]]
+    for (height, gait, speed), of in _by_cell(cells, results):
         times, ways = ([getattr(one, what) for one in of if one.stopped and not one.fell]
                        for what in ('time', 'away'))
         rows.append((f'{height:g}', f'{gait} {speed:g}', *(
@@ -397,9 +257,11 @@ def obstacles(workers: Workers, seeds: int, phases: int) -> Table:
 
 def contacts(workers: Workers, seeds: int, phases: int) -> Table:
     """Crossings of rough ground with each of ``FEELING``."""
-    results, rows = _crossings(workers, seeds, product(FELT_GROUNDS, ROUGH_GAITS, FEELING)), []
+    walks, rows = product(given.FELT_GROUNDS, given.ROUGH_GAITS, given.FEELING), []
+    results = _crossings(workers, seeds, walks)
     for case, words, of, shares in _groups(results, seeds):
-        rows.append((f'{case["kind"]}, {words}', case['gait'], FEELING[case['values']], *shares,
+        feels = given.FEELING[case['values']]
+        rows.append((f'{case["kind"]}, {words}', case['gait'], feels, *shares,
                      f'{np.mean([outcome.distance for outcome in of]):.2f}',
                      f'{np.mean([outcome.distance / outcome.time for outcome in of]):.3f}',
                      f'{np.nanmean([outcome.tilt for outcome in of]):.2f}'))
@@ -430,14 +292,14 @@ def _groups(results: Results, seeds: int) -> Iterator[tuple[
 
 def delays(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls and speed by the delay of the targets, without a lead and with one that covers it."""
-    cells = [(gait, speed, delay, lead) for (gait, speed), delay in product(LATE_WALKS, DELAYS_MS)
+    cells = [(gait, speed, delay, lead)
+             for (gait, speed), delay in product(given.LATE_WALKS, given.DELAYS_MS)
              for lead in sorted({0, 4 * ceil(delay[1] / 4)})]
     results = _run(workers, late_walks.late, [
         {'gait': gait, 'speed': speed, 'delay_ms': delay, 'lead_ms': lead, 'seed': seed + 1}
         for gait, speed, delay, lead in cells for seed in range(seeds)])
     rows = []
-    for k, (gait, speed, delay, lead) in enumerate(cells):
-        of = [outcome for _, outcome in results[k * seeds:(k + 1) * seeds]]
+    for (gait, speed, delay, lead), of in _by_cell(cells, results):
         upright = [one for one in of if not one.fell]
         means = ((f'{np.mean([one.reached for one in upright]):.2f}',
                   f'{np.mean([one.tilt for one in upright]):.2f}') if upright else ('-', '-'))
@@ -449,13 +311,12 @@ def delays(workers: Workers, seeds: int, phases: int) -> Table:
 
 def starved(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls by how long and how often the controllers do not get to run."""
-    cells = list(product(STARVED_WALKS, STARVED))
+    cells = list(product(given.STARVED_WALKS, given.STARVED))
     results = _run(workers, late_walks.starved, [
         {'gait': gait, 'speed': speed, 'stalls': stalls, 'seed': seed + 1}
         for (gait, speed), stalls in cells for seed in range(seeds)])
     rows = []
-    for k, ((gait, speed), stalls) in enumerate(cells):
-        of = [outcome for _, outcome in results[k * seeds:(k + 1) * seeds]]
+    for ((gait, speed), stalls), of in _by_cell(cells, results):
         rows.append((f'{gait} {speed:g}', str(stalls), f'{sum(one.fell for one in of)}/{seeds}',
                      f'{np.mean([one.stood for one in of]):.1f}'))
     return Table('Controllers that starve', (
@@ -464,14 +325,13 @@ def starved(workers: Workers, seeds: int, phases: int) -> Table:
 
 def mismatch(workers: Workers, seeds: int, phases: int) -> Table:
     """Falls and speeds of a robot that is not as its controllers know it."""
-    cells = list(product(MISMATCHED, MISMATCHED_WALKS))
+    cells = list(product(given.MISMATCHED, given.MISMATCHED_WALKS))
     results = _run(workers, trials.steady, [
         {'gait': gait, 'velocity': (speed, 0.0, 0.0), 'seed': seed + 1,
-         'values': MISMATCHED[what](seed)}
+         'values': given.MISMATCHED[what](seed)}
         for what, (gait, speed) in cells for seed in range(seeds)])
     rows = []
-    for k, (what, (gait, speed)) in enumerate(cells):
-        of = [outcome for _, outcome in results[k * seeds:(k + 1) * seeds]]
+    for (what, (gait, speed)), of in _by_cell(cells, results):
         errors = [100.0 * trials.relative_error(one, (speed, 0.0, 0.0))
                   for one in of if not one.fell]
         rows.append((what, f'{gait} {speed:g}', f'{seeds - len(errors)}/{seeds}', *(
@@ -506,8 +366,8 @@ def gaits(workers: Workers, seeds: int, phases: int) -> Table:
 def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
     """Every ordered pair of gaits changed while all is asked for that may be."""
     cases: list[dict[str, Any]] = []
-    for file in filter(_is_there, ROBOTS[:4]):  # others fall at such speeds without a change
-        most = trials.suite_of(file, 'trot').parameters.reference.max_speed
+    for file in filter(_is_there, given.ROBOTS[:4]):  # others fall at such speeds without a change
+        most = suite_of(robot=file).parameters.reference.max_speed
         cases += [{'before': before, 'speed': speed, 'phases': max(1, phases // 4), 'robot': file}
                   for before, speed in product(load_gaits(), (most, -most))]
     walks = _run(workers, trials.run_changes, cases)
@@ -529,7 +389,7 @@ def fast_gaits(workers: Workers, seeds: int, phases: int) -> Table:
 def restarts(workers: Workers, seeds: int, phases: int) -> Table:
     """Posture control that begins anew in the middle of a stride."""
     walks = _run(workers, trials.run_restarts, [
-        {'gait': gait, 'speed': speed, 'phases': phases} for gait, speed in RESTARTED])
+        {'gait': gait, 'speed': speed, 'phases': phases} for gait, speed in given.RESTARTED])
     results = [(case, one) for case, of in walks for one in of]
     return Table('Posture control begins anew', (
         'gait, m/s', 'restarts', 'fell', 'largest tilt deg, median', 'worst'), [
@@ -557,7 +417,7 @@ def run_robot(file: str, phases: int) -> dict[str, Any]:
         ``pushed``, the sideways speed change survived at every phase of that amble [m/s].
     """
     # a zero command is no request here, but the first command starts the gait
-    suite = load_suite(None, {'robot': file, 'cmd_vel_timeout': 0.0})
+    suite = suite_of(robot=file)
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
     shares = [i / phases for i in range(phases)]
     stops = StopSummary(list(run_trials(
@@ -567,17 +427,17 @@ def run_robot(file: str, phases: int) -> dict[str, Any]:
         'trot': trials.steady('trot', (1.0, 0.0, 0.0), file), 'top_speed': _top_speed(file),
         'stops': phases, 'stood': stops.number('standing'),
         'walked_on': stops.number('walked_on'), 'stop_falls': stops.number('fell'),
-        'pushed': min(min(trials.survived_pushes('amble', 0.5, phase, SIDES, file))
+        'pushed': min(min(push_trials.survived_pushes('amble', 0.5, phase, given.SIDES, file))
                       for phase in shares)}
 
 
 def _top_speed(file: str) -> float:
     """Fastest trot that is reached within ``TOP_ERROR``, trying faster ones until one is not."""
     top = nan
-    for speed in TOP_SPEEDS:
+    for speed in given.TOP_SPEEDS:
         velocity = (speed, 0.0, 0.0)
         error = trials.relative_error(trials.steady('trot', velocity, file), velocity)
-        if not error <= TOP_ERROR:
+        if not error <= given.TOP_ERROR:
             break
         top = speed
     return top
@@ -586,7 +446,7 @@ def _top_speed(file: str) -> float:
 def robots(workers: Workers, seeds: int, phases: int) -> Table:
     """All robots that are there, with their files alone."""
     results = _run(workers, run_robot, [
-        {'file': file, 'phases': phases} for file in ROBOTS if _is_there(file)])
+        {'file': file, 'phases': phases} for file in given.ROBOTS if _is_there(file)])
     rows = []
     for case, of in results:
         amble, trot = (steady_cells((v, 0.0, 0.0), of[gait])
@@ -604,7 +464,7 @@ def robots(workers: Workers, seeds: int, phases: int) -> Table:
 
 def _is_there(file: str) -> bool:
     try:
-        MujocoRobot(trials.suite_of(file, 'amble').robot_file)
+        MujocoRobot(suite_of(robot=file).robot_file)
     except MissingFileError:
         return False
     return True

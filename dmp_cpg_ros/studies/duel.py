@@ -28,8 +28,10 @@ from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.studies import loop_recording as runs
 from dmp_cpg_ros.studies import output
 from dmp_cpg_ros.studies import walking_trials as trials
-from dmp_cpg_ros.studies.benchmark_walking import DIRECTIONS, steady_cells
+from dmp_cpg_ros.studies.benchmark_cases import DIRECTIONS
+from dmp_cpg_ros.studies.benchmark_walking import steady_cells
 from dmp_cpg_ros.studies.learned_policy import PolicyFile, PolicyRun, load_policy
+from dmp_cpg_ros.studies.push_trials import largest_pushes
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gait
 
@@ -90,7 +92,7 @@ def pushed(walker: Walker, phase: float) -> tuple[float, ...]:
     run = walker.begin()
     if not (run.settle((PUSHED_SPEED, 0.0, 0.0)) and run.walk(phase * run.period())):
         return (np.nan,) * len(DIRECTIONS)
-    return trials.largest_pushes(run, tuple(DIRECTIONS.values()), LARGEST_PUSH)
+    return largest_pushes(run, tuple(DIRECTIONS.values()), LARGEST_PUSH)
 
 
 def stopped(walker: Walker, speed: float, phase: float) -> runs.StopOutcome:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import ceil
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -21,6 +22,7 @@ from dmp_cpg_ros.core.loop import Array, Tick
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.robot_model.state import JointTargets, RobotState
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.suite import Suite, load_suite
 
 PUSH_DURATION = 0.1
 """Time over which the impulse of a push is spread [s]."""
@@ -29,6 +31,15 @@ RAMP = 1.0
 """Rate at which commands rise [m/s^2]; three times that for turning [rad/s^2]."""
 
 Velocity = tuple[float, float, float]
+
+
+@lru_cache
+def suite_of(file: str | None = None, **values: Any) -> Suite:
+    """A parameter file, the package's own without, with values that are not None in place of its
+    own, and a command that needs no repetition.
+    """
+    return load_suite(file, {'cmd_vel_timeout': 0.0, **{
+        name: value for name, value in values.items() if value is not None}})
 
 
 class Controller(Protocol):

@@ -22,7 +22,8 @@ import numpy as np
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.studies import output
-from dmp_cpg_ros.studies.walking_trials import Velocity, Walk, suite_of
+from dmp_cpg_ros.studies.loop_recording import Velocity, suite_of
+from dmp_cpg_ros.studies.walking_trials import Walk
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_gaits
 
@@ -108,7 +109,7 @@ def trial(seed: int, seconds: float, robot: str | None = None, gaits: Sequence[s
         Gaits to change among.
     """
     first = gaits[seed % len(gaits)]
-    p = suite_of(robot, first).parameters.reference
+    p = suite_of(robot=robot).parameters.reference
     limits = (p.max_speed, p.max_lateral_speed, p.max_turn_rate)
     run, outcome = Walk(first, robot, seed=seed + 1), Outcome(seed)
     loop, asked, open_stop = run.loop, (0.0, 0.0, 0.0), None

@@ -9,13 +9,8 @@ be used.
 The robot walks once for all request phases of a gait and speed; every case goes on from a copy of
 robot and loop at its phase, and so gives the same numbers as a run of its own.
 
-Two simple ways to stop a gait are compared with sparse inhibition:
-
-- *freeze*: all phases stop at once, and every leg holds the joint targets that it has.
-- *finish swing*: a leg that stands stops at once; a leg that swings goes on to its touchdown.
-
-In both the reference is brought to zero as usual, the balance of the body works as usual, and no
-oscillator is coupled or inhibited until the gait is resumed.
+Two simple ways to stop, which freeze the phases, are compared with sparse inhibition
+(:mod:`~dmp_cpg_ros.studies.freezing_loop`).
 """
 
 from __future__ import annotations
@@ -27,33 +22,29 @@ import sys
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from itertools import groupby, product
 from math import cos, isnan, pi, sin
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dmp_cpg_ros.analysis.context import RunContext
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.core.balance.controller import PostureFeedback
 from dmp_cpg_ros.core.canonical.inhibition import AUTO
-from dmp_cpg_ros.core.canonical.phase import phase, phase_generator, state_at
 from dmp_cpg_ros.core.certificates.certify import certify
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.core.gait.network import GaitNetwork
-from dmp_cpg_ros.core.loop import Array, Tick, WalkingLoop
-from dmp_cpg_ros.core.primitives.spring_damper import SpringState
 from dmp_cpg_ros.core.robot_model.mismatch import MismatchParameters
-from dmp_cpg_ros.core.robot_model.state import LEGS, JointTargets, RobotState
+from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.robot_model.world import World
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
 from dmp_cpg_ros.studies import loop_recording as runs
-from dmp_cpg_ros.studies.loop_recording import LoopRun, StopOutcome
+from dmp_cpg_ros.studies.freezing_loop import FreezingLoop
+from dmp_cpg_ros.studies.loop_recording import LoopRun, StopOutcome, suite_of
 from dmp_cpg_ros.studies.output import (
     at_least_one,
     markdown_table,
@@ -62,7 +53,7 @@ from dmp_cpg_ros.studies.output import (
     write_results,
 )
 from dmp_cpg_ros.studies.workers import Workers
-from dmp_cpg_ros.suite import Suite, load_gait, load_suite
+from dmp_cpg_ros.suite import load_gait
 
 METHODS = ('inhibition', 'freeze', 'finish_swing')
 """Ways to stop: sparse inhibition, and the two simple ones."""
@@ -169,7 +160,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _study(options: argparse.Namespace, _: RosArguments) -> int:
     cases = random_cases(options) if options.random else cases_of(options)
-    suite = suite_of(options.file, cases[0].leg, cases[0].braking)
+    suite = suite_of(options.file, inhibited_legs=(cases[0].leg,), braking=cases[0].braking)
     for gait in options.gaits:
         load_gait(gait)
     results = run_cases(cases, options.file, Workers(
@@ -235,17 +226,11 @@ def scenario_bound(outcomes: Sequence[StopOutcome]) -> str:
             f'{" and below ".join(shares)}')
 
 
-@lru_cache
-def suite_of(file: str | None, leg: str, braking: float = 0.0) -> Suite:
-    """Parameter file with one inhibited leg, and a command that needs no repetition."""
-    return load_suite(file, {'inhibited_legs': [leg], 'braking': braking, 'cmd_vel_timeout': 0.0})
-
-
 def run_walk(cases: Sequence[StopCase], file: str | None) -> list[StopOutcome]:
     """Run the cases of one walk with the robot and the parameters of a parameter file, and the
     certified time to rest, which holds for every phase and is infinite without a certificate.
     """
-    suite = suite_of(file, cases[0].leg, cases[0].braking)
+    suite = suite_of(file, inhibited_legs=(cases[0].leg,), braking=cases[0].braking)
     gait = load_gait(cases[0].gait).scaled(cases[0].cadence)
     robot, p = MujocoRobot(suite.robot_file, suite.tick_ns,
                            world=World(friction=cases[0].friction),
@@ -272,65 +257,6 @@ def run_cases(cases: Sequence[StopCase], file: str | None, workers: Workers,
             print(*(json.dumps(vars(outcome)) for outcome in of_walk), sep='\n', file=kept,
                   flush=True)
     return list(zip(cases, outcomes[:len(cases)], strict=True))
-
-
-class FreezingLoop(WalkingLoop):
-    """A walking loop whose legs freeze when :meth:`freeze` is called; made as a WalkingLoop."""
-
-    _frozen: NDArray[np.bool_] | None = None
-
-    def freeze(self, finish_swing: bool) -> None:
-        """Stop the legs from the next tick on.
-
-        Parameters
-        ----------
-        finish_swing : bool
-            Whether a leg that swings finishes its swing before it freezes.
-        """
-        self._finish_swing, self._frozen = finish_swing, np.zeros(len(LEGS), dtype=bool)
-
-    def resume(self) -> None:
-        """Walk on from the phases and joint angles at which the legs are."""
-        self._frozen = None
-
-    def tick(self, state: RobotState) -> Tick:
-        """Run all parts on the robot's state of one tick, as :meth:`WalkingLoop.tick`."""
-        if self._frozen is None:
-            return super().tick(state)
-        dt = self._clock.step(state.time_ns)
-        self.stop = replace(self.stop, time_ns=state.time_ns)
-        stopping = replace(self.inhibition, requested=True)
-        self.r = self.reference.towards(self.r, (0.0, 0.0, 0.0), stopping, dt)
-        self._frozen = self._frozen | ~(self._finish_swing & self._swinging())
-        omega = np.where(self._frozen, 0.0, self.network.omega(self.r))
-        x = state_at(phase(self.x) + omega * dt, np.hypot(self.x[:, 0], self.x[:, 1]))
-        x_dot = omega[:, None] * (x @ phase_generator().T)
-        self.canon = replace(self.canon, x=x, x_dot=x_dot)
-        balance, feedback = self.body.posture.step(
-            self.posture.balance, state, self.canon.gait, x, x_dot, self.r, dt)
-        self.posture = replace(self.posture, balance=balance)
-        targets = self._joint_targets(state, x_dot, feedback, dt)
-        return Tick(state.time_ns, self.r, x, x_dot, self.stop, feedback, targets, self.mode,
-                    self.canon.gait)
-
-    def _swinging(self) -> NDArray[np.bool_]:
-        """Which legs are in the swing of their cycle, (4,)."""
-        gait, scale = self.network.gait, self.network.scale
-        duty = gait.duty(scale.foot_speed(*self.r.tolist()), scale)
-        return np.abs(gait.cycle_position(phase(self.x))) < 0.5 * (1.0 - duty)
-
-    def _leg(self, i: int, state: RobotState, x_dot: Array, feedback: PostureFeedback,
-             dt: float) -> JointTargets:
-        """Targets of one leg: those of its primitive, or those that it froze with."""
-        if self._frozen is None or not self._frozen[i]:
-            return super()._leg(i, state, x_dot, feedback, dt)
-        leg, joints, of_leg = self.legs[i].primitive, self.legs[i].joints, self.leg_states[i].leg
-        position, zero = of_leg.joints.position, np.zeros(3)
-        held = of_leg._replace(joints=SpringState(position, zero))
-        self.leg_states[i] = self.leg_states[i]._replace(leg=held)
-        measured = SpringState(state.joint_position[joints], state.joint_velocity[joints]) \
-            if leg.parameters.reading == 'torque' else None
-        return leg.targets(held, position, zero, feedback.torque[joints], measured)
 
 
 def run_trials(robot: MujocoRobot, cases: Sequence[StopCase], parameters: SuiteParameters,

@@ -1,18 +1,17 @@
 # Copyright 2026 The dmp_cpg_ros authors
 # SPDX-License-Identifier: Apache-2.0
-"""Trials of walking: steady velocities, pushes, rough ground, changes of the gait.
+"""Trials of walking: steady velocities, rough ground, changes of the gait.
 
-All in the plain loop with the MuJoCo robot, which equals the nodes in lock-step. Equal trials give
-equal outcomes.
+All in the plain loop with the MuJoCo robot, which equals the nodes in lock-step, as those of
+pushes (:mod:`~dmp_cpg_ros.studies.push_trials`). Equal trials give equal outcomes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
-from math import ceil, cos, hypot, isnan, log2, nan, pi, sin
+from math import ceil, hypot, isnan, nan, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,13 +22,12 @@ from dmp_cpg_ros.analysis.motion import roll_pitch_yaw, tilt
 from dmp_cpg_ros.core.estimation.estimator import estimated_state
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
 from dmp_cpg_ros.core.loop import Array, WalkingLoop
-from dmp_cpg_ros.core.maths.roots import last_that_holds
 from dmp_cpg_ros.core.robot_model.sensor_readings import readings_of
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.core.robot_model.world import WORLDS, Steps, World
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
-from dmp_cpg_ros.studies.loop_recording import PUSH_DURATION, LoopRun, Velocity, recording_of
-from dmp_cpg_ros.suite import Suite, load_gaits, load_suite
+from dmp_cpg_ros.studies.loop_recording import LoopRun, Velocity, recording_of, suite_of
+from dmp_cpg_ros.suite import load_gaits
 
 Values = tuple[tuple[str, Any], ...]
 
@@ -43,9 +41,6 @@ heading are averaged: over half a metre the sway of single steps would be taken 
 
 RECOVERY = 3.0
 """Time for which the robot must stay on its feet after a push [s]."""
-
-PUSH_RESOLUTION, LARGEST_PUSH = 0.1, 3.2
-"""Of the speed change by a push that is looked for [m/s]."""
 
 FINISH, CROSSING_TIME = 5.0, 30.0
 """Distance to cross on rough ground [m], and the time after which a trial ends [s]."""
@@ -61,13 +56,6 @@ CYCLES_AFTER = 3
 
 WATCHED = 5.0
 """Time for which the robot is watched after a change was asked for [s]."""
-
-
-@lru_cache
-def suite_of(robot: str | None, gait: str, values: Values = ()) -> Suite:
-    """The package's parameters with a robot and gait, and a command that needs no repetition."""
-    overrides = {'gait': gait, 'cmd_vel_timeout': 0.0, 'auto_inhibit': False, **dict(values)}
-    return load_suite(None, overrides if robot is None else overrides | {'robot': robot})
 
 
 class Walk(LoopRun[WalkingLoop]):
@@ -91,7 +79,7 @@ class Walk(LoopRun[WalkingLoop]):
 
     def __init__(self, gait: str, robot: str | None = None, world: World | None = None,
                  seed: int = 0, values: Values = (), start: bool = True) -> None:
-        suite = suite_of(robot, gait, values)
+        suite = suite_of(robot=robot, gait=gait, **{'auto_inhibit': False, **dict(values)})
         body = MujocoRobot(suite.robot_file, suite.tick_ns, seed, 0.03 if seed else 0.0,
                            world=world or suite.world, sensors=suite.sensors,
                            mismatch=suite.mismatch)
@@ -175,178 +163,6 @@ def relative_error(outcome: SteadyOutcome, velocity: Velocity) -> float:
         return abs(outcome.velocity[2] - velocity[2]) / abs(velocity[2])
     along = float(np.dot(outcome.velocity[:2], velocity[:2])) / speed
     return abs(along - speed) / speed
-
-
-def survived_pushes(gait: str, speed: float, phase: float, directions: Sequence[float],
-                    robot: str | None = None) -> tuple[float, ...]:
-    """Look for the largest speed change Δv = J/m that is survived, per direction, by bisection.
-
-    Every impulse below it that the bisection tried was survived too.
-
-    Parameters
-    ----------
-    gait : str
-        Name of the gait.
-    speed : float
-        Commanded forward speed [m/s].
-    phase : float
-        Fraction of a cycle at which the push begins.
-    directions : sequence of float
-        Directions of the pushes in the base frame [rad].
-    robot : str, optional
-        Robot file; the suite's own without.
-
-    Returns
-    -------
-    tuple of float
-        [m/s]; NaN where the robot fell before any push.
-    """
-    run = Walk(gait, robot)
-    if not (run.settle((speed, 0.0, 0.0)) and run.walk(phase * run.period())):
-        return (nan,) * len(directions)
-    return largest_pushes(run, directions)
-
-
-def largest_pushes(run: LoopRun[Any], directions: Sequence[float], most: float = LARGEST_PUSH
-                   ) -> tuple[float, ...]:
-    """As :func:`survived_pushes`, for a run as it is, with up to ``most`` [m/s]."""
-    halvings = ceil(log2(most / PUSH_RESOLUTION) - 1e-9)
-    return tuple(most if survives(run, angle, most) else last_that_holds(
-        partial(survives, run, angle), 0.0, most, halvings) for angle in directions)
-
-
-def survives(run: LoopRun[Any], angle: float, speed_change: float) -> bool:
-    """Whether a copy of a run stays on its feet for ``RECOVERY`` after a push in a direction of
-    the base frame [rad] that would change the free body's speed by so much [m/s].
-    """
-    after = deepcopy(run)
-    yaw = float(attitude([run.state])[0, 2]) + angle
-    impulse = after.robot.description.mass * speed_change
-    after.push(np.array((impulse * cos(yaw), impulse * sin(yaw), 0.0)))
-    return after.walk(RECOVERY)
-
-
-class Manoeuvre(NamedTuple):
-    """What the robot does when it is pushed: from rest without a velocity; ``then`` begins the
-    manoeuvre, and the push comes within ``window`` [s] from there.
-    """
-
-    gait: str
-    velocity: Velocity | None
-    then: Callable[[WalkingLoop], object]
-    window: float
-
-
-def _start(loop: WalkingLoop) -> None:
-    loop.command(0.5)
-    loop.request(False)
-
-
-MANOEUVRES = {
-    'at rest': Manoeuvre('amble', None, lambda loop: None, 0.0),
-    'stopping from an amble at 0.5 m/s': Manoeuvre(
-        'amble', (0.5, 0.0, 0.0), lambda loop: loop.request(True), 1.2),
-    'stopping from a trot at 1.5 m/s': Manoeuvre(
-        'trot', (1.5, 0.0, 0.0), lambda loop: loop.request(True), 1.4),
-    'starting': Manoeuvre('amble', None, _start, 0.8),
-    'changing from amble to trot at 0.5 m/s': Manoeuvre(
-        'amble', (0.5, 0.0, 0.0), lambda loop: loop.change_gait('trot'), 2.0),
-    'turning, amble 0.5 m/s and 0.8 rad/s': Manoeuvre(
-        'amble', (0.5, 0.0, 0.8), lambda loop: None, 0.6),
-}
-"""What pushes meet."""
-
-PUSH_DURATIONS = (0.05, 0.4)
-"""Least and longest time of a push that is drawn [s]."""
-
-
-@dataclass(frozen=True)
-class PushedOutcome:
-    """Whether it fell, rests at the end, how often it was released, and the largest reference
-    speed after the push.
-    """
-
-    fell: bool
-    rests: bool = False
-    releases: int = 0
-    reference: float = nan
-
-
-@lru_cache(maxsize=2)
-def _before(manoeuvre: str, recovery: bool, robot: str | None) -> Walk:
-    gait, velocity, *_ = MANOEUVRES[manoeuvre]
-    run = Walk(gait, robot, values=(('push_recovery', recovery),), start=velocity is not None)
-    if velocity is not None:
-        run.settle(velocity)
-    return run
-
-
-def pushed(manoeuvre: str, speed_change: float, case: int, cases: int, drawn: bool = True,
-           recovery: bool = True, robot: str | None = None) -> PushedOutcome:
-    """Push the robot in one of ``MANOEUVRES``, begun at phase case/cases.
-
-    Direction, duration and time within the manoeuvre are drawn from the case as seed, or the push
-    lasts ``PUSH_DURATION`` and the cases are directions, evenly around.
-    """
-    run, draw = deepcopy(_before(manoeuvre, recovery, robot)), np.random.default_rng(1000 + case)
-    _, velocity, then, window = MANOEUVRES[manoeuvre]
-    angle, duration = 2.0 * pi * case / cases, PUSH_DURATION
-    if drawn:
-        angle, duration = draw.uniform(0.0, 2.0 * pi), round(draw.uniform(*PUSH_DURATIONS), 3)
-    if velocity is not None:
-        run.walk(case / cases * run.period())
-    then(run.loop)
-    run.walk(draw.uniform(0.0, window))
-    angle += float(attitude([run.state])[0, 2])
-    force = run.robot.description.mass * speed_change / duration
-    run.robot.apply_push(force * np.array((cos(angle), sin(angle), 0.0)), round(duration * 1e9))
-    releases, reference = 0, 0.0
-    for _ in range(ceil((RECOVERY + duration) / run.tick_s)):
-        was = run.loop.stop.push.acts
-        if not run.walk(run.tick_s):
-            return PushedOutcome(True, False, releases, reference)
-        releases += run.loop.stop.push.acts and not was
-        reference = max(reference, float(np.abs(run.loop.r).max()))
-    return PushedOutcome(False, run.loop.stop.state == 'at_rest', releases, reference)
-
-
-@lru_cache(maxsize=1)
-def _steady(gait: str, speed: float, robot: str | None, ground: str, quick: bool) -> Walk:
-    world = WORLDS[ground](**({'height': 0.03, 'seed': 1} if ground == 'blocks' else {}))
-    run = Walk(gait, robot, world, values=(('step_timing', quick),))
-    run.settle((speed, 0.0, 0.0))
-    return run
-
-
-def caught(gait: str, speed: float, speed_change: float, case: int, quick: bool = True,
-           robot: str | None = None, ground: str = 'flat') -> bool:
-    """Whether a walk stays on its feet for ``RECOVERY`` after a push whose time in the cycle,
-    direction and duration are drawn from the case as seed; with steps that are quicker or not.
-    """
-    draw = np.random.default_rng(2000 + case)
-    run, angle = deepcopy(_steady(gait, speed, robot, ground, quick)), draw.uniform(0.0, 2.0 * pi)
-    duration = round(draw.uniform(*PUSH_DURATIONS), 3)
-    run.walk(draw.uniform(0.0, run.period()))
-    angle += float(attitude([run.state])[0, 2])
-    force = run.robot.description.mass * speed_change / duration
-    run.robot.apply_push(force * np.array((cos(angle), sin(angle), 0.0)), round(duration * 1e9))
-    return run.walk(RECOVERY + duration)
-
-
-def unpushed(gait: str, speed: float, seed: int, kind: str, numbers: Mapping[str, float],
-             payload: float = 0.0) -> PushedOutcome:
-    """Stop from a speed [m/s] at a drawn time without a push, with a payload as share of the
-    robot's mass.
-    """
-    run = Walk(gait, None, WORLDS[kind](**numbers), seed, (('payload', payload),))
-    draw = np.random.default_rng(seed)
-    upright = run.settle((speed, 0.0, 0.0)) and run.walk(draw.uniform(0.0, 1.0))
-    run.loop.request(True)
-    releases = 0
-    for _ in range(ceil(RECOVERY / run.tick_s)):
-        upright = upright and run.walk(run.tick_s)
-        releases = max(releases, run.loop.stop.push.releases)
-    return PushedOutcome(not upright, run.loop.stop.state == 'at_rest', releases)
 
 
 @dataclass(frozen=True)
@@ -452,11 +268,6 @@ def obstacle(gait: str, height: float, seed: int, speed: float = 0.5, robot: str
                            float(place - run.state.base_position_in_world[0]))
 
 
-def attitude(states: Sequence[RobotState]) -> Array:
-    """Roll, pitch and yaw (n, 3) [rad]."""
-    return roll_pitch_yaw(np.array([state.base_quaternion for state in states]))
-
-
 @dataclass(frozen=True)
 class ChangeOutcome:
     """One change.
@@ -497,15 +308,20 @@ def run_changes(before: str, speed: float, phases: int, robot: str | None = None
     """Walk at a speed [m/s] once, and change to every other gait at some phases, evenly over a
     cycle, in copies of the walk.
     """
-    run, outcomes = Walk(before, robot), []
+    run = Walk(before, robot)
+    return [_changed(deepcopy(run), fell) if upright else fell
+            for phase, upright in _phases(run, speed, phases)
+            for fell in (ChangeOutcome(after, phase, True)
+                         for after in load_gaits() if after != before)]
+
+
+def _phases(run: Walk, speed: float, phases: int) -> Iterator[tuple[float, bool]]:
+    """Walk at a speed [m/s] to some phases, evenly over a cycle; tell at each whether it fell."""
     upright = run.settle((speed, 0.0, 0.0))
     step = run.period() / phases
     for k in range(phases):
-        for after in (name for name in load_gaits() if name != before):
-            fell = ChangeOutcome(after, k / phases, True)
-            outcomes.append(_changed(deepcopy(run), fell) if upright else fell)
+        yield k / phases, upright
         upright = run.walk(step)
-    return outcomes
 
 
 def _changed(run: Walk, fell: ChangeOutcome) -> ChangeOutcome:
@@ -544,13 +360,9 @@ def run_restarts(gait: str, speed: float, phases: int) -> list[RestartOutcome]:
     """Walk at a speed [m/s], and let posture control and estimator forget all at some phases,
     evenly over a cycle, as a node that is started again has.
     """
-    run, outcomes = Walk(gait, seed=1), []
-    upright = run.settle((speed, 0.0, 0.0))
-    step = run.period() / phases
-    for _ in range(phases):
-        outcomes.append(_restarted(deepcopy(run)) if upright else RestartOutcome(True, nan))
-        upright = run.walk(step)
-    return outcomes
+    run = Walk(gait, seed=1)
+    return [_restarted(deepcopy(run)) if upright else RestartOutcome(True, nan)
+            for _, upright in _phases(run, speed, phases)]
 
 
 def _restarted(run: Walk) -> RestartOutcome:
@@ -564,3 +376,8 @@ def _restarted(run: Walk) -> RestartOutcome:
     upright = run.walk(WATCHED)
     return RestartOutcome(not upright, float(np.rad2deg(tilt(
         np.array([state.base_quaternion for state in run.states])).max())))
+
+
+def attitude(states: Sequence[RobotState]) -> Array:
+    """Roll, pitch and yaw (n, 3) [rad]."""
+    return roll_pitch_yaw(np.array([state.base_quaternion for state in states]))

@@ -11,7 +11,7 @@ from core_examples import GAITS, GRAVITY, TICK, suite_parameters
 from dmp_cpg_ros.core.canonical.inhibition import InhibitionParameters
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import LEGS, RobotState
-from dmp_cpg_ros.studies.study_stops import FreezingLoop
+from dmp_cpg_ros.studies.freezing_loop import FreezingLoop
 
 pytest.importorskip('mujoco')
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot

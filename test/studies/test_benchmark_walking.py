@@ -21,7 +21,8 @@ pytest.importorskip('mujoco')
 from dmp_cpg_ros.studies import walking_trials
 from dmp_cpg_ros.studies.benchmark_walking import main, steady_cells
 from dmp_cpg_ros.studies.loop_recording import recording_of
-from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, Walk, cross, relative_error, survives
+from dmp_cpg_ros.studies.push_trials import survives
+from dmp_cpg_ros.studies.walking_trials import SteadyOutcome, Walk, cross, relative_error
 
 
 def test_the_error_is_along_the_command() -> None:

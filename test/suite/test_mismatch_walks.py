@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip('mujoco')
 
-from dmp_cpg_ros.studies.benchmark_walking import MISMATCHED
+from dmp_cpg_ros.studies.benchmark_cases import MISMATCHED
 from dmp_cpg_ros.studies.walking_trials import relative_error, steady
 
 PAYLOAD, FRICTION, OFFSET = (next(name for name in MISMATCHED if word in name)

@@ -13,7 +13,8 @@ from math import cos, pi, sin
 import numpy as np
 import pytest
 
-from dmp_cpg_ros.studies.walking_trials import Walk, survives
+from dmp_cpg_ros.studies.push_trials import survives
+from dmp_cpg_ros.studies.walking_trials import Walk
 
 SPEED_CHANGE = 1.2
 
