@@ -75,29 +75,6 @@ def moments(recording: Recording, context: RunContext) -> list[Moment]:
     return found
 
 
-def write_pictures(recording: Recording, context: RunContext, folder: Path, draw: Draw,
-                   ) -> dict[str, tuple[Path, str]]:
-    """Draw the moments of a run and write ``NAME.png``.
-
-    Parameters
-    ----------
-    recording : Recording
-        Needs joints and odometry.
-    context : RunContext
-        What is known besides.
-    folder : Path
-        Made when missing.
-    draw : callable
-        Draws poses; an empty answer means that nothing can be drawn here.
-
-    Returns
-    -------
-    dict of str to (Path, str)
-        File and caption by name; empty without pictures.
-    """
-    return _draw_pictures(_scenes(recording, context), folder, draw)
-
-
 Pose = tuple[Array, Array, Array]
 
 
@@ -111,6 +88,7 @@ def _scenes(recording: Recording, context: RunContext) -> list[tuple[Moment, Pos
 
 def _draw_pictures(scenes: Sequence[tuple[Moment, Pose]], folder: Path, draw: Draw,
                    ) -> dict[str, tuple[Path, str]]:
+    """Write the moments as ``NAME.png``; files and captions by name, none where none is drawn."""
     from matplotlib import image
 
     if not scenes:

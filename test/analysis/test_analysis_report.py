@@ -26,7 +26,7 @@ from dmp_cpg_ros.analysis.metrics.summary import compute_metrics
 from dmp_cpg_ros.analysis.motion import roll_pitch_yaw
 from dmp_cpg_ros.analysis.recording import Recording, StatusEvent, VelocitySeries
 from dmp_cpg_ros.analysis.report import CATALOGUE, FOLDED, SCRIPT, label, write_figures
-from dmp_cpg_ros.analysis.run import RunResults, moments, write_pictures, write_results
+from dmp_cpg_ros.analysis.run import RunResults, moments, write_results
 from dmp_cpg_ros.analysis.story import MOST_POINTS, story
 from dmp_cpg_ros.analysis.tables import flattened
 from dmp_cpg_ros.commands.analyze import analyze_run, main
@@ -111,12 +111,6 @@ def test_moments_lie_where_their_captions_say(walked: Recording, context: RunCon
     assert WALK.stop_s + WALK.time_to_rest_s <= found['at_rest'] <= WALK.release_s
     row = np.searchsorted(walked.feet.time, found['turning'])
     assert walked.feet.force[row].min() == 0.0
-
-
-def test_a_run_goes_on_without_pictures(
-    walked: Recording, context: RunContext, tmp_path: Path
-) -> None:
-    assert write_pictures(walked, context, tmp_path, no_pictures) == {}
 
 
 class References(HTMLParser):
@@ -249,7 +243,7 @@ def test_texts_of_a_recording_are_no_markup(context: RunContext, tmp_path: Path)
                 'parameters': {hostile: hostile}}
     certificate = [{'name': hostile, hostile: hostile, 'holds': True}]
     written = write_results(tmp_path, changed, context, manifest, certificate, no_pictures)
-    assert written.report is not None
+    assert written.report is not None and written.pictures == {}
     page = written.report.read_text(encoding='utf-8')
     assert page.count('<script') == 1 and f'<script>{SCRIPT}</script>' in page
     assert '&lt;script&gt;' in page
