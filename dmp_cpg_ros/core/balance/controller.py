@@ -237,7 +237,9 @@ class PostureController:
             self._torque(body, legs, feet, load, planned, bounce, acceleration),
             np.array([part for (x, y), up in zip(shift, raised, strict=True)
                       for part in (x, y, up)]).reshape(-1, 3),
-            np.array(self.placement.drift(p, measured, planned, swings, sway.velocity)),
+            np.array(self.placement.drift(
+                self.placement.yielding(p, reference[0], gait.apart), measured, planned, swings,
+                sway.velocity)),
             np.array(correction), command, state.joint_position, believed(state.foot_force),
             self._margins(R_ground_base, feet, swings, (lean_x, lean_y), (
                 measured[0] - (planned[0] - lasting[0]),

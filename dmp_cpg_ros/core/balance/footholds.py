@@ -39,6 +39,9 @@ INSIDE = 0.3
 their distance.
 """
 
+BACKWARDS, QUICK = 0.75, 0.6
+"""See :meth:`FootPlacement.yielding`."""
+
 SLIGHT = 0.03
 """Slope of which half is followed, more of steeper ones and little of the few tenths of a degree
 that soft ground and compliant feet feign.
@@ -193,7 +196,28 @@ class FootPlacement:
             raised.append(clamped(gain * lost, -limit, limit))
         return raised
 
-    def drift(self, p: PostureParameters, measured: Triple, planned: Triple,
+    def yielding(self, p: PostureParameters, v_x: float, apart: float) -> float:
+        """Share of an error of the velocity with which standing feet go along.
+
+        Feet that hold a body which goes backwards roll it to one side, where it stays: they go
+        along further, by ``BACKWARDS`` of what is left from a dimensionless speed of ``QUICK`` on.
+        Not where all legs swing together: they pitch it the more the less they hold it.
+
+        Parameters
+        ----------
+        p : PostureParameters
+            Gains.
+        v_x : float
+            Reference [m/s].
+        apart : float
+            Of the gait: 0 where all legs swing together, else 1.
+        """
+        if v_x >= 0.0:
+            return p.yielding
+        quick = min(1.0, -v_x / (QUICK * (GRAVITY * self._leg_length) ** 0.5))
+        return p.yielding + apart * BACKWARDS * quick * (1.0 - p.yielding)
+
+    def drift(self, yielding: float, measured: Triple, planned: Triple,
               activity: Sequence[float], sway_velocity: float = 0.0) -> list[Pair]:
         """Velocity that standing feet add to their paths so as to go along with the ground.
 
@@ -203,8 +227,8 @@ class FootPlacement:
 
         Parameters
         ----------
-        p : PostureParameters
-            Gains.
+        yielding : float
+            As from :meth:`yielding`.
         measured, planned : tuple of float
             As for :meth:`shift`.
         activity : sequence of four floats
@@ -218,8 +242,8 @@ class FootPlacement:
         list of four pairs of float
             [m/s]
         """
-        x = -p.yielding * (measured[0] - planned[0])
-        y = -p.yielding * (measured[1] - planned[1]) - sway_velocity
+        x = -yielding * (measured[0] - planned[0])
+        y = -yielding * (measured[1] - planned[1]) - sway_velocity
         return [(swings * x, swings * y) for swings in activity]
 
 

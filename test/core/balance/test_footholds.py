@@ -79,3 +79,14 @@ def test_raised_feet_of_a_tilted_body_are_level(roll: float, pitch: float) -> No
     feet = (FEET + raised[:, None] * np.array([0.0, 0.0, 1.0])) @ np.array(R_level_base).T
     inside = np.abs(raised) < 0.09
     assert np.allclose(feet[inside, 2], FEET[inside, 2], atol=1e-9)
+
+
+@given(yielding=st.floats(0.0, 1.0), v=st.floats(0.0, 4.0), more=st.floats(0.0, 1.0))
+def test_standing_feet_go_along_further_the_faster_the_body_goes_backwards(
+        yielding: float, v: float, more: float) -> None:
+    p = PostureParameters(yielding=yielding)
+    assert PLACEMENT.yielding(p, v, 1.0) == PLACEMENT.yielding(p, -v, 0.0) == yielding
+    slow, fast = (PLACEMENT.yielding(p, -speed, 1.0) for speed in (v, v + more))
+    assert yielding <= slow <= fast <= 1.0
+    drift = np.array(PLACEMENT.drift(1.0, (0.3, -0.2, 0.1), AT_REST, (1.0, 0.5, 0.0, 1.0)))
+    assert np.allclose(drift, np.outer((1.0, 0.5, 0.0, 1.0), (-0.3, 0.2)))

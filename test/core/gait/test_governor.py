@@ -19,7 +19,7 @@ from dmp_cpg_ros.core.reference.governor import LEAST, Governor
 from dmp_cpg_ros.core.transformation.leg import body_scale
 from dmp_cpg_ros.robot.model_reader import load_description
 from dmp_cpg_ros.studies.random_commands import GAITS, course, trial
-from dmp_cpg_ros.studies.walking_trials import steady
+from dmp_cpg_ros.studies.walking_trials import Walk, attitude, steady
 from dmp_cpg_ros.suite import load_gaits, load_suite
 
 SCALE = body_scale(load_description(load_suite().robot_file))
@@ -135,3 +135,10 @@ def test_a_robot_stays_up_under_random_commands_under_which_it_fell() -> None:
 
 def test_a_pace_backwards_through_a_curve_stays_up() -> None:
     assert not steady('pace', (-1.0, 0.0, 1.1)).fell
+
+
+def test_a_fast_trot_backwards_does_not_roll_to_one_side() -> None:
+    """By 3 degrees in the mean, where feet went along no further than forwards."""
+    run = Walk('trot', seed=3, values=(('caution', False),))
+    assert run.reach((-2.5, 0.0, 0.0)) and run.walk(4.0)
+    assert abs(np.mean(attitude(run.states[-500:])[:, 0])) < 0.026
