@@ -153,10 +153,13 @@ def certificates() -> list[Row]:
     loop, new = run.loop, count(1)
     running, voting = running_parameters(suite), suite.parameters.voting
 
-    def change(accepted: bool = True, **values: Callable[[int], object]) -> Callable[[], object]:
+    other = _walking()[1].loop  # of which the gait is on its way to another
+
+    def change(of: WalkingLoop = loop, accepted: bool = True, **values: Callable[[int], object]
+               ) -> Callable[[], object]:
         def ask() -> None:
             number = next(new)
-            refused = loop.change({name: value(number) for name, value in values.items()})
+            refused = of.change({name: value(number) for name, value in values.items()})
             if accepted == bool(refused):
                 raise RuntimeError(refused or 'accepted')
 
@@ -168,15 +171,15 @@ def certificates() -> list[Row]:
             **running, voting=voting)),
         ('another inhibition gain', change(inhibition_gain=lambda n: 400.0 - 1e-3 * n)),
         ('another coupling gain', change(coupling_gain=lambda n: 100.0 + 1e-3 * n)),
-        ('another gait', change(gait=lambda n: ('trot', 'amble')[n % 2],
+        ('another gait', change(other, gait=lambda n: ('trot', 'amble')[n % 2],
                                 coupling_gain=lambda n: 100.0 + 1e-3 * n)),
         ('a refused inhibition gain, with one that works', change(
-            False, inhibition_gain=lambda n: 10.0 + 1e-3 * n)),
+            accepted=False, inhibition_gain=lambda n: 10.0 + 1e-3 * n)),
         ('a refused coupling gain, with one that works', change(
-            False, coupling_gain=lambda n: 1.0 + 1e-4 * n)),
+            accepted=False, coupling_gain=lambda n: 1.0 + 1e-4 * n)),
         ('refused values of three, with some that work', change(
-            False, cadence_scale=lambda n: 4.0 - 1e-4 * n, coupling_gain=lambda n: 50.0,
-            rho=lambda n: 3.0)),
+            accepted=False, cadence_scale=lambda n: 4.0 - 1e-4 * n,
+            coupling_gain=lambda n: 50.0, rho=lambda n: 3.0)),
         ('another cadence', change(cadence_scale=lambda n: 1.0 + 1e-5 * n)),
     ])
     return rows[1:]
