@@ -13,7 +13,7 @@ import sys
 import time
 import timeit
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import count
 from typing import NamedTuple
@@ -148,12 +148,15 @@ def parts_of_a_tick() -> list[Row]:
 
 
 def certificates() -> list[Row]:
-    """The certificate of the defaults, and the judging of changes that were not asked before."""
+    """Processor time of the certificate of the defaults, and of judging changes that were not
+    asked for before.
+    """
     suite, run = _walking()
     loop, new = run.loop, count(1)
     running, voting = running_parameters(suite), suite.parameters.voting
 
     other = _walking()[1].loop  # of which the gait is on its way to another
+    more = _walking({'voting': True, 'auto_gait': True, 'inhibited_legs': ['auto']})[1].loop
 
     def change(of: WalkingLoop = loop, accepted: bool = True, **values: Callable[[int], object]
                ) -> Callable[[], object]:
@@ -181,7 +184,11 @@ def certificates() -> list[Row]:
             accepted=False, cadence_scale=lambda n: 4.0 - 1e-4 * n,
             coupling_gain=lambda n: 50.0, rho=lambda n: 3.0)),
         ('another cadence', change(cadence_scale=lambda n: 1.0 + 1e-5 * n)),
-    ])
+        ('the same with votes, three gaits and any leg', change(
+            more, cadence_scale=lambda n: 1.0 + 1e-5 * n)),
+        ('a refused one, with one that works', change(
+            more, accepted=False, cadence_scale=lambda n: 4.0 - 1e-4 * n)),
+    ], time.process_time)  # another process may compute them beside the ticks
     return rows[1:]
 
 
@@ -191,9 +198,9 @@ def ticks_per_second() -> float:
     return 1.0 / seconds_of(lambda: run.tick(run.tick_s), least=0.2)
 
 
-def _walking() -> tuple[Suite, LoopRun[WalkingLoop]]:
+def _walking(overrides: Mapping[str, object] | None = None) -> tuple[Suite, LoopRun[WalkingLoop]]:
     """The plain loop, 2 s after it was told to walk, and its parameters."""
-    suite = load_suite(overrides={'cmd_vel_timeout': 0.0})
+    suite = load_suite(overrides={'cmd_vel_timeout': 0.0, **(overrides or {})})
     robot = MujocoRobot(suite.robot_file, suite.tick_ns)
     loop = WalkingLoop(robot.description, suite.gait, suite.parameters, load_gaits())
     loop.command(0.5)
@@ -251,16 +258,18 @@ def messages() -> list[Row]:
     return rows
 
 
-def seconds_of(what: Callable[[], object], repetitions: int = 7, least: float = 0.01) -> float:
+def seconds_of(what: Callable[[], object], repetitions: int = 7, least: float = 0.01,
+               clock: Callable[[], float] = time.perf_counter) -> float:
     """Time of one call: the best of several repetitions of at least some seconds each."""
-    timer, calls = timeit.Timer(what), 1
+    timer, calls = timeit.Timer(what, timer=clock), 1
     while (elapsed := timer.timeit(calls)) < least:
         calls = max(calls + 1, int(1.5 * calls * least / max(elapsed, 1e-9)))
     return min(timer.repeat(repetitions, calls)) / calls
 
 
-def _with_ratios(cases: Sequence[tuple[str, Callable[[], object]]]) -> list[Row]:
-    seconds = [seconds_of(what) for _, what in cases]
+def _with_ratios(cases: Sequence[tuple[str, Callable[[], object]]],
+                 clock: Callable[[], float] = time.perf_counter) -> list[Row]:
+    seconds = [seconds_of(what, clock=clock) for _, what in cases]
     return [Row(name, own, own / seconds[0])
             for (name, _), own in zip(cases, seconds, strict=True)]
 
