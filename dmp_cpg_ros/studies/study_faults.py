@@ -69,6 +69,8 @@ class Kill:
         On the robot's clock [s].
     back_s, in_phase_s : float
         When its messages were followed again, and when the walk was in phase again [s].
+    follows_s : float
+        When the robot, which had looked after itself, followed its legs again [s].
     period_s : float
         Of the gait before [s].
     unrecorded_s : float
@@ -80,6 +82,7 @@ class Kill:
     node: str
     time_s: float = nan
     back_s: float = inf
+    follows_s: float = -inf
     in_phase_s: float = inf
     period_s: float = nan
     unrecorded_s: float = nan
@@ -143,9 +146,11 @@ def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence
             break
         kill.time_s = walk.said(f'{node} was ended', begin)
         ready = walk.said(READY, begin)
+        walks = ready < inf and (lock_step or node == RECORDER or walk.walks())
         told = [re.search(rf'^ *([\d.]+) s .*{FOLLOWS}', line) for line in walk.lines[begin:]]
-        kill.back_s = min([ready, *(float(found[1]) for found in told if found)])
-        if ready == inf or not (lock_step or node == RECORDER or walk.walks()):
+        follows = [float(found[1]) for found in told if found]
+        kill.back_s, kill.follows_s = min([ready, *follows]), max(follows, default=-inf)
+        if not walks:
             break
     if respawn:
         time.sleep(rng.uniform(4.0, 6.0))
@@ -196,7 +201,8 @@ def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
         if before.sum() > 1:
             way = np.ptp(turned[before]) / np.ptp(canonical.time[before])
             kill.period_s = 2.0 * np.pi / way if way > 0.0 else nan
-        again = canonical.time[well & (canonical.time >= kill.back_s)]
+        # While the robot comes to a stand by itself its pace is not that of its legs.
+        again = canonical.time[well & (canonical.time >= max(kill.back_s, kill.follows_s))]
         # one that the next kill forestalled says nothing
         kill.in_phase_s = float(again[0]) if len(again) and again[0] <= following_s else inf
 
