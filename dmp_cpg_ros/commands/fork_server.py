@@ -6,9 +6,6 @@ To import rclpy, its messages, NumPy and MuJoCo takes most of a node's start. Te
 forked pay it once; nothing of ROS runs yet where they are forked. Only the tracer that ROS 2 is
 linked with, LTTng, has threads from the first import on, and is told of every fork.
 
-A spare process is forked ahead and joins the ROS domain before it is known which node it will be:
-where one dies, another that has long been known to all takes its place.
-
 Run as a program, ``PARENT SOCKET PADDING``, it is that process. What it forks becomes a child of
 its parent (``PR_SET_CHILD_SUBREAPER`` of prctl(2)), which waits for it as for any other, and ends
 with that parent, in whatever way it ends. Linux only.
@@ -29,7 +26,6 @@ import socket
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -53,12 +49,6 @@ ANSWERS_WITHIN_S = 120.0
 
 TITLE_BYTES = 4000
 """Room for the command line that ``ps`` shows [bytes]."""
-
-SPARE = 'spare'
-"""What a process that waits is called."""
-
-SECURITY = 'ROS_SECURITY_ENABLE'
-"""Environment variable that is ``true`` where a participant may only be what its enclave says."""
 
 
 class Forked:
@@ -105,38 +95,6 @@ class Forked:
         self.send_signal(signal.SIGKILL)
 
 
-@dataclass(frozen=True)
-class _Spare:
-    """A process that waits in the ROS domain for its command.
-
-    Attributes
-    ----------
-    process : Forked
-        It.
-    told : socket
-        Where its command is sent; it ends when that is closed before.
-    arguments : tuple of str
-        That its command must have, for the domain was joined with them.
-    """
-
-    process: Forked
-    told: socket.socket
-    arguments: tuple[str, ...]
-
-    def fits(self, command: Sequence[str]) -> bool:
-        """Whether it can run a command, and still runs."""
-        own = len(self.arguments)
-        begins = range(len(command) - own + 1)
-        return self.process.poll() is None and any(
-            tuple(command[i:i + own]) == self.arguments for i in begins)
-
-    def end(self) -> None:
-        """End it; it has nothing to finish."""
-        self.told.close()
-        self.process.kill()
-        self.process.wait()
-
-
 class ForkServer:
     """Forks processes that run executables of this package; a context manager.
 
@@ -146,7 +104,6 @@ class ForkServer:
     def __init__(self, folder: str | None = None) -> None:
         """Start the server, in a working folder."""
         _prctl(PR_SET_CHILD_SUBREAPER, 1)
-        self._spare: _Spare | None = None
         self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.settimeout(ANSWERS_WITHIN_S)
         with theirs:
@@ -175,49 +132,10 @@ class ForkServer:
         OSError
             If it cannot, because the server has ended perhaps or does not answer.
         """
-        request = self._request(command, environment)
-        spare, self._spare = self._spare, None
-        if spare is not None:
-            with contextlib.suppress(OSError):  # it has just ended
-                if spare.fits(command):
-                    socket.send_fds(spare.told, [request], [output, errors])
-                    spare.told.close()
-                    return spare.process
-            spare.end()
-        return self._forked(request, output, errors)
-
-    def prepare(self, arguments: Sequence[str]) -> None:
-        """Let a spare process join the ROS domain and wait; the next :meth:`start` whose command
-        has these arguments gives it that command.
-
-        Where participants may only be what an enclave says, there is none.
-
-        Parameters
-        ----------
-        arguments : sequence of str
-            ``--ros-args``, as far as they are common to all commands.
-
-        Raises
-        ------
-        OSError
-            As :meth:`start`.
-        """
-        if self._spare is not None or os.environ.get(SECURITY, '').lower() == 'true':
-            return
-        told, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        with theirs, open(os.devnull, 'ab') as nowhere:
-            process = self._forked(self._request([SPARE, *arguments], None),
-                                   nowhere.fileno(), nowhere.fileno(), theirs.fileno())
-        self._spare = _Spare(process, told, tuple(arguments))
-
-    @staticmethod
-    def _request(command: Sequence[str], environment: Mapping[str, str] | None) -> bytes:
         wanted = os.environ if environment is None else environment
-        return json.dumps([list(command), {**OWN, **wanted}]).encode()
-
-    def _forked(self, request: bytes, *files: int) -> Forked:
+        request = json.dumps([list(command), {**OWN, **wanted}]).encode()
         try:
-            socket.send_fds(self._socket, [request], files)
+            socket.send_fds(self._socket, [request], [output, errors])
             answer = self._socket.recv(64)
         except TimeoutError:
             raise TimeoutError(f'the fork server does not answer within {ANSWERS_WITHIN_S:g} s'
@@ -227,10 +145,7 @@ class ForkServer:
         raise ChildProcessError('the fork server has ended')
 
     def close(self) -> None:
-        """End the server and the spare process, which have nothing to finish."""
-        if self._spare is not None:
-            self._spare.end()
-            self._spare = None
+        """End the server, which has nothing to finish."""
         self._socket.close()
         self._server.kill()
         self._server.wait()
@@ -252,20 +167,14 @@ def _prctl(option: int, value: int | bytes) -> None:
     ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
-def _serve(parent: int, requests: socket.socket) -> int | None:
-    """Fork for every request until there are no more; returns in what was forked, ready to run.
-
-    Returns
-    -------
-    int or None
-        Descriptor of the socket from which a spare process gets its command.
-    """
+def _serve(parent: int, requests: socket.socket) -> None:
+    """Fork for every request until there are no more; returns in what was forked, ready to run."""
     _show([sys.executable, *sys.argv[:2]])  # without the padding
     _prepare()
     gc.collect()
     gc.freeze()  # the collector of a child would otherwise write to, and so copy, all of it
     while True:
-        message, files, _, _ = socket.recv_fds(requests, MOST_BYTES, 3)
+        message, files, _, _ = socket.recv_fds(requests, MOST_BYTES, 2)
         if not message:
             os._exit(0)
         command, environment = json.loads(message)
@@ -278,11 +187,11 @@ def _serve(parent: int, requests: socket.socket) -> int | None:
             if os.fork():
                 os._exit(0)
             os.read(adopted, 1)  # which ends when the server, the last that could write, says so
-            _become(parent, files[:2], command, environment)
+            _become(parent, files, command, environment)
             os.write(say, str(os.getpid()).encode())
             for descriptor in (adopted, said, say, requests.detach()):
                 os.close(descriptor)
-            return next(iter(files[2:]), None)
+            return
         os.waitpid(middle, 0)  # whose child is the parent's from now on
         for descriptor in (go, adopted, say, *files):
             os.close(descriptor)
@@ -351,32 +260,16 @@ def _tell_tracer() -> None:
                 break
 
 
-def _stand_by(parent: int, told: socket.socket) -> None:
-    """Join the ROS domain, and be what is asked for when it is; end when nothing will be."""
-    import_module('dmp_cpg_ros.nodes.framework.execution').join_early(sys.argv[1:])
-    with told:
-        message, files, _, _ = socket.recv_fds(told, MOST_BYTES, 2)
-    if not message:
-        os._exit(0)
-    _dress(parent, files, *json.loads(message))
-
-
 def _become(parent: int, files: Sequence[int], command: Sequence[str],
             environment: Mapping[str, str]) -> None:
-    """Be the process that was asked for, in a session of its own; it ends with its parent."""
+    """Be the process that was asked for: its session, files, environment, arguments, name."""
     os.setsid()
-    end_with_parent(signal.SIGTERM)
-    if os.getppid() != parent:
-        os.kill(os.getpid(), signal.SIGTERM)
-    _dress(parent, files, command, environment)
-
-
-def _dress(parent: int, files: Sequence[int], command: Sequence[str],
-           environment: Mapping[str, str]) -> None:
-    """Take files, environment, arguments and name."""
     for number, descriptor in enumerate(files, 1):
         os.dup2(descriptor, number)
         os.close(descriptor)
+    end_with_parent(signal.SIGTERM)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGTERM)
     os.environ.clear()
     os.environ.update(environment)
     _show([sys.executable, __file__, str(parent), *command])
@@ -396,7 +289,5 @@ def _show(words: Sequence[str]) -> None:
 
 if __name__ == '__main__':
     sys.path[0] = str(Path(__file__).parents[2])  # and not what lies in the working folder
-    _of = int(sys.argv[1])
-    if (_told := _serve(_of, socket.socket(fileno=int(sys.argv[2])))) is not None:
-        _stand_by(_of, socket.socket(fileno=_told))
+    _serve(int(sys.argv[1]), socket.socket(fileno=int(sys.argv[2])))
     sys.exit(import_module('dmp_cpg_ros.__main__').run(sys.argv[0]))

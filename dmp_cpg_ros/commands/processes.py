@@ -9,7 +9,6 @@ import signal
 import subprocess
 import time
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
@@ -49,13 +48,6 @@ class ProcessGroup:
     def restart(self, name: str) -> None:
         """Start a process that has ended once more."""
         self.start(name, self._commands[name])
-
-    def prepare(self, arguments: Sequence[str]) -> None:
-        """Let a spare process wait for the next restart, as :meth:`.ForkServer.prepare`; without
-        one it takes longer.
-        """
-        with suppress(OSError):
-            self._server.prepare(arguments)
 
     def kill(self, name: str) -> None:
         """End a process that does not answer."""

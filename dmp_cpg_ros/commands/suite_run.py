@@ -46,7 +46,7 @@ from dmp_cpg_ros.suite_table import (
 READY_WITHIN_S = 120.0
 """How long nodes may take to come up and find each other [s]."""
 
-SLICE_S = 0.05
+SLICE_S = 0.1
 """How often processes and Ctrl-C are looked at [s]."""
 
 LAST_WORDS_S = 10.0
@@ -222,8 +222,7 @@ def run_suite(scenario: Scenario, tick_ns: int, arguments: Sequence[str], logs: 
             player = ScenarioPlayer(scenario, tick_ns, lock_step, say)
             executor = execution.make_executor('events')
             executor.add_node(player)
-            watch = _Watch(executor, player, group, interrupted, say, shared,
-                           arguments if respawn else None)
+            watch = _Watch(executor, player, group, interrupted, say, shared, respawn)
             try:
                 watch.until_ready()
                 player.begin()
@@ -258,7 +257,7 @@ class _Watch:
 
     def __init__(self, executor: Executor, player: ScenarioPlayer, group: ProcessGroup,
                  interrupted: list[int], say: Say, shared: Mapping[str, Sequence[str]],
-                 respawn: Sequence[str] | None) -> None:
+                 respawn: bool) -> None:
         self._executor, self._player, self._group = executor, player, group
         self._interrupted, self._say = interrupted, say
         self._shared, self._respawn = shared, respawn
@@ -295,8 +294,8 @@ class _Watch:
         news = {name: how for name, how in self._group.ended().items() if name not in self._told}
         for name, how in news.items():
             nodes = self._shared[name]
-            if (self._respawn is not None and self._begun and not self._ending
-                    and ROBOT not in nodes and self._restarts[name] < MOST_RESTARTS):
+            if (self._respawn and self._begun and not self._ending and ROBOT not in nodes
+                    and self._restarts[name] < MOST_RESTARTS):
                 self._say(self._player.progress_ns * 1e-9, f'{how}; it is started again')
                 self._restarts[name] += 1
                 self._group.restart(name)
@@ -316,7 +315,6 @@ class _Watch:
             self._say(self._player.progress_ns * 1e-9, 'all nodes are ready again')
             self._player.renew([node for name in self._restarts for node in self._shared[name]])
             self._restarts.clear()
-            self._prepare()
         if not self._ending:
             self._look_for_stall()
 
@@ -344,7 +342,7 @@ class _Watch:
 
     def _end_hung(self, nodes: set[str]) -> None:
         hung = [name for name, own in self._shared.items() if nodes.intersection(own)]
-        if self._respawn is None:
+        if not self._respawn:
             raise SuiteError(f'{", ".join(hung)} hung: no answer for {HUNG_S:g} s')
         for name in hung:
             self._say(self._player.progress_ns * 1e-9, f'{name} hung and is ended')
@@ -363,12 +361,6 @@ class _Watch:
                 self._say(math.nan, f'waiting for {waiting}')
             self.until(Future(), SLICE_S)
         self._begun = True
-        self._prepare()
-
-    def _prepare(self) -> None:
-        """Have a process at hand for what may end; not while the suite has to become ready."""
-        if self._respawn is not None:
-            self._group.prepare(self._respawn)
 
     def lay_down(self) -> None:
         """End the recording, then lay the robot down; a second Ctrl-C cuts it short."""

@@ -54,10 +54,6 @@ HEARTBEAT_NS = 100_000_000
 PATIENT_TICKS = 100
 """Ticks after which a restarted node begins although somebody has not told what acts."""
 
-UNSEEN_NS = 60_000_000
-"""In real time: time without a tick after which the last one is told to who is started again [ns].
-"""
-
 BLIND_NS = 250_000_000
 """Time on the robot's clock without a tick after which nothing is known of the gait [ns]."""
 
@@ -96,9 +92,10 @@ class InhibitionNode(SuiteNode):
         self._gains_publisher = self.publisher('inhibition_gains')
         self._others = OthersKnow(self, self._take_up)
         self.listen('drive_mode', self._on_drive)
-        self._memory_writer = conversions.GaitMemoryWriter(tuple(gaits.gaits))
-        self._memory, self._remembered_ns = self.publisher('gait_memory'), -1
-        if not self.lock_step:
+        if self.lock_step:
+            self._memory_writer = conversions.GaitMemoryWriter(tuple(gaits.gaits))
+            self._memory = self.publisher('gait_memory')
+        else:
             self.listen('/clock', lambda message: self._watch(stamp_ns(message.clock)))
         body, sensors = conversions.BodyReader(), {}
         if self._voting.voting.voting:
@@ -166,17 +163,13 @@ class InhibitionNode(SuiteNode):
                 or stamp_ns - self._told_ns >= HEARTBEAT_NS):
             self._publish_gains()
         if self.lock_step:
-            self._remember()
+            self._memory.publish(
+                self._memory_writer.fill(
+                    stamp_ns, self._x, self._x_dot, self._slow.gait, self._r))
         if self._blind:
             self._blind = ''
             self.clear('blind')
         self._watch_bound(stamp_ns)
-
-    def _remember(self) -> None:
-        """Tell the last tick, for oscillators and a reference filter that are started again."""
-        self._remembered_ns = self._state.time_ns
-        self._memory.publish(self._memory_writer.fill(
-            self._remembered_ns, self._x, self._x_dot, self._slow.gait, self._r))
 
     def _tell_block(self, before: SupervisorState) -> None:
         """Say that the robot has stopped by itself, and when it no longer has."""
@@ -248,10 +241,7 @@ class InhibitionNode(SuiteNode):
         """Notice on the robot's clock that nothing is known of the gait any more."""
         if self._x is None:
             return
-        unseen_ns = now_ns - self._state.time_ns
-        if unseen_ns > UNSEEN_NS and self._remembered_ns != self._state.time_ns:
-            self._remember()
-        if unseen_ns > BLIND_NS and not self._blind:
+        if now_ns - self._state.time_ns > BLIND_NS and not self._blind:
             topic = next((name for name in ('reference', 'canonical_state')
                           if now_ns - self.inputs.newest_ns(name) > BLIND_NS), 'canonical_state')
             self._blind = (f'no {topic} from {interface(topic).publishers[0]} since '

@@ -74,7 +74,7 @@ class LegTransformation(SuiteNode):
         self.clear('feedback')
         if not self._joined:
             self._joined = True
-            if stamp_ns > 0:
+            if self.lock_step and stamp_ns > 0:
                 self._state = self._leg.picked_up(gait, x, x_dot, values['reference'], feedback)
         state, targets = self._leg.step(
             self._state, gait, x, x_dot, values['reference'], feedback, position, velocity,

@@ -7,9 +7,8 @@ stands; without a rhythm it holds its joints for 0.1 s and puts its feet down. A
 holds its stance. One that is upright but low (on its way up or down, or on its belly) is lowered
 onto its belly. So is one with a leg that gives no torque, as fast as it would fall: three legs do
 not carry a body that moves, and from its belly nothing falls. The joints of a tilted one are
-damped. Targets are followed again when they act in time and rest where the joints are, or a step
-away where the robot stands, or move in step with it while it still strides: nodes that are back at
-once find it walking.
+damped. Targets are followed again when they rest where the joints are, or a step away where the
+robot stands, and act in time.
 """
 
 from __future__ import annotations
@@ -58,14 +57,11 @@ LONGEST_STOP_S = 1.6
 NEAR, SLOW = 0.3, 0.3
 """Distance [rad] and speed [rad/s] within which targets are at rest where the joints are held."""
 
-IN_STEP = 0.5
-"""That distance for a robot that strides and targets that move [rad]."""
-
 STEPPED = 0.7
 """That distance for a robot that stands: its legs may rest on footholds a step away [rad]."""
 
 AT_EASE_NS = 100_000_000
-"""Time for which targets must have agreed with the joints until they are followed again [ns]."""
+"""Time for which targets must have been at rest until they are followed again [ns]."""
 
 TAKEN_UP_S = 0.3
 """Time in which the joints go over to targets that are followed again, as long for each ``NEAR``
@@ -134,7 +130,7 @@ class CommandWatchdog:
         self._rhythm: Rhythm | None = None
         self._given, self._off = np.zeros(12), np.zeros(12)
         self._begin_ns = self._late_ns = self._uneasy_ns = self._taken_ns = 0
-        self._taking_s, self._stop_s = TAKEN_UP_S, 0.0
+        self._taking_s = TAKEN_UP_S
         self._lagged_ns = -1
         self.lateness_ns = self.ticks = self.carried = 0
         self._start = self._targets
@@ -254,22 +250,15 @@ class CommandWatchdog:
                 and condition.height >= STANDING_HEIGHT * self._stance_height)
 
     def _at_ease(self, now: int) -> bool:
-        """Whether the targets have agreed with what the joints do for a while, and in time: move
-        in step with a robot that strides, or rest where one does not. A robot that follows what is
-        late would soon have to look after itself again.
+        """Whether the targets have rested for a while where the joints are held, and in time:
+        a robot that follows what is late would soon have to look after itself again.
         """
         position, velocity, _ = self._targets
-        strides = self._strides(now)
-        near = IN_STEP if strides else STEPPED if self.fallback == 'stand' else NEAR
-        if ((np.abs(velocity).max() > SLOW) != strides or self.lateness_ns > CARRIED_NS
-                or np.abs(position - self._given).max() > near):
+        near = STEPPED if self.fallback == 'stand' else NEAR
+        if (np.abs(velocity).max() > SLOW or np.abs(position - self._given).max() > near
+                or self.lateness_ns > CARRIED_NS):
             self._uneasy_ns = now
         return now - self._uneasy_ns >= AT_EASE_NS
-
-    def _strides(self, now: int) -> bool:
-        """Whether the robot comes to a stand by itself in steps that are still half as long."""
-        return (self.fallback == 'stand' and self._rhythm is not None
-                and now - self._begin_ns < 0.5e9 * self._stop_s)
 
     def _falling_back(self, state: RobotState) -> JointTargets:
         """Targets of the fallback that the robot's state asked for when it began; a robot that
@@ -299,8 +288,6 @@ class CommandWatchdog:
             self._going_on(now, start)
         self._begin_ns, self._late_ns, self._start = now, 0, start
         self._off = self._given - self._rhythm.at(now)[0] if self._rhythm else np.zeros(12)
-        self._stop_s = min(STOP_CYCLES * self._rhythm.period_s, LONGEST_STOP_S) if (
-            self._rhythm) else 0.0
 
     def _taking_up(self, posture: str, ahead_ns: int, state: RobotState) -> Array:
         """Targets (3, 12) on the way to a posture; a standing robot carries its weight."""
@@ -315,7 +302,8 @@ class CommandWatchdog:
 
     def _coming_to_a_stand(self, rhythm: Rhythm, state: RobotState) -> JointTargets:
         """The last rhythm about the stance, smaller and smaller."""
-        now, goal, seconds = state.time_ns, self._ways['stand'][0], self._stop_s
+        now, goal = state.time_ns, self._ways['stand'][0]
+        seconds = min(STOP_CYCLES * rhythm.period_s, LONGEST_STOP_S)
         ahead = now - self._begin_ns
         size, rate = 1.0 - _share(ahead, seconds), -_share(ahead, seconds, 1) / seconds
         position, velocity, effort = rhythm.at(now)

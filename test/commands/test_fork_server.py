@@ -16,16 +16,12 @@ import pytest
 pytest.importorskip('rclpy')
 
 import ros_processes
-from rcl_interfaces.srv import GetParameters
-from ros_processes import Processes, Ros
 
 from dmp_cpg_ros.commands import fork_server
 from dmp_cpg_ros.commands.fork_server import Forked, ForkServer
 
-ros, processes, ros_domain = (
-    ros_processes.ros, ros_processes.processes, ros_processes.ros_domain)
+ros_domain = ros_processes.ros_domain
 WAIT_S = ros_processes.DEADLINE_S
-COMMON = ('--ros-args', '-p', 'autostart:=false')
 NODE = ('leg_transformation', '--ros-args', '-p', 'leg:=fl', '-p', 'autostart:=false')
 
 
@@ -78,75 +74,6 @@ def test_it_does_what_its_command_does_alone(server: ForkServer, tmp_path: Path)
         refused = server.start(['certify', '--no-such-option'], 1, errors.fileno())
     assert refused.wait(WAIT_S) == 2
     assert b'--no-such-option' in (tmp_path / 'errors').read_bytes()
-
-
-def ended(pid: int) -> bool:
-    """Whether nothing runs under a number any more; who waits for it may not have yet."""
-    try:
-        status = Path(f'/proc/{pid}/stat').read_text(encoding='utf-8')
-    except OSError:
-        return True
-    return status.rpartition(')')[2].split()[0] == 'Z'
-
-
-def test_a_spare_process_becomes_the_node_that_is_asked_for(
-        server: ForkServer, ros_domain: int, ros: Ros, tmp_path: Path) -> None:
-    """It has joined the domain before, under a name that is hidden, and leaves that name."""
-    server.prepare(COMMON)
-    assert server._spare is not None
-    spare = server._spare.process
-    ros.spin_until(lambda: '_spare' in ros.node.get_node_names())
-    assert tuple(command_of(spare)[-len(COMMON) - 1:]) == (fork_server.SPARE, *COMMON)
-    command = ('leg_transformation', *COMMON, '-r', '__node:=restarted', '-p', 'leg:=fr')
-    with (tmp_path / 'output').open('wb') as output:
-        node = server.start(command, output.fileno(), output.fileno())
-    ros.spin_until(lambda: 'restarted' in (names := ros.node.get_node_names())
-                   and '_spare' not in names)
-    assert node is spare and tuple(command_of(node)[-len(command):]) == command
-    answer = ros.call(GetParameters, '/restarted/get_parameters',
-                      GetParameters.Request(names=['leg', 'autostart']))
-    assert (answer.values[0].string_value, answer.values[1].bool_value) == ('fr', False)
-    node.send_signal(signal.SIGTERM)
-    assert node.wait(WAIT_S) == 0, (tmp_path / 'output').read_text(encoding='utf-8')
-
-
-def test_what_a_spare_process_cannot_run_is_forked(
-        server: ForkServer, ros_domain: int, tmp_path: Path) -> None:
-    with (tmp_path / 'output').open('wb') as output:
-        for command, dies in ((NODE, False), (('certify', *COMMON), True)):
-            server.prepare(COMMON)
-            assert server._spare is not None
-            spare = server._spare.process
-            if dies:
-                os.kill(spare.pid, signal.SIGKILL)
-                spare.wait(WAIT_S)
-            process = server.start(command, output.fileno(), output.fileno())
-            assert process.pid != spare.pid and spare.poll() == -signal.SIGKILL
-            process.kill()
-            process.wait(WAIT_S)
-
-
-def test_with_security_there_is_no_spare_process(
-        server: ForkServer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(fork_server.SECURITY, 'true')
-    server.prepare(COMMON)
-    assert server._spare is None
-
-
-@pytest.mark.parametrize('killed', [False, True])
-def test_a_spare_process_ends_with_who_may_need_it(
-        processes: Processes, killed: bool) -> None:
-    parent = processes.python('-c', (
-        'import signal\n'
-        'from dmp_cpg_ros.commands.fork_server import ForkServer\n'
-        'with ForkServer() as server:\n'
-        f'    server.prepare({list(COMMON)})\n'
-        '    print("spare", server._spare.process.pid, flush=True)\n'
-        f'    {"signal.pause()" if killed else "pass"}\n'))
-    pid = int(parent.wait_for_output(r'spare (\d+)')[1])
-    if killed:
-        os.kill(parent.pid, signal.SIGKILL)
-    ros_processes.wait_until(lambda: ended(pid), what=lambda: 'the end of the spare process')
 
 
 def test_what_it_prepares_for_nodes_is_there() -> None:

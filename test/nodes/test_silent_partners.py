@@ -11,7 +11,6 @@ import pytest
 import ros_processes
 from rclpy.parameter import Parameter
 from ros_processes import Ros
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
@@ -19,10 +18,9 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
-from dmp_cpg_ros.nodes.framework.suite_node import RECENT_NS
-from dmp_cpg_ros.nodes.inhibition import PATIENT_TICKS, UNSEEN_NS, InhibitionNode
+from dmp_cpg_ros.nodes.inhibition import PATIENT_TICKS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
-from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS, interface
+from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.values import header_ns
 from dmp_cpg_ros.nodes.mujoco_robot import MujocoRobotNode
 from dmp_cpg_ros.nodes.reference_filter import ReferenceFilter
@@ -82,34 +80,6 @@ def test_while_nothing_is_known_of_the_gait_no_time_to_rest_is_promised(ros: Ros
     node._watch(now + 10_000_000_000)
     assert node.health.has_problem('bound')
     node.destroy_node()
-
-
-def test_oscillators_and_reference_go_on_from_the_last_tick_that_was_heard(ros: Ros) -> None:
-    """The inhibition tells it once there is none; they make up for the time since."""
-    (_, _, tick), (_, later, then) = walked(301), walked(401)
-    node, now = watching(ros, RUNS)
-    ros.nodes.append(node)
-    told = ros.collect(JointState, 'gait_memory', interface('gait_memory').reader_qos)
-    for age in (UNSEEN_NS, UNSEEN_NS + TICK, UNSEEN_NS + 9 * TICK):
-        node._watch(now + age)
-    ros.spin_until(lambda: bool(told))
-    assert len(told) == 1 and header_ns(told[0]) == now
-    for stamp, remembers in ((later.time_ns - TICK, True), (now + RECENT_NS + TICK, False)):
-        reference = ReferenceFilter('reference_filter', context=ros.context)
-        canonical = CanonicalOscillators('canonical_oscillators', context=ros.context)
-        for restarted in (reference, canonical):
-            restarted.start()
-            ros.executor.add_node(restarted)
-            (watch,) = restarted.writers._watches['gait_memory']
-            ros.spin_until(lambda watch=watch: watch.known)
-            ros.executor.remove_node(restarted)
-        gains = {'inhibition_gains': (stamp, RUNS)}
-        reference.on_tick(stamp, {'joint_states': None, **gains})
-        canonical.on_tick(stamp, {'reference': tick.r, **gains})
-        assert (0.0 < reference._r[0] < tick.r[0]) == remembers  # nobody commands any more
-        assert np.allclose(canonical._state.x, then.x, atol=0.05) == remembers
-        reference.destroy_node()
-        canonical.destroy_node()
 
 
 def test_a_restarted_node_keeps_a_stop_and_does_not_stop_a_gait(ros: Ros) -> None:

@@ -12,12 +12,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.nodes.framework.writers import (
-    GONE_NS,
     LOST,
     PROVEN,
     REMEMBERED_NS,
     SILENT_NS,
-    YOUNG,
     WriterWatch,
 )
 
@@ -104,39 +102,6 @@ def test_a_writer_that_was_started_again_takes_over(first: int, stamp: int) -> N
     watch, again = watched(), KNOWN * TICK_NS + SILENT_NS + TICK_NS
     for k in range(10):
         assert watch.admits(first + k, stamp + k * TICK_NS, again + k * TICK_NS)
-
-
-def test_a_writer_that_was_started_again_at_once_takes_over_with_its_first_messages() -> None:
-    """No sooner than its former self may be late, and with several of them in a row."""
-    watch, number, taken_ns = watched(), 0, 0
-    for now in range((KNOWN + 1) * TICK_NS, KNOWN * TICK_NS + SILENT_NS, TICK_NS):
-        number += 1
-        if watch.admits(number, now, now):
-            taken_ns = taken_ns or now - KNOWN * TICK_NS
-        else:
-            assert not taken_ns
-    assert GONE_NS < taken_ns <= GONE_NS + (PROVEN + 1) * TICK_NS
-
-
-@pytest.mark.parametrize(('alone', 'ticked', 'first'), [
-    (False, True, 1), (True, False, 1), (True, True, YOUNG + 1)])
-def test_nobody_else_takes_over_so_soon(alone: bool, ticked: bool, first: int) -> None:
-    """Nor while the graph knows a stranger, nor of a topic without ticks, nor in mid-stream."""
-    watch = watched(alone=alone, ticked=ticked)
-    for k, now in enumerate(range((KNOWN + 1) * TICK_NS, KNOWN * TICK_NS + SILENT_NS, TICK_NS)):
-        assert not watch.admits(first + k, now, now)
-
-
-def test_a_writer_that_only_stalled_keeps_its_topic() -> None:
-    """Its messages come between those of who wants to take over."""
-    watch, number = watched(), 0
-    for k in range(GONE_NS // TICK_NS + 1, 500):
-        now = (KNOWN + k) * TICK_NS
-        if k % PROVEN:
-            number += 1
-            assert not watch.admits(number, now, now)
-        else:
-            assert watch.admits(KNOWN + k, now, now)
 
 
 def test_a_stranger_does_not_take_over_while_it_is_in_the_graph() -> None:

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import deepcopy
 from itertools import product
 from math import pi, tau
@@ -96,40 +95,8 @@ def test_silent_while_it_speeds_up_it_puts_its_feet_down(gait: str, speed: float
         assert walk.go(40).left_alone(500) < 0.6
 
 
-@pytest.mark.parametrize(('gait', 'speed'), [('amble', 0.5), ('trot', 1.0)])
-@pytest.mark.parametrize('silent', [('fl',), LEGS])
-def test_legs_that_are_back_while_it_strides_are_followed_in_step(
-        gait: str, speed: float, silent: Sequence[str]) -> None:
-    """After 0.3 s in any of eight phases it walks on, and hardly more slowly."""
-    walk = Walk(gait, speed).go(1000)
-    for _ in range(8):
-        walk.go(75, silent=' '.join(silent))
-        assert walk.guard.fallback == 'stand'
-        for _ in range(50):
-            walk.go(1)
-            assert walk.state.base_velocity_in_base[0] > 0.25 * speed
-        assert not walk.guard.fallback and not walk.robot.fallen
-        walk.go(375 + 13)
-        assert walk.state.base_velocity_in_base[0] == pytest.approx(speed, rel=0.3)
-
-
-def test_legs_that_rest_are_not_followed_while_it_strides() -> None:
-    """They would hold its feet."""
-    walk = Walk('amble', 0.5).go(1000).go(75, silent=' '.join(LEGS))
-    begun = walk.state.time_ns - 100_000_000
-    home = home_joint_position(walk.robot.description)
-    while walk.guard.fallback:
-        for i, leg in enumerate(LEGS):
-            joints = home[3 * i:3 * i + 3]
-            walk.guard.accept(leg, walk.state.time_ns, JointTargets(
-                joints, np.zeros(3), np.zeros(3)))
-        walk.state = walk.robot.step(walk.guard.targets(walk.state))
-        assert not walk.robot.fallen
-    assert walk.guard._stop_s and walk.state.time_ns - begun > 0.5e9 * walk.guard._stop_s
-
-
 def test_it_follows_the_legs_again_once_they_are_at_rest() -> None:
-    walk = Walk('amble', 0.5).go(750).go(200, silent='fl')
+    walk = Walk('amble', 0.5).go(750).go(100, silent='fl')
     assert walk.guard.fallback == 'stand'
     walk.go(300)
     assert walk.guard.fallback == 'stand'  # the legs still walk, the robot stands

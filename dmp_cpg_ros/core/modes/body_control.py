@@ -7,8 +7,6 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from dmp_cpg_ros.core.balance.body_command import BALANCED
 from dmp_cpg_ros.core.balance.controller import (
     PostureController,
@@ -35,14 +33,10 @@ class BodyState:
         What the body does, requests included.
     balance : PostureState
         Of the posture controller.
-    alone : bool
-        Whether the robot looks after itself: its legs keep to their own footholds, for what moves
-        the body then is not what they tell.
     """
 
     mode: ModeState
     balance: PostureState
-    alone: bool = False
 
 
 class BodyControl:
@@ -78,21 +72,21 @@ class BodyControl:
 
     def picked_up(self, state: BodyState, measured: RobotState) -> BodyState:
         """State of a block that comes to a robot that has long begun."""
-        return replace(state, mode=self.modes.picked_up(state.mode, measured))
+        return BodyState(self.modes.picked_up(state.mode, measured), state.balance)
 
     def request(self, state: BodyState, what: str) -> tuple[BodyState, ModeAnswer]:
         """Take a request; see :func:`~dmp_cpg_ros.core.modes.requests.request`."""
         mode, answer = request(self.modes, state.mode, what)
-        return replace(state, mode=mode), answer
+        return BodyState(mode, state.balance), answer
 
     def told_drive(self, state: BodyState, drive_mode: str) -> BodyState:
         """State that knows what the drives do by themselves: who is lowered by them does not stand
         any more, and has not fallen.
         """
-        lowered, alone = drive_mode == 'lie', drive_mode in ('stand', 'lie', 'damp')
-        if (lowered, alone) == (state.mode.lowered, state.alone):
+        lowered = drive_mode == 'lie'
+        if lowered == state.mode.lowered:
             return state
-        return replace(state, mode=replace(state.mode, lowered=lowered), alone=alone)
+        return BodyState(replace(state.mode, lowered=lowered), state.balance)
 
     def step(self, state: BodyState, measured: RobotState, gait: GaitInForce, x: Array,
              x_dot: Array, r: Array, dt: float) -> tuple[BodyState, PostureFeedback]:
@@ -121,11 +115,8 @@ class BodyControl:
         """
         mode = self.modes.step(state.mode, measured, x, x_dot, r, state.balance.activity)
         if mode.mode not in BALANCED:
-            return (BodyState(mode, self.posture.initial_state(), state.alone),
+            return (BodyState(mode, self.posture.initial_state()),
                     self.modes.feedback(mode, measured))
         balance, feedback = self.posture.step(
             state.balance, measured, gait, x, x_dot, r, dt, self.modes.command(mode))
-        if state.alone:
-            feedback = replace(feedback, shift_in_base=np.zeros((4, 3)),
-                               drift_in_base=np.zeros((4, 2)), correction=np.zeros(3))
-        return BodyState(mode, balance, state.alone), feedback
+        return BodyState(mode, balance), feedback

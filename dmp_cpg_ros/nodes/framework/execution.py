@@ -22,7 +22,7 @@ import traceback
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import rclpy
 from rclpy.context import Context
@@ -86,33 +86,6 @@ def prepare_middleware() -> None:
     elif os.environ.get(VARIABLES[0]) != local:  # which this has named before
         os.environ.update(dict.fromkeys(VARIABLES, subnet))
 
-
-_EARLY: list[Any] = []
-"""Node that keeps this process in the domain until it has another."""
-
-
-def join_early(arguments: Sequence[str]) -> None:
-    """Join the ROS domain before it is known which nodes this process will run.
-
-    A new participant needs seconds on a busy machine until it knows all ends of the others, and
-    they its own: each asks again once a second what has been lost. A node that is made in one that
-    has long been there is matched in a tenth of a second.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        ``--ros-args`` that all nodes have.
-    """
-    prepare_middleware()
-    rclpy.init(args=[_EARLY_NAME, *arguments], signal_handler_options=SignalHandlerOptions.NO)
-    context = get_default_context()
-    with context.handle:  # a node of rclpy would have topics, of which others would ask whose
-        _EARLY.append(rclpy_implementation.Node(
-            _EARLY_NAME, '', context.handle, None, True, False))
-
-
-_EARLY_NAME = '_spare'
-"""Name of that node, which ``ros2 node list`` hides."""
 
 _THREADS = '/proc/self/task'
 
@@ -238,9 +211,7 @@ def run_node(kind: str) -> int:
     if {'-h', '--help'} & set(own):
         print(help_text(node_class))
         return OK
-    # A process that has joined early knows the arguments of all nodes only.
-    return run_nodes(kind, arguments, lambda: [node_class(
-        node_class.default_name(arguments), cli_args=arguments if _EARLY else None)])
+    return run_nodes(kind, arguments, lambda: [node_class(node_class.default_name(arguments))])
 
 
 def run_nodes(program: str, arguments: Sequence[str],
@@ -286,12 +257,9 @@ def _run(program: str, arguments: Sequence[str], make: Callable[[], Iterable[Sui
     if unknown:
         raise ParameterError(
             f"unknown argument '{unknown[0]}'; valid are --help and --ros-args ...")
-    if not _EARLY:
-        prepare_middleware()
-        rclpy.init(args=[program, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+    prepare_middleware()
+    rclpy.init(args=[program, *arguments], signal_handler_options=SignalHandlerOptions.NO)
     nodes.extend(make())
-    while _EARLY:
-        _EARLY.pop().destroy_when_not_in_use()
     claims = [claim(node.get_fully_qualified_name(), node.context.get_domain_id())
               for node in nodes]
     for node in nodes:

@@ -53,9 +53,9 @@ LOOK_AFTER_S = 0.02
 """How often a node looks after inputs that do not wake it, in case the one that does is late [s].
 """
 
-FRESH_NS, RECENT_NS = 20_000_000, 1_000_000_000
-"""Age up to which a memory of the gait is where a restarted node goes on [ns]: in lock-step, where
-the robot waits and has not moved, and in real time, where it goes on with its rhythm meanwhile."""
+FRESH_NS = 20_000_000
+"""Age up to which a memory of the gait is where a restarted node goes on [ns]: within it the robot
+has not moved, which waits in lock-step."""
 
 MOST_VERDICTS = 8
 """How often a change is judged anew because what runs has become another meanwhile."""
@@ -516,8 +516,7 @@ class SuiteNode(GuardedLifecycleNode):
             if heard is not None:  # nobody needs it any more
                 self._inputs = [entry for entry in self._inputs if entry[1] is not heard]
                 self.destroy_subscription(heard)
-            oldest = FRESH_NS if self.lock_step else RECENT_NS
-            return next(((1e-9 * age, what) for age, what in said if 0 <= age <= oldest), None)
+            return next(((1e-9 * age, what) for age, what in said if 0 <= age <= FRESH_NS), None)
 
         return take
 

@@ -33,12 +33,6 @@ if TYPE_CHECKING:
 SILENT_NS = 500_000_000
 """Time without a message of the writer after which another one may take over [ns]."""
 
-GONE_NS, YOUNG = 100_000_000, 250
-"""Where the graph knows nobody else: time without a message of the writer of every tick after
-which a node of its name may take over [ns] whose messages have only begun, and how many it may
-have sent.
-"""
-
 REMEMBERED_NS = 2_000_000_000
 """Time for which a stranger is remembered after its last message [ns]."""
 
@@ -127,14 +121,14 @@ class WriterWatch:
             # What is sent again after a loss is received later than what waited behind it.
             self._heard_ns = max(self._heard_ns, now_ns)
             return True
-        if silent or self._is_young(number, now_ns):
+        if silent:
             alone = self._may_take_over()
-            if silent and alone is None and not self._ticked and self._stranger < 0:
+            if alone is None and not self._ticked and self._stranger < 0:
                 return True  # nothing tells the writer from others before its topic has one
-            if alone or (silent and alone is None and self._ticked and not stranger):
+            if alone or (alone is None and self._ticked and not stranger):
                 goes_on = number == self._tried[0] + 1 and stamp_ns > self._tried[1]
                 self._tried = number, stamp_ns, 1 + (self._tried[2] if goes_on else 0)
-                if (alone and silent) or self._lock_step or self._tried[2] >= PROVEN:
+                if alone or self._lock_step or self._tried[2] >= PROVEN:
                     self._begin(number, stamp_ns, now_ns)
                     return True
                 return False
@@ -151,18 +145,12 @@ class WriterWatch:
     def may_admit(self, number: int | None, stamp_ns: int, now_ns: int) -> bool:
         """Whether :meth:`admits` can be true: False for most of what is not the writer's."""
         return (number is None or now_ns - self._heard_ns > SILENT_NS
-                or self._is_young(number, now_ns)
                 or self._is_repeat(number - self._last, stamp_ns - self._stamp_ns)
                 or self._continues(number - self._last, stamp_ns - self._stamp_ns, now_ns))
 
     def has_strangers(self, now_ns: int) -> bool:
         """Whether strangers have been heard lately."""
         return now_ns - self._stranger_ns < REMEMBERED_NS
-
-    def _is_young(self, number: int, now_ns: int) -> bool:
-        """Whether a message can be one of the first of a node that was started again at once."""
-        return (self._ticked and not self._lock_step and number <= YOUNG
-                and now_ns - self._heard_ns > GONE_NS)
 
     def _is_repeat(self, ahead: int, passed_ns: int) -> bool:
         return (self._lock_step and self._ticked and self._last > 0 and passed_ns == 0

@@ -244,7 +244,7 @@ TOPICS: tuple[Interface, ...] = (
               'the newest of acting_gains: who restarts inhibition and the oscillators finds it',
               (ROBOT,), (INHIBITION,), latched=True, recorded=False),
     Interface('gait_memory', JointState,
-              'canonical_state and reference of the last tick, for who is restarted',
+              'lock-step: canonical_state and reference of the last tick, for who is restarted',
               (INHIBITION,), (REFERENCE, CANONICAL), latched=True,
               sometimes=(REFERENCE, CANONICAL, INHIBITION)),
     Interface('drive_mode', String,
