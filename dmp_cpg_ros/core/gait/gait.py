@@ -29,6 +29,9 @@ from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
+BACKWARD_WEIGHT = 1.3
+"""Weight of speed backwards, by the highest speed of a gait whose legs all swing together."""
+
 LATERAL_WEIGHT = 2.0
 """Weight of speed across the body in the speed by which a gait chooses its cadence."""
 
@@ -69,12 +72,13 @@ class BodyScale:
         """Speed by which a gait chooses its cadence: a bound on that of any stance foot [m/s].
 
         Speed sideways and from turning counts ``LATERAL_WEIGHT`` times: across the body the feet
-        have about half the room, so that the steps must be shorter. By a highest speed it counts
-        1/``rolling`` times where a gait's legs swing together, with ``apart`` 0.
+        have about half the room. By a highest speed it counts 1/``rolling`` times where a gait's
+        legs swing together, with ``apart`` 0, and speed backwards ``BACKWARD_WEIGHT`` times.
         """
         weight = LATERAL_WEIGHT
         if apart < 1.0:
             weight += (1.0 - apart) * max(0.0, 1.0 / self.rolling - weight)
+            v_x *= 1.0 if v_x >= 0.0 else 1.0 + (1.0 - apart) * (BACKWARD_WEIGHT - 1.0)
         across = weight * v_y
         return float(
             (v_x * v_x + across * across) ** 0.5 + weight * abs(gamma) * self.hip_radius)
@@ -304,9 +308,7 @@ class Gait(CycleOfLegs):
 
     def following(self, omega: float, change_rate: float, pauses: bool, dt: float
                   ) -> tuple[Gait, float]:
-        """Gait a time step later, and what the oscillators gain on ω meanwhile [rad]: the same
-        and nothing, other than while gaits change.
-        """
+        """Gait a time step later, and what oscillators gain on ω [rad]: the same, and nothing."""
         return self, 0.0
 
     def omega(self, foot_speed: float, scale: BodyScale) -> float:
@@ -338,9 +340,7 @@ class Gait(CycleOfLegs):
 
 
 def _interpolated(at: float, xs: Sequence[float], ys: Sequence[float]) -> float:
-    """Piecewise linear interpolation, constant outside; plain floats, because it runs in every
-    node at every tick.
-    """
+    """Piecewise linear interpolation, constant outside, of plain floats: it runs at every tick."""
     place = bisect_right(xs, at)
     if place == 0:
         return ys[0]

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.gait import BodyScale, Gait
+from dmp_cpg_ros.core.gait.gait import BACKWARD_WEIGHT, BodyScale, Gait
 from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, limiting_gaits
 from dmp_cpg_ros.core.gait.speed_limit import blended_limit, swing_acceleration
 from dmp_cpg_ros.core.gait.transition import (
@@ -248,12 +248,13 @@ def test_gaits_change_at_a_speed_that_is_neithers_limit_and_walk_on(
     for _ in range(1500):
         assert run.walk(0.004)
         if isinstance(run.loop.network.gait, BlendedGait):
-            fastest = max(fastest, SCALE.foot_speed(*run.loop.r.tolist()))
+            fastest = max(fastest, SCALE.foot_speed(*run.loop.r.tolist(), GAITS[after].apart))
     assert 0.9 * most < fastest <= HASTE * most
     assert run.loop.network.gait.name == after and run.loop.stop.share > 0.9
     reached = np.mean([state.base_velocity_in_base[0] for state in run.states[-250:]])
-    wanted = min(abs(speed), GAITS[after].highest_speed * ROOT)
-    assert 0.75 * wanted < abs(reached) < 1.05 * wanted  # a pronk backwards is slow
+    wanted = SCALE.limited((speed, 0.0, 0.0), GAITS[after].highest_speed,
+                           apart=GAITS[after].apart)[0]
+    assert reached == pytest.approx(wanted, rel=0.2)  # a pronk swings about its speed
 
 
 def test_who_has_the_gait_that_is_wanted_follows_all_of_the_command() -> None:
@@ -272,3 +273,15 @@ def test_who_has_the_gait_that_is_wanted_follows_all_of_the_command() -> None:
     assert network.scale.foot_speed(*shortened, walk.apart) == pytest.approx(
         network.scale.speed(CHANGING * walk.highest_speed))
     assert changing_share(network, walk, (0.0, 0.0, 0.0)) == 1.0
+
+
+@given(velocity=velocities, factor=st.floats(0.1, 3.0))
+def test_backwards_a_pronk_is_granted_less_and_others_are_granted_the_same(
+        velocity: tuple[float, float, float], factor: float) -> None:
+    v_x, v_y, gamma = velocity
+    ahead, back = (abs(v_x), v_y, gamma), (-abs(v_x), v_y, gamma)
+    assert SCALE.foot_speed(*back) == SCALE.foot_speed(*ahead)
+    assert SCALE.foot_speed(*back, 0.0) >= SCALE.foot_speed(*ahead, 0.0)
+    assert SCALE.foot_speed(-1.0, 0.0, 0.0, 0.0) == BACKWARD_WEIGHT
+    scaled = tuple(factor * value for value in back)  # curves are shortened by one factor
+    assert SCALE.foot_speed(*scaled, 0.0) == pytest.approx(factor * SCALE.foot_speed(*back, 0.0))
