@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 from math import inf, isfinite, nan
@@ -51,8 +52,13 @@ FOLLOWING = conversions.DRIVE_MODES[0]
 HEARTBEAT_NS = 100_000_000
 """Time after which the gains are told again although they are the same [ns]."""
 
-PATIENT_TICKS = 100
-"""Ticks after which a restarted node begins although somebody has not told what acts."""
+JOIN_EVERY_S = 0.1
+"""In lock-step, how often a restarted node looks whether it has been told what acts [s]."""
+
+PATIENT_NS, BRIEF_NS = 5_000_000_000, 400_000_000
+"""Time for which a restarted node waits to be told what acts, longer than the 3 s after which a
+participant announces itself again, and where nobody is to be expected who could tell [ns].
+"""
 
 BLIND_NS = 250_000_000
 """Time on the robot's clock without a tick after which nothing is known of the gait [ns]."""
@@ -84,8 +90,9 @@ class InhibitionNode(SuiteNode):
         self._predicted = self._bound = self._way = nan
         self._outlook: Outlook | None = None
         self._due_ns, self._told_ns, self._blind = inf, -HEARTBEAT_NS, ''
-        self._drive, self._joined, self._waited = FOLLOWING, False, 0
-        self._began_ns, self._asked = 0, False
+        self._drive, self._joined, self._asked = FOLLOWING, False, False
+        self._first_ns = self._began_ns = -1
+        self._held: tuple[int, dict[str, Any]] | None = None
         self._told: tuple[Any, ...] = ()
         self._publisher = self.publisher('inhibition_state')
         self._gains_writer = conversions.InhibitionGainsWriter()
@@ -95,6 +102,7 @@ class InhibitionNode(SuiteNode):
         if self.lock_step:
             self._memory_writer = conversions.GaitMemoryWriter(tuple(gaits.gaits))
             self._memory = self.publisher('gait_memory')
+            self.look_every(JOIN_EVERY_S, self._try_again)
         else:
             self.listen('/clock', lambda message: self._watch(stamp_ns(message.clock)))
         body, sensors = conversions.BodyReader(), {}
@@ -141,6 +149,7 @@ class InhibitionNode(SuiteNode):
         self._r = values['reference']
         self._network = network = self._running_gait.network(gait)
         if not self._joined and not self._join(stamp_ns):
+            self._held = (stamp_ns, values) if self.lock_step else None
             return
         self._slow, before = self._unhurried(gait), self._state
         self._body_mode, margins, progress = values['posture_feedback'] or (
@@ -195,20 +204,33 @@ class InhibitionNode(SuiteNode):
         """Take up what acts on a gait that began before this node; the first tick of a run has
         the stamp 0. False while it is not known yet: what others know of a stop holds until then.
         """
-        self._waited += 1
-        if stamp_ns > 0 and not (
-                self._others.all_told or self.lock_step or self._waited >= PATIENT_TICKS):
-            return False
+        now_ns = time.monotonic_ns() if self.lock_step else stamp_ns  # no robot's time passes
+        if self._first_ns < 0:
+            self._first_ns = now_ns
+        if stamp_ns > 0 and not self._others.all_told:
+            patience = PATIENT_NS if self._others.more_may_tell else BRIEF_NS
+            if now_ns - self._first_ns < patience:
+                return False
+        self._adopt(stamp_ns)
+        return True
+
+    def _try_again(self) -> None:
+        """In lock-step, where the robot waits, take the tick that could not be taken before."""
+        held, self._held = self._held, None
+        if held is not None:
+            self.on_tick(*held)
+
+    def _adopt(self, stamp_ns: int) -> None:
+        """Take over what is known at a tick; who does not know whether the gait was stopped leaves
+        it to the service to start.
+        """
         self._joined, self._began_ns = True, stamp_ns
         if stamp_ns > 0:
-            # Who does not know whether it was stopped leaves it to the service to start.
             unknown = replace(self._supervisor.inhibition(self._state), automatic=False)
-            _, known = self._others.newest or (0, unknown)
-            self._state = adopted(known, stamp_ns)
+            self._state = adopted(self._others.known or unknown, stamp_ns)
             self._acting = self._supervisor.inhibition(self._state)
             if self._state.requested:
                 self._predict()
-        return True
 
     def _take_up(self, stamp_ns: int, acting: Inhibition) -> None:
         """Take up a stop of the service of before this node that is told only now."""
@@ -226,7 +248,7 @@ class InhibitionNode(SuiteNode):
     def _on_drive(self, message: Any) -> None:
         """Stop the gait at once while the robot does not follow the legs."""
         self._drive = conversions.read_drive_mode(message)
-        if self._drive != FOLLOWING and self._x is not None:
+        if self._drive != FOLLOWING and self._joined:
             self._stop_now()
 
     def _stop_now(self, automatic: bool = True) -> None:
@@ -239,7 +261,7 @@ class InhibitionNode(SuiteNode):
 
     def _watch(self, now_ns: int) -> None:
         """Notice on the robot's clock that nothing is known of the gait any more."""
-        if self._x is None:
+        if not self._joined:
             return
         if now_ns - self._state.time_ns > BLIND_NS and not self._blind:
             topic = next((name for name in ('reference', 'canonical_state')
@@ -292,6 +314,8 @@ class InhibitionNode(SuiteNode):
             return False, (
                 f'{self._blind}: no time to rest can be promised' + (
                     '; the stop is requested and will be carried out' if stop else ''))
+        if not self._joined:  # what is asked for now acts, whatever was before
+            self._adopt(self.health.stamp_ns)
         already, steps = stop == self._state.in_force, self._state.push.acts
         self._state = self._supervisor.request(self._state, stop)
         if stop != self._state.in_force:

@@ -11,6 +11,7 @@ import pytest
 import ros_processes
 from rclpy.parameter import Parameter
 from ros_processes import Ros
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
@@ -18,7 +19,7 @@ from dmp_cpg_ros.core.canonical.inhibition import Inhibition
 from dmp_cpg_ros.core.loop import WalkingLoop
 from dmp_cpg_ros.core.robot_model.state import RobotState
 from dmp_cpg_ros.nodes.canonical_oscillators import CanonicalOscillators
-from dmp_cpg_ros.nodes.inhibition import PATIENT_TICKS, InhibitionNode
+from dmp_cpg_ros.nodes.inhibition import BRIEF_NS, PATIENT_NS, InhibitionNode
 from dmp_cpg_ros.nodes.leg_transformation import LegTransformation
 from dmp_cpg_ros.nodes.messages.interfaces import SILENT_NS
 from dmp_cpg_ros.nodes.messages.values import header_ns
@@ -47,25 +48,36 @@ def walked(ticks: int) -> tuple[WalkingLoop, RobotState, Any]:
     return loop, before, tick
 
 
-def watching(ros: Ros, acting: Inhibition | None) -> tuple[InhibitionNode, int]:
-    """A node that is started while the robot walks, with what the oscillators tell."""
+def tick_at(node: InhibitionNode, state: RobotState, tick: Any, after_ns: int = 0) -> int:
+    """Give a node one tick, some time [ns] after a state; return its stamp [ns]."""
+    stamp = state.time_ns + after_ns
+    node.health.stamp_ns = stamp
+    node.on_tick(stamp, {
+        'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r,
+        'posture_feedback': ('standing', None, None)})
+    return stamp
+
+
+def watching(ros: Ros, *acting: tuple[str, int, Inhibition], wait_ns: int = PATIENT_NS
+             ) -> tuple[InhibitionNode, int]:
+    """A node that is started while the robot walks, with what others tell of the stop."""
     _, state, tick = walked(300)
     node = InhibitionNode('inhibition', context=ros.context)
     node.start()
-    if acting is not None:
-        node._others.hear('acting_gains', 0, acting)
-    for _ in range(PATIENT_TICKS + 1):
-        node.on_tick(state.time_ns, {
-            'canonical_state': (tick.x, tick.x_dot, tick.gait), 'reference': tick.r,
-            'posture_feedback': ('standing', None, None)})
-    return node, state.time_ns
+    for who, stamp_ns, what in acting:
+        node._others.hear(who, stamp_ns, what)
+    tick_at(node, state, tick)
+    return node, tick_at(node, state, tick, wait_ns)
 
 
 RUNS = Inhibition(False, np.zeros(4), 0.3)
+KNOWN = ('acting_gains', 1_000_000_000, RUNS)
+AT_FIRST = ('acting_gains', 0, Inhibition(True, np.zeros(4), 0.3, at_rest=True))
+STOPPED = Inhibition(True, np.zeros(4), 0.3, automatic=False)
 
 
 def test_while_nothing_is_known_of_the_gait_no_time_to_rest_is_promised(ros: Ros) -> None:
-    node, now = watching(ros, RUNS)
+    node, now = watching(ros, KNOWN)
     assert not node._state.requested
     told, answer = node._take_request(SetBool.Request(data=True))
     assert told and 'at rest in' in answer
@@ -83,18 +95,54 @@ def test_while_nothing_is_known_of_the_gait_no_time_to_rest_is_promised(ros: Ros
 
 
 def test_a_restarted_node_keeps_a_stop_and_does_not_stop_a_gait(ros: Ros) -> None:
-    for acting in (RUNS, Inhibition(True, np.zeros(4), 0.3, automatic=False)):
-        node, _ = watching(ros, acting)
+    for acting in (RUNS, STOPPED):
+        node, _ = watching(ros, ('acting_gains', 1_000_000_000, acting))
         assert (node._state.requested, node._state.automatic) == (
             acting.requested, acting.automatic)
         node.destroy_node()
-    node, _ = watching(ros, None)  # nobody knows: only the service starts
+    node, _ = watching(ros)  # nobody knows: only the service starts
     assert node._state.requested and not node._state.automatic
     node.destroy_node()
 
 
+def test_what_restarted_oscillators_do_not_know_does_not_end_a_stop(ros: Ros) -> None:
+    """The robot may know of it, and its publishers are found seconds after theirs."""
+    node, _ = watching(ros, AT_FIRST, wait_ns=PATIENT_NS - TICK)
+    assert not node._joined  # neither the robot nor what it keeps is there
+    node._others.hear('kept_gains', 1_000_000_000, STOPPED)
+    _, state, tick = walked(300)
+    tick_at(node, state, tick, PATIENT_NS - TICK)
+    assert node._state.requested and not node._state.automatic
+    node.destroy_node()
+    node, _ = watching(ros, AT_FIRST)
+    assert node._state.requested and not node._state.automatic
+    node.destroy_node()
+
+
+def test_a_robot_that_cannot_tell_of_a_stop_is_not_waited_for(ros: Ros) -> None:
+    robot = ros.node.create_publisher(JointState, 'joint_states', 1)
+    ros.spin_until(lambda: ros.node.count_publishers('joint_states') == 1)
+    node, _ = watching(ros, AT_FIRST, wait_ns=BRIEF_NS)
+    assert node._state.requested and node._state.automatic
+    node.destroy_node()
+    ros.node.destroy_publisher(robot)
+
+
+@pytest.mark.parametrize('stop', [True, False])
+def test_what_is_asked_of_a_node_that_has_just_come_back_is_not_lost(
+        ros: Ros, stop: bool) -> None:
+    node, now = watching(ros, KNOWN, wait_ns=TICK)
+    assert not node._joined
+    accepted, answer = node._take_request(SetBool.Request(data=stop))
+    assert accepted, answer
+    _, state, tick = walked(300)
+    tick_at(node, state, tick, now + TICK - state.time_ns)
+    assert node._state.requested is stop
+    node.destroy_node()
+
+
 def test_the_gait_stops_while_the_robot_looks_after_itself(ros: Ros) -> None:
-    node, _ = watching(ros, RUNS)
+    node, _ = watching(ros, KNOWN)
     node._on_drive(String(data='stand'))
     assert node._state.requested and node._state.automatic
     told, answer = node._take_request(SetBool.Request(data=False))

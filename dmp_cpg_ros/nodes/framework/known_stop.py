@@ -83,13 +83,29 @@ class OthersKnow:
     def __init__(self, node: SuiteNode, news: Heard) -> None:
         """Listen."""
         self.newest: tuple[int, Inhibition] | None = None
-        self._silent, self._news = set(TELLERS), news
+        self._node, self._silent, self._news = node, set(TELLERS), news
         listen(node, TELLERS, self.hear)
 
     @property
     def all_told(self) -> bool:
         """Whether everybody who can tell has."""
         return not self._silent
+
+    @property
+    def more_may_tell(self) -> bool:
+        """Whether somebody who can tell has not: one is in the graph, or no robot is there yet."""
+        return not self.all_told and (
+            any(map(self._node.count_publishers, self._silent))
+            or not self._node.count_publishers('joint_states'))
+
+    @property
+    def known(self) -> Inhibition | None:
+        """What acts, as far as it is certain: 0 is the stamp of oscillators that were restarted
+        too, and as long as somebody may know more, nothing follows from that.
+        """
+        if self.newest is None or (self.newest[0] <= 0 and self.more_may_tell):
+            return None
+        return self.newest[1]
 
     def hear(self, topic: str, stamp_ns: int, inhibition: Inhibition) -> None:
         """Take what is told on a topic."""

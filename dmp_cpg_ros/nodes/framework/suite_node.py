@@ -396,10 +396,10 @@ class SuiteNode(GuardedLifecycleNode):
         for subscription in list(self._not_waking.values()):
             drain(subscription)
 
-    def look_every(self, period_s: float) -> None:
-        """Call :meth:`look_after` with a period of wall time [s]."""
-        self._undo.append(partial(
-            self.destroy_timer, self.create_steady_timer(period_s, self.look_after)))
+    def look_every(self, period_s: float, look: Callable[[], None] | None = None) -> None:
+        """Call :meth:`look_after`, or something else, with a period of wall time [s]."""
+        self._undo.append(partial(self.destroy_timer, self.create_steady_timer(
+            period_s, look or self.look_after)))
 
     def serve(self, name: str, take: Callable[[Any], tuple[bool, str]]) -> None:
         """Create a service of the table; while the node is active, what takes its requests tells
