@@ -84,9 +84,8 @@ def disagreement(p: Any, xi: Any, b: F) -> list[list[F]]:
 
 def plane_rates(p: Any, u: Any, c: F, s: F, h: Any) -> list[F]:
     """What drives states on the edge of the half-plane n.y >= h into it, n = (c, -s)."""
-    r = p['radius']
-    return [x - p['omega_max'] * min(max(d - r * s, F(0)), r)
-            for x, d in zip(times(laplacian(p, 1), [r * c - x for x in h]), u, strict=True)]
+    both = zip(times(laplacian(p, 1), [p['radius'] * c - x for x in h]), u, strict=True)
+    return [x - p['omega_max'] * min(max(d - p['radius'] * s, F(0)), p['radius']) for x, d in both]
 
 
 def entry_height(p: Any, c: F, s: F, sine: F) -> F:
@@ -216,4 +215,5 @@ if __name__ == '__main__':
         with open(sys.argv[1], encoding='utf-8') as file:
             print('accepted:', *check(json.loads(file.read(2**20), object_pairs_hook=once)))
     except Exception as error:  # noqa: BLE001 - whatever goes wrong, it is no proof
-        sys.exit(f'{sys.argv[1]} is refused: {error!r:.200}')
+        print(f'{" ".join(sys.argv[1:])} is refused: {error!r:.200}', file=sys.stderr)
+        sys.exit(2 if isinstance(error, OSError) or not sys.argv[1:] else 1)

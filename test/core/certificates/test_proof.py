@@ -10,7 +10,7 @@ import copy
 import json
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import count
 from pathlib import Path
@@ -210,9 +210,11 @@ def test_the_checker_is_a_script_of_its_own(tmp_path: Path) -> None:
     found = proof(network())
     path.write_text(json.dumps(found), encoding='utf-8')
 
-    def status() -> int:
-        return subprocess.run([sys.executable, '-I', str(script), str(path)],
-                              capture_output=True, check=False).returncode
+    def status(arguments: Sequence[str] = (str(path),)) -> int:
+        ended = subprocess.run([sys.executable, '-I', str(script), *arguments],
+                               capture_output=True, text=True, check=False)
+        assert (ended.stdout + ended.stderr).count('\n') == 1
+        return ended.returncode
 
     assert status() == 0
     text = path.read_text(encoding='utf-8')
@@ -222,3 +224,5 @@ def test_the_checker_is_a_script_of_its_own(tmp_path: Path) -> None:
                     text.replace('"rho": "8"', '"rho": "8e999999999"'), '[' * 100_000):
         path.write_text(changed, encoding='utf-8')
         assert changed != text and status() == 1
+    path.unlink()
+    assert status() == 2 and status([]) == 2
