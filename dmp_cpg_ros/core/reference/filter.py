@@ -209,8 +209,9 @@ class ReferenceSystem:
         if share < 1.0:
             before, change = r[:2], following[:2] - r[:2]
             if following[:2] @ following[:2] <= before @ before:
-                share = max(share, float(
-                    (1.0 - kept) * np.sqrt((before @ before) / (change @ change))))
+                to_rest = (1.0 - kept) * float(np.sqrt(before @ before))
+                share = max(share, min(to_rest, self.parameters.max_acceleration * dt)
+                            / float(np.sqrt(change @ change)))
             self.limited = share < 1.0
             if self.limited:
                 following[:2] = before + share * change
