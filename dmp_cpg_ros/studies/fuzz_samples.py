@@ -232,8 +232,7 @@ def read(kind: str, path: Path, out: Path) -> int:
             try:
                 runpy.run_path(str(check_proof.__file__), run_name='__main__')
             except SystemExit as ended:
-                print(ended.code, file=sys.stderr)
-                return NO_PROOF
+                return int(ended.code or 0)
             return 0
     return run_command(argparse.ArgumentParser(prog=kind), [], lambda *_: READERS[kind](path, out))
 

@@ -215,5 +215,5 @@ if __name__ == '__main__':
         with open(sys.argv[1], encoding='utf-8') as file:
             print('accepted:', *check(json.loads(file.read(2**20), object_pairs_hook=once)))
     except Exception as error:  # noqa: BLE001 - whatever goes wrong, it is no proof
-        print(f'{" ".join(sys.argv[1:])} is refused: {error!r:.200}', file=sys.stderr)
+        print(f'{" ".join(sys.argv[1:]) or "no file"} is refused: {error!r:.200}', file=sys.stderr)
         sys.exit(2 if isinstance(error, OSError) or not sys.argv[1:] else 1)
