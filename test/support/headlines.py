@@ -3,7 +3,7 @@
 """What the documents say of studies, made from the files that their commands write.
 
 ``python headlines.py`` (``make headlines``) writes the headlines of the README anew, and prints
-what ``doc/results.md`` should say and does not.
+what ``doc/results.md`` and others should say and do not.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ FOLDER = ROOT / 'doc' / 'results'
 """Where the files are, named as the sections: ``COMMAND --json doc/results/SECTION.json``."""
 
 STOPS = ROOT / 'doc' / 'stops.md'
-"""The table that ``study_stops`` prints."""
+"""The tables that ``study_stops`` prints, of :func:`stops` and of :func:`brisk_stops`."""
 
 
 def table_of_studies() -> dict[str, list[str]]:
@@ -97,6 +97,28 @@ def stops(rows: Sequence[dict[str, str]]) -> str:
         f'stood {least[0]} %, walked on {least[1]} % at worst')
     return (f'{count:,} stops: {fell} falls, {fate}, bound {over or "never"} exceeded; freezing '
             f'all phases instead: {sum(int(row["fell"]) for row in of["freeze"])} falls')
+
+
+def brisk_stops(rows: Sequence[dict[str, str]]) -> str:
+    """Of the table of brisk stops in ``doc/stops.md``."""
+    *cases, whole = rows
+    over, bounded = whole['over bound'].split('/')
+    assert bounded == whole['cases'] and whole['prediction error %'] == '0.0 / 0.0', whole
+    speeds_asked = [float(row['m/s']) for row in cases]
+    bounds = sorted({row['bound s'].split(' / ')[1] for row in cases})
+    typical, worst = whole['still s'].split(' / ')
+    return (f'with `inhibited_legs: [{whole_of(cases, "leg")}]` and `braking: '
+            f'{whole_of(cases, "braking")}`, {whole["cases"]} stops from {min(speeds_asked):g} to '
+            f'{max(speeds_asked):g} m/s at {whole_of(cases, "cases")} phases: '
+            f'{"no" if whole["fell"] == "0" else whole["fell"]} fall, the body stands after '
+            f'{typical} s (median), {worst} s at worst; bounds {" and ".join(bounds)} s, '
+            f'{"none" if over == "0" else over} exceeded')
+
+
+def whole_of(rows: Sequence[dict[str, str]], name: str) -> str:
+    """The one value that a column has in all rows."""
+    (value,) = {row[name] for row in rows}
+    return value
 
 
 def speeds(results: Any) -> str:
@@ -180,6 +202,14 @@ def stop_rows(rows: Sequence[dict[str, str]]) -> list[str]:
             for row in rows if row['gait'] == 'all']
 
 
+def brisk_rows(rows: Sequence[dict[str, str]]) -> list[str]:
+    """Rows of the table of brisk stops: gait and speed."""
+    names = ('still s', 'rest s', 'bound s', 'slip mm', 'm/s^2')
+    return [' | '.join((f'| {row["gait"]} {float(row["m/s"]):.1f}', *(
+        row[name].split(' / ')[1] if name == 'bound s' else row[name] for name in names))) + ' |'
+            for row in rows[:-1]]
+
+
 def speed_rows(results: Any) -> list[str]:
     """Rows of the table of speeds: straight ahead, gait by gait."""
     rows = []
@@ -243,28 +273,35 @@ class Study:
     headline : callable
         Content of its file → headline of the README.
     rows : callable
-        Content of its file → lines of ``doc/results.md``.
+        Content of its file → lines of the document.
+    document : str
+        Where its section is.
     """
 
     headline: Callable[[Any], str]
     rows: Callable[[Any], list[str]]
+    document: str = 'doc/results.md'
 
 
 STUDIES = {
     'the-experiment': Study(experiment, experiment_rows),
     'speeds': Study(speeds, speed_rows), 'changes-of-gait': Study(gaits, gait_rows),
     'tightness-of-the-certificates': Study(tightness, tightness_rows),
-    'falls': Study(falls, fall_rows), 'stops-at-every-phase': Study(stops, stop_rows)}
+    'falls': Study(falls, fall_rows), 'stops-at-every-phase': Study(stops, stop_rows),
+    'brisk-stops': Study(brisk_stops, brisk_rows, 'doc/walking.md')}
 """Studies that have a file, ``doc/results/ANCHOR.json``, by the anchor of their section; that of
 the experiment is a run's ``metrics.json``, and that of stops is :data:`STOPS`.
 """
 
 
+TABLES_OF_STOPS = ('stops-at-every-phase', 'brisk-stops')
+
+
 def content(anchor: str) -> Any:
     """What the command of a study has written."""
-    if anchor == 'stops-at-every-phase':
-        (rows,) = tables(STOPS.read_text(encoding='utf-8'))
-        return rows
+    if anchor in TABLES_OF_STOPS:
+        return dict(zip(TABLES_OF_STOPS, tables(STOPS.read_text(encoding='utf-8')), strict=True))[
+            anchor]
     return json.loads((FOLDER / f'{anchor}.json').read_text(encoding='utf-8'))
 
 
@@ -274,8 +311,8 @@ def headlines() -> dict[str, str]:
 
 
 def missing(anchor: str) -> list[str]:
-    """Lines that ``doc/results.md`` should have of a study, and has not."""
-    text = section(f'doc/results.md#{anchor}')
+    """Lines that the document should have of a study, and has not."""
+    text = section(f'{STUDIES[anchor].document}#{anchor}')
     return [row for row in STUDIES[anchor].rows(content(anchor)) if row not in text]
 
 
@@ -291,7 +328,7 @@ def main() -> int:
     README.write_text(text, encoding='utf-8')
     for anchor in STUDIES:
         for row in missing(anchor):
-            print(f'doc/results.md#{anchor} has not: {row}')
+            print(f'{STUDIES[anchor].document}#{anchor} has not: {row}')
     return 0
 
 
