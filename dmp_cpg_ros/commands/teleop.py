@@ -74,6 +74,7 @@ class Teleop:
     def __init__(self, client: SuiteClient) -> None:
         """Create clients, and listen to the state of the stop."""
         node, gains = client.node, InhibitionGainsReader()
+        self._requested: bool | None = None  # until it is known nothing is asked for
 
         def on_state(message: Any) -> None:
             self._word = read_state_word(message)
@@ -82,7 +83,7 @@ class Teleop:
             self._requested = gains.read(message).requested
 
         self.velocity = STILL
-        self._word, self._requested, self._shown = '', False, ''
+        self._word, self._shown = '', ''
         services = {key: interface(name) for key, name in SERVICES.items()}
         self._clients = {key: node.create_client(service.type, service.name)
                          for key, service in services.items()}
@@ -102,6 +103,8 @@ class Teleop:
         elif key == 'x':
             self.velocity = STILL
         elif key in self._clients:
+            if key == ' ' and self._requested is None:
+                return
             client = self._clients[key]
             request = client.srv_type.Request()
             if key == ' ':
@@ -111,7 +114,8 @@ class Teleop:
     def show(self) -> None:
         """Rewrite the last line of the terminal where it has changed."""
         v_x, _, yaw_rate = self.velocity
-        line = f'{v_x:+.1f} m/s, {yaw_rate:+.1f} rad/s, {self._word.replace("_", " ")}'
+        word = '' if self._requested is None else self._word.replace('_', ' ')
+        line = f'{v_x:+.1f} m/s, {yaw_rate:+.1f} rad/s, {word}'
         if line != self._shown:
             self._shown = line
             print(f'\r\x1b[K{line}', end='', flush=True)
