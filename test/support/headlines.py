@@ -107,15 +107,15 @@ def brisk_stops(rows: Sequence[dict[str, str]]) -> str:
     speeds_asked = [float(row['m/s']) for row in cases]
     bounds = sorted({row['bound s'].split(' / ')[1] for row in cases})
     typical, worst = whole['still s'].split(' / ')
-    return (f'with `inhibited_legs: [{whole_of(cases, "leg")}]` and `braking: '
-            f'{whole_of(cases, "braking")}`, {whole["cases"]} stops from {min(speeds_asked):g} to '
-            f'{max(speeds_asked):g} m/s at {whole_of(cases, "cases")} phases: '
+    return (f'with `inhibited_legs: [{value_of(cases, "leg")}]` and `braking: '
+            f'{value_of(cases, "braking")}`, {whole["cases"]} stops from {min(speeds_asked):g} to '
+            f'{max(speeds_asked):g} m/s at {value_of(cases, "cases")} phases: '
             f'{"no" if whole["fell"] == "0" else whole["fell"]} fall, the body stands after '
             f'{typical} s (median), {worst} s at worst; bounds {" and ".join(bounds)} s, '
             f'{"none" if over == "0" else over} exceeded')
 
 
-def whole_of(rows: Sequence[dict[str, str]], name: str) -> str:
+def value_of(rows: Sequence[dict[str, str]], name: str) -> str:
     """The one value that a column has in all rows."""
     (value,) = {row[name] for row in rows}
     return value

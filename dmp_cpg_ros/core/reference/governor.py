@@ -19,7 +19,7 @@ ellipse, and friction, of which a curve has |v| |γ| already, a circle:
 A quarter of ``max_acceleration`` is always allowed, or a reference could be stuck. The limits are
 those of the gait that is wanted, and the least ones where gaits are chosen by speed. Braking to
 rest is not limited (:mod:`~dmp_cpg_ros.core.reference.filter`), and slowing down towards another
-velocity only by friction.
+velocity only by ``max_acceleration``, whatever the curve.
 """
 
 from __future__ import annotations
