@@ -118,8 +118,7 @@ class CanonicalSystem:
         ndarray (2N, 2N)
         """
         matrix = self._kept_linear_part(gains)[0].copy()
-        own = self.oscillators.jacobian(x, np.broadcast_to(omega, (self.graph.size,)))
-        matrix[self._own] += own.ravel()
+        matrix[self._own] += self.oscillators.jacobian(x, omega).ravel()
         return matrix
 
     def _kept_linear_part(self, gains: Array) -> tuple[Array, Array]:
@@ -131,12 +130,12 @@ class CanonicalSystem:
             linear = self._linear[key] = self.linear_part(gains)
         return linear
 
-    def newton_step(self, x: Array, omega: float | Array, gains: Array) -> Array:
-        """States (N, 2) one of Newton's steps nearer to an equilibrium; LinAlgError where the
-        Jacobian is singular.
+    def newton_step(self, x: Array, omega: float | Array, gains: Array, field: Array) -> Array:
+        """States (N, 2) one of Newton's steps nearer to an equilibrium, from those with a known
+        field (N, 2); LinAlgError where the Jacobian is singular.
         """
-        off = self.field(x, omega, gains).ravel()
-        return x - np.linalg.solve(self.jacobian(x, omega, gains), off).reshape(x.shape)
+        step = np.linalg.solve(self.jacobian(x, omega, gains), field.ravel())
+        return x - step.reshape(x.shape)
 
     def step(self, x: Array, omega: float | Array, gains: Array, dt: float) -> Array:
         """Advance by one time step with ω and the gains held.

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from itertools import combinations
 
 from dmp_cpg_ros.core.certificates.certify import certificate_of
@@ -86,7 +87,7 @@ def certify_changes(parameters: SuiteParameters, gaits: Sequence[Gait], scale: B
             for row in whole.inequalities]
     rows = discharged(rows, alike=replace(setting, parameters=p).alike)
     if not until_lost or all(row.holds or not row.required for row in rows):
-        rows += _votes(p, networks, tick_s)
+        rows += _votes(p, gaits, scale, tick_s, acting_cadence)
     if ways and not required_only:
         rows.append(Inequality(
             'offset_rate', share * span.omega[1], whole['frequency_mismatch'].right, 'rad/s',
@@ -117,18 +118,27 @@ def refused_change(parameters: SuiteParameters, gaits: Sequence[Gait], scale: Bo
             f'{certificate.explained()}')
 
 
-def _votes(p: SuiteParameters, networks: Sequence[GaitNetwork], tick_s: float
-           ) -> list[Inequality]:
+def _votes(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale, tick_s: float,
+           acting_cadence: float | None) -> list[Inequality]:
     """What votes can do in the gaits, of each inequality the worst: their clamp follows the
     cadence, and a stop waits until a change of gait is over.
     """
     worst: dict[str, Inequality] = {}
-    for network in networks:
-        for row in vote_inequalities(Setting.of(network, p, tick_s)):
-            known = worst.get(row.name)
-            if known is None or not row.margin > known.margin:
-                worst[row.name] = replace(row, sentence=f'{row.sentence}, in {network.gait.name}')
+    for cadence in _cadences(p, acting_cadence):
+        for gait in gaits:
+            for row in _votes_in(p, gait, scale, tick_s, cadence):
+                known = worst.get(row.name)
+                if known is None or not row.margin > known.margin:
+                    worst[row.name] = replace(row, sentence=f'{row.sentence}, in {gait.name}')
     return list(worst.values())
+
+
+@lru_cache(maxsize=32)
+def _votes_in(p: SuiteParameters, gait: Gait, scale: BodyScale, tick_s: float, cadence: float
+              ) -> list[Inequality]:
+    """Of one gait at one cadence: what moves to a cadence and what has come there share it."""
+    network = GaitNetwork(replace(p.canonical, cadence_scale=cadence), gait, scale)
+    return vote_inequalities(Setting.of(network, p, tick_s))
 
 
 def _changed(row: Inequality, bound: float, leg: LegParameters, what: str) -> Inequality:
@@ -146,9 +156,14 @@ def _changed(row: Inequality, bound: float, leg: LegParameters, what: str) -> In
 def all_networks(p: SuiteParameters, gaits: Sequence[Gait], scale: BodyScale,
                  acting_cadence: float | None) -> list[GaitNetwork]:
     """Networks of all gaits, at the cadence of the parameters and at the one that acts."""
+    return [GaitNetwork(replace(p.canonical, cadence_scale=cadence), gait, scale)
+            for cadence in _cadences(p, acting_cadence) for gait in gaits]
+
+
+def _cadences(p: SuiteParameters, acting_cadence: float | None) -> list[float]:
+    """Factors on the cadence: of the parameters, and the one that acts where it is another."""
     cadence = p.canonical.cadence_scale
-    return [GaitNetwork(replace(p.canonical, cadence_scale=acting), gait, scale)
-            for acting in dict.fromkeys((cadence, acting_cadence or cadence)) for gait in gaits]
+    return list(dict.fromkeys((cadence, acting_cadence or cadence)))
 
 
 def _widened(p: SuiteParameters, networks: Sequence[GaitNetwork], share: float) -> OperatingRange:

@@ -52,8 +52,8 @@ class InhibitedEquilibrium:
     slowest_rate: float
 
 
-def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array,
-                          gains: Array) -> InhibitedEquilibrium | None:
+def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array, gains: Array,
+                          near: Array | None = None) -> InhibitedEquilibrium | None:
     """Equilibrium that grows out of the resting targets as ω rises from zero, by Newton's method.
 
     Parameters
@@ -64,12 +64,20 @@ def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array,
         Angular frequencies [rad/s].
     gains : ndarray (N,)
         Inhibition gains α_i that act [1/s].
+    near : ndarray (N, 2), optional
+        Stable equilibrium under gains that are not very different: the one that grows out of it
+        is taken where it is stable, too, at a third of the cost.
 
     Returns
     -------
     InhibitedEquilibrium or None
         None when the equilibrium ceases to exist before ω is reached: the oscillators break free.
     """
+    if near is not None:
+        x = _newton(system, near, np.asarray(omega), gains)
+        found = None if x is None else _described(system, x, omega, gains)
+        if found is not None and found.slowest_rate > 0.0:
+            return found
     x = _newton(system, system.target.copy(), 0.0 * np.asarray(omega), gains)
     if x is None:
         return None
@@ -83,8 +91,12 @@ def inhibited_equilibrium(system: CanonicalSystem, omega: float | Array,
             step *= 0.4
         if share == 1.0 or (following is None and step <= _SMALLEST_STEP):
             break
-    if share < 1.0:
-        return None
+    return None if share < 1.0 else _described(system, x, omega, gains)
+
+
+def _described(system: CanonicalSystem, x: Array, omega: float | Array, gains: Array
+               ) -> InhibitedEquilibrium:
+    """Everything about an equilibrium x."""
     rates = np.linalg.eigvals(system.jacobian(x, omega, gains)).real
     return InhibitedEquilibrium(
         x, wrapped(phase(x) - system.graph.phases), np.hypot(x[:, 0], x[:, 1]),
@@ -97,10 +109,11 @@ def _newton(system: CanonicalSystem, x: Array, omega: Array, gains: Array) -> Ar
     start = x
     scale = float(np.abs(system.linear_part(gains)[0]).max()) + 1.0
     for _ in range(12):
-        if np.abs(system.field(x, omega, gains)).max() < _CONVERGED * scale:
+        field = system.field(x, omega, gains)
+        if np.abs(field).max() < _CONVERGED * scale:
             return x
         try:
-            x = system.newton_step(x, omega, gains)
+            x = system.newton_step(x, omega, gains, field)
         except np.linalg.LinAlgError:
             return None
         if np.abs(x - start).max() > 0.5 * float(system.radius.max()):

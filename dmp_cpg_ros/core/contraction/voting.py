@@ -75,11 +75,16 @@ def rest_threshold(system: CanonicalSystem, omega: float | Array, voters: Sequen
         Found by bisection on the equilibrium [1/s]: necessary for a stop, and tight; infinite when
         no weight is enough.
     """
+    near: Array | None = None
+
     def rests(alpha: float) -> bool:
+        nonlocal near
         gains = _votes(system, voters, alpha)
-        rest = inhibited_equilibrium(system, omega, gains)
-        return (rest is not None and rest.slowest_rate > 0.0
-                and bool(np.all(rest.distance[gains > 0.0] <= region_radius)))
+        rest = inhibited_equilibrium(system, omega, gains, near)
+        if rest is None or not rest.slowest_rate > 0.0:
+            return False
+        near = rest.state
+        return bool(np.all(rest.distance[gains > 0.0] <= region_radius))
 
     return _threshold(rests, _scale(system, omega, region_radius))
 

@@ -266,7 +266,7 @@ class GaitNetwork:
         system, _ = self._frame(inhibition.rest_phase)
         omega, gains = self.omega(r), inhibition.acting_gains(x, system.target)
         for _ in range(6):
-            x = system.newton_step(x, omega, gains)
+            x = system.newton_step(x, omega, gains, system.field(x, omega, gains))
         held = np.array_equal(inhibition.acting_gains(x, system.target), gains)
         return x if held and np.abs(self.rate(x, r, inhibition)).max() <= AT_REST else None
 

@@ -41,6 +41,7 @@ a common arc is a faster or slower cycle for all. The rule, in this order:
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from itertools import product
 from math import exp, inf
 
@@ -111,7 +112,8 @@ class GaitTransition:
         """Choose the arcs."""
         before, after = self.before, self.after
         middle = [float(np.median(gait.duty_factor)) for gait in (before, after)]
-        arcs = arcs_between(before.rest - before.lag, after.rest - after.lag, *middle)
+        arcs = _arcs((before.rest - before.lag).tobytes(), (after.rest - after.lag).tobytes(),
+                     *middle)
         rest_arc = (after.rest - before.rest + 0.5) % 1.0 - 0.5
         moves = arcs - arcs[0] + round(float(before.lag[0] - after.lag[0]), 12)
         vars(self).update(arcs=arcs, rest_arc=rest_arc, offset_arcs=moves)
@@ -305,6 +307,14 @@ def arcs_between(places: Array, new_places: Array, duty: float, new_duty: float)
         if _less(cost, least):
             best, least = arcs, cost
     return best
+
+
+@lru_cache(maxsize=64)
+def _arcs(places: bytes, new_places: bytes, duty: float, new_duty: float) -> Array:
+    """Arcs of :func:`arcs_between`, kept: gaits change between the same few again and again."""
+    arcs = arcs_between(np.frombuffer(places), np.frombuffer(new_places), duty, new_duty)
+    arcs.setflags(write=False)
+    return arcs
 
 
 def crowding(places: Array, arcs: Array, duty: float, new_duty: float, grid: int = 48) -> float:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from dmp_cpg_ros.core.canonical.coupling import graph_from_edges, topology
@@ -37,6 +37,22 @@ def test_it_is_where_the_field_vanishes_and_the_simulation_ends(
         x = network.step(x, omega, gains, 0.004)
     assert np.abs(x - rest.state).max() < 1e-6
     assert np.allclose(rest.radius, np.linalg.norm(x, axis=1), atol=1e-6)
+
+
+@settings(max_examples=60)
+@given(name=st.sampled_from(['all_to_all', 'ring', 'path', 'star', 'directed_ring']),
+       gain=st.floats(10.0, 300.0), omega=st.floats(0.0, 30.0), node=st.integers(0, 3),
+       other=st.floats(0.3, 3.0))
+def test_from_a_rest_nearby_it_is_the_one_that_grows_out_of_the_targets(
+        name: str, gain: float, omega: float, node: int, other: float) -> None:
+    network, gains = system(name, gain), np.zeros(4)
+    gains[node] = 600.0
+    nearby = inhibited_equilibrium(network, omega, other * gains)
+    assume(nearby is not None and nearby.slowest_rate > 0.0)
+    near = inhibited_equilibrium(network, omega, gains, nearby.state)
+    grown = inhibited_equilibrium(network, omega, gains)
+    assert (near is None) == (grown is None)
+    assert near is None or np.abs(near.state - grown.state).max() < 1e-8
 
 
 @pytest.mark.parametrize(('gain', 'omega'), [(10.0, 8.8), (30.0, 8.8), (100.0, 8.8)])
