@@ -238,7 +238,7 @@ class PostureController:
             np.array([part for (x, y), up in zip(shift, raised, strict=True)
                       for part in (x, y, up)]).reshape(-1, 3),
             np.array(self.placement.drift(
-                self.placement.yielding(p, reference[0], gait.apart), measured, planned, swings,
+                self.placement.yielding(p, reference[0], gait.firm), measured, planned, swings,
                 sway.velocity)),
             np.array(correction), command, state.joint_position, believed(state.foot_force),
             self._margins(R_ground_base, feet, swings, (lean_x, lean_y), (

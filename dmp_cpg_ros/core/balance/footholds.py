@@ -196,12 +196,13 @@ class FootPlacement:
             raised.append(clamped(gain * lost, -limit, limit))
         return raised
 
-    def yielding(self, p: PostureParameters, v_x: float, apart: float) -> float:
+    def yielding(self, p: PostureParameters, v_x: float, firm: float) -> float:
         """Share of an error of the velocity with which standing feet go along.
 
         Feet that hold a body which goes backwards roll it to one side, where it stays: they go
         along further, by ``BACKWARDS`` of what is left from a dimensionless speed of ``QUICK`` on.
-        Not where all legs swing together: they pitch it the more the less they hold it.
+        Not where all legs swing together: they pitch it the more the less they hold it; nor where
+        one side stands alone, which they roll the more.
 
         Parameters
         ----------
@@ -209,13 +210,13 @@ class FootPlacement:
             Gains.
         v_x : float
             Reference [m/s].
-        apart : float
-            Of the gait: 0 where all legs swing together, else 1.
+        firm : float
+            Of the gait: 0 where all legs swing together or one side stands alone, else 1.
         """
         if v_x >= 0.0:
             return p.yielding
         quick = min(1.0, -v_x / (QUICK * (GRAVITY * self._leg_length) ** 0.5))
-        return p.yielding + apart * BACKWARDS * quick * (1.0 - p.yielding)
+        return p.yielding + firm * BACKWARDS * quick * (1.0 - p.yielding)
 
     def drift(self, yielding: float, measured: Triple, planned: Triple,
               activity: Sequence[float], sway_velocity: float = 0.0) -> list[Pair]:

@@ -29,8 +29,13 @@ from dmp_cpg_ros.core.maths.constants import GRAVITY
 from dmp_cpg_ros.core.maths.vec3 import Triple
 from dmp_cpg_ros.core.robot_model.state import LEGS
 
-BACKWARD_WEIGHT = 1.3
-"""Weight of speed backwards, by the highest speed of a gait whose legs all swing together."""
+BACKWARD_WEIGHT, ONE_SIDED_WEIGHT = 1.3, 2.0
+"""Weights of speed backwards, by the highest speed: of a gait whose legs all swing together, and
+of one that stands on one side only.
+"""
+
+WIDE_STANCE = 0.75
+"""Share of stance on both sides from which on a gait counts as standing on both."""
 
 LATERAL_WEIGHT = 2.0
 """Weight of speed across the body in the speed by which a gait chooses its cadence."""
@@ -68,29 +73,22 @@ class BodyScale:
         """Speed u √(g l) of a dimensionless one u [m/s]."""
         return dimensionless * (GRAVITY * self.leg_length) ** 0.5
 
-    def foot_speed(self, v_x: float, v_y: float, gamma: float, apart: float = 1.0) -> float:
+    def foot_speed(self, v_x: float, v_y: float, gamma: float, apart: float = 1.0,
+                   backwards: float = 1.0) -> float:
         """Speed by which a gait chooses its cadence: a bound on that of any stance foot [m/s].
 
         Speed sideways and from turning counts ``LATERAL_WEIGHT`` times: across the body the feet
         have about half the room. By a highest speed it counts 1/``rolling`` times where a gait's
-        legs swing together, with ``apart`` 0, and speed backwards ``BACKWARD_WEIGHT`` times.
+        legs swing together, with ``apart`` 0, and speed backwards ``backwards`` times; both are
+        the gait's.
         """
         weight = LATERAL_WEIGHT
         if apart < 1.0:
             weight += (1.0 - apart) * max(0.0, 1.0 / self.rolling - weight)
-            v_x *= 1.0 if v_x >= 0.0 else 1.0 + (1.0 - apart) * (BACKWARD_WEIGHT - 1.0)
+        v_x *= 1.0 if v_x >= 0.0 else backwards
         across = weight * v_y
         return float(
             (v_x * v_x + across * across) ** 0.5 + weight * abs(gamma) * self.hip_radius)
-
-    def limited(self, velocity: Triple, highest_speed: float, largest_curve: float = inf,
-                apart: float = 1.0) -> Triple:
-        """Velocity (v_x, v_y, γ) within a dimensionless highest speed and the largest curve, as a
-        share of g, that goes with it [m/s], [rad/s], see
-        :mod:`~dmp_cpg_ros.core.gait.speed_limit`; ``apart`` is that of the gait.
-        """
-        return within_limit(velocity, self.foot_speed(*velocity, apart),
-                            self.speed(highest_speed), largest_curve * GRAVITY)
 
 
 class Pace(NamedTuple):
@@ -128,6 +126,8 @@ class CycleOfLegs(ABC):
         The same while gaits change, which moves them.
     apart : float
         0 where all legs swing together, which turns the body, else 1; between while gaits change.
+    two_sided : float
+        Share of stance with feet of both sides on the ground, where it is shortest.
     rest_rate : float
         Rate of the rest phase, to be added to the rate of a leg's phase [rad/s]; 0, other than
         while gaits change.
@@ -137,6 +137,7 @@ class CycleOfLegs(ABC):
     phases: Array
     moving_phases: Array | None = None
     apart: float = 1.0
+    two_sided: float = 1.0
     rest_rate: float = 0.0
     _paced: tuple[tuple[float, ...], Pace] | None = None
 
@@ -166,6 +167,33 @@ class CycleOfLegs(ABC):
         """
         return omega
 
+    @property
+    def wide(self) -> float:
+        """1 where feet of both sides stand for long enough, 0 where one side stands alone."""
+        return min(1.0, self.two_sided / WIDE_STANCE)
+
+    @property
+    def firm(self) -> float:
+        """1 where some legs stand on both sides meanwhile, 0 where all swing together or one side
+        stands alone.
+        """
+        return self.apart * self.wide
+
+    def limiting_speed(self, velocity: Triple, scale: BodyScale) -> float:
+        """Foot speed of a velocity (v_x, v_y [m/s], γ [rad/s]) that counts by the highest speed
+        [m/s].
+        """
+        backwards = (1.0 + (1.0 - self.apart) * (BACKWARD_WEIGHT - 1.0)
+                     + (1.0 - self.wide) * (ONE_SIDED_WEIGHT - 1.0))
+        return scale.foot_speed(*velocity, self.apart, backwards)
+
+    def limited(self, velocity: Triple, scale: BodyScale, largest_curve: float = inf) -> Triple:
+        """Velocity (v_x, v_y [m/s], γ [rad/s]) within the highest speed and the largest curve, as
+        a share of g, that goes with it: :mod:`~dmp_cpg_ros.core.gait.speed_limit`.
+        """
+        return within_limit(velocity, self.limiting_speed(velocity, scale),
+                            scale.speed(self.highest(scale)), largest_curve * GRAVITY)
+
     def pace(self, r: Array, scale: BodyScale) -> Pace:
         """What the gait makes of a reference (v_x, v_y, γ), ndarray (3,); the last answer is
         kept, for the body and its legs ask in turn.
@@ -173,7 +201,7 @@ class CycleOfLegs(ABC):
         v_x, v_y, gamma = r.tolist()
         asked = (v_x, v_y, gamma, scale.leg_length, scale.hip_radius, scale.rolling, scale.swing)
         if self._paced is None or self._paced[0] != asked:
-            velocity = scale.limited((v_x, v_y, gamma), self.highest(scale), apart=self.apart)
+            velocity = self.limited((v_x, v_y, gamma), scale)
             speed = scale.foot_speed(*velocity)
             omega, duty = self.omega(speed, scale), self.duty(speed, scale)
             pace = Pace(velocity, omega, self.own_omegas(omega), duty)
@@ -210,8 +238,6 @@ class Gait(CycleOfLegs):
         Dimensionless stride frequencies.
     duty_factor : ndarray (n,)
         Fraction β of the cycle that a foot is planned to stand, in (0, 1).
-    two_sided : float
-        Share of stance with feet of both sides on the ground, where it is shortest.
     steps : int
         How often in a cycle feet come down.
     highest_speed : float

@@ -319,7 +319,7 @@ class RunningGait:
         if inhibition.requested or isinstance(gait, BlendedGait):
             return network, x
         v_x, v_y, gamma = r.tolist()
-        speed = self.scale.foot_speed(v_x, v_y, gamma, wanted.apart)
+        speed = wanted.limiting_speed((v_x, v_y, gamma), self.scale)
         most = (wanted.highest(self.scale) if self.choice.auto_gait
                 else changing_speed(gait, wanted, self.scale))
         if speed > HASTE * self.scale.speed(most):

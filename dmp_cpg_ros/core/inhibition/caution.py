@@ -35,14 +35,14 @@ bear, and twice that.
 LEAST = 0.1
 """Least share: with none a robot that is held, or wrong about its speed, would not move again."""
 
-NARROW, WIDE_STANCE = 0.5, 0.75
-"""q of a gait that stands on one side only, and the share of stance on both from which it is 1."""
+NARROW = 0.5
+"""q of a gait that stands on one side only."""
 
 REGAIN = 1.0
 """Rate at which the share grows again [1/s]: a cycle or two to test what has been given back."""
 
 
-def room(margins: Sequence[float] | None, leg_length: float, two_sided: float) -> float | None:
+def room(margins: Sequence[float] | None, leg_length: float, wide: float) -> float | None:
     """Least margin of the capture point, in q l.
 
     Parameters
@@ -51,12 +51,12 @@ def room(margins: Sequence[float] | None, leg_length: float, two_sided: float) -
         To the edges of the support polygon [m], where they are known.
     leg_length : float
         l [m].
-    two_sided : float
-        Share of stance with feet of both sides on the ground, of the gait.
+    wide : float
+        Of the gait: 1 where feet of both sides stand, 0 where one side stands alone.
     """
     if margins is None:
         return None
-    q = NARROW + (1.0 - NARROW) * min(1.0, two_sided / WIDE_STANCE)
+    q = NARROW + (1.0 - NARROW) * wide
     return min(margins) / (q * leg_length)
 
 
@@ -86,5 +86,5 @@ def changing_share(network: GaitNetwork, wanted: Gait, command: tuple[float, flo
     if network.gait.name == wanted.name:
         return 1.0
     most = network.scale.speed(changing_speed(network.gait, wanted, network.scale))
-    speed = network.scale.foot_speed(*command, wanted.apart)
+    speed = wanted.limiting_speed(command, network.scale)
     return 1.0 if speed <= most else most / speed

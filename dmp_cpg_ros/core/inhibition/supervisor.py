@@ -176,7 +176,7 @@ class GaitSupervisor:
         """Follow less of the command, and step faster, while the body is disturbed; follow at most
         a share of it while the gait changes.
         """
-        p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.two_sided)
+        p, left = self.parameters, room(margins, network.scale.leg_length, network.gait.wide)
         predicted = state.requested or state.state == 'releasing'
         share = 1.0
         if not (predicted or state.push.acts):

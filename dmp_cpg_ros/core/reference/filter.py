@@ -128,9 +128,8 @@ class CommandGate:
         if self._scale is None or self._fastest is None:
             return self._command
         gait = self._fastest
-        limited = self._scale.limited(
-            self._command, gait.highest(self._scale), self.parameters.max_curve * gait.two_sided,
-            gait.apart)
+        limited = gait.limited(
+            self._command, self._scale, self.parameters.max_curve * gait.two_sided)
         if limited != self._command:
             self.limited_by = 'gait'
         return limited

@@ -18,9 +18,9 @@ from hypothesis import strategies as st
 from dmp_cpg_ros.core.balance.controller import PostureController, PostureParameters
 from dmp_cpg_ros.core.canonical.phase import state_at
 from dmp_cpg_ros.core.errors import ParameterError
-from dmp_cpg_ros.core.gait.gait import BACKWARD_WEIGHT, BodyScale, Gait
+from dmp_cpg_ros.core.gait.gait import BACKWARD_WEIGHT, ONE_SIDED_WEIGHT, BodyScale, Gait
 from dmp_cpg_ros.core.gait.running import HASTE, GaitChoiceParameters, limiting_gaits
-from dmp_cpg_ros.core.gait.speed_limit import blended_limit, swing_acceleration
+from dmp_cpg_ros.core.gait.speed_limit import blended_limit, swing_acceleration, within_limit
 from dmp_cpg_ros.core.gait.transition import (
     CHANGING,
     BlendedGait,
@@ -50,7 +50,7 @@ FAST = (4.0, 0.4, 0.5)
 def test_a_velocity_is_shortened_and_keeps_its_curve(
         velocity: tuple[float, float, float], most: float) -> None:
     scale = BodyScale(0.28, 0.2)
-    short = scale.limited(velocity, most)
+    short = within_limit(velocity, scale.foot_speed(*velocity), scale.speed(most))
     reached, speed = scale.foot_speed(*short), scale.foot_speed(*velocity)
     assert reached <= most * (GRAVITY * 0.28) ** 0.5 * (1.0 + 1e-12)
     share = reached / speed if speed > 0.0 else 1.0
@@ -68,7 +68,8 @@ def test_a_fast_command_leaves_less_for_its_curve(
         speed = scale.foot_speed(*v) / (most * (GRAVITY * 0.28) ** 0.5)
         return speed ** 2 + (np.hypot(v[0], v[1]) * v[2] / (curve * GRAVITY)) ** 2
 
-    short = scale.limited(velocity, most, curve)
+    short = within_limit(velocity, scale.foot_speed(*velocity), scale.speed(most),
+                         curve * GRAVITY)
     assert np.allclose(np.cross(short, velocity), 0.0, atol=1e-12)
     assert np.dot(short, velocity) >= 0.0
     if share(velocity) > 1.0:
@@ -165,7 +166,7 @@ def test_commands_are_followed_up_to_the_gait_or_the_fastest_that_may_be_chosen(
     0.4, 1.0)])
 def test_legs_posture_and_cadence_take_the_same_velocity(gait: object) -> None:
     """What exceeds the limit is as if the limit had been asked for."""
-    short = SCALE.limited(FAST, gait.highest(SCALE))  # type: ignore[attr-defined]
+    short = gait.limited(FAST, SCALE)  # type: ignore[attr-defined]
     speeds = [SCALE.foot_speed(*velocity) for velocity in (FAST, short)]
     assert speeds[1] < 0.99 * speeds[0]
     assert np.allclose(*([gait.omega(u, SCALE), gait.duty(u, SCALE)] for u in speeds))  # type: ignore[attr-defined]
@@ -248,12 +249,11 @@ def test_gaits_change_at_a_speed_that_is_neithers_limit_and_walk_on(
     for _ in range(1500):
         assert run.walk(0.004)
         if isinstance(run.loop.network.gait, BlendedGait):
-            fastest = max(fastest, SCALE.foot_speed(*run.loop.r.tolist(), GAITS[after].apart))
+            fastest = max(fastest, GAITS[after].limiting_speed(run.loop.r.tolist(), SCALE))
     assert 0.9 * most < fastest <= HASTE * most
     assert run.loop.network.gait.name == after and run.loop.stop.share > 0.9
     reached = np.mean([state.base_velocity_in_base[0] for state in run.states[-250:]])
-    wanted = SCALE.limited((speed, 0.0, 0.0), GAITS[after].highest_speed,
-                           apart=GAITS[after].apart)[0]
+    wanted = GAITS[after].limited((speed, 0.0, 0.0), SCALE)[0]
     assert reached == pytest.approx(wanted, rel=0.2)  # a pronk swings about its speed
 
 
@@ -270,18 +270,20 @@ def test_who_has_the_gait_that_is_wanted_follows_all_of_the_command() -> None:
     assert changing_share(network, network.gait, command) == 1.0
     share = changing_share(network, walk, command)
     shortened = tuple(share * value for value in command)
-    assert network.scale.foot_speed(*shortened, walk.apart) == pytest.approx(
+    assert walk.limiting_speed(shortened, network.scale) == pytest.approx(
         network.scale.speed(CHANGING * walk.highest_speed))
     assert changing_share(network, walk, (0.0, 0.0, 0.0)) == 1.0
 
 
-@given(velocity=velocities, factor=st.floats(0.1, 3.0))
-def test_backwards_a_pronk_is_granted_less_and_others_are_granted_the_same(
-        velocity: tuple[float, float, float], factor: float) -> None:
-    v_x, v_y, gamma = velocity
+@given(velocity=velocities, factor=st.floats(0.1, 3.0), name=st.sampled_from(sorted(GAITS)))
+def test_backwards_a_pronk_and_a_pace_are_granted_less_and_others_the_same(
+        velocity: tuple[float, float, float], factor: float, name: str) -> None:
+    (v_x, v_y, gamma), gait = velocity, GAITS[name]
     ahead, back = (abs(v_x), v_y, gamma), (-abs(v_x), v_y, gamma)
     assert SCALE.foot_speed(*back) == SCALE.foot_speed(*ahead)
-    assert SCALE.foot_speed(*back, 0.0) >= SCALE.foot_speed(*ahead, 0.0)
-    assert SCALE.foot_speed(-1.0, 0.0, 0.0, 0.0) == BACKWARD_WEIGHT
+    counted = gait.limiting_speed(back, SCALE)
+    assert counted >= gait.limiting_speed(ahead, SCALE)
+    weight = {'pronk': BACKWARD_WEIGHT, 'pace': pytest.approx(ONE_SIDED_WEIGHT, abs=0.2)}
+    assert gait.limiting_speed((-1.0, 0.0, 0.0), SCALE) == weight.get(name, 1.0)
     scaled = tuple(factor * value for value in back)  # curves are shortened by one factor
-    assert SCALE.foot_speed(*scaled, 0.0) == pytest.approx(factor * SCALE.foot_speed(*back, 0.0))
+    assert gait.limiting_speed(scaled, SCALE) == pytest.approx(factor * counted)
