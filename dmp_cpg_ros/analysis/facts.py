@@ -15,6 +15,10 @@ SPEED_TOLERANCE = 0.10
 REAL_TIME_FACTOR = 0.98
 """Least real-time factor of a run that was to keep wall time."""
 
+SLOW_MOTION = ('it walked in slow motion; walk --composed, --processes blocks or a lower --rate '
+               'takes less of the processor')
+"""What is said of a run that did not keep wall time."""
+
 COSTS = {'joint_work': 'from the work of every physics step',
          'joint_states': 'estimated from torque and speed at the stamps alone'}
 """What a cost of transport was taken from, in words."""
@@ -125,7 +129,8 @@ def _timing(timing: Mapping[str, Any], lock_step: bool | None) -> list[Fact]:
     kept = None if lock_step is None else factor >= REAL_TIME_FACTOR
     latency = _number(timing['latency_ms_p50'], 'median {:.2f} ms')
     late = _number(timing['latency_ms_p99'], '99% {:.2f} ms')
-    return [Fact('The suite kept wall time', f'real-time factor {factor:.3f}, {rate}', kept),
+    hint = '' if kept is not False else f'; {SLOW_MOTION}'
+    return [Fact('The suite kept wall time', f'real-time factor {factor:.3f}, {rate}{hint}', kept),
             Fact('Latency from state to last target', f'{latency}, {late}', None)]
 
 
