@@ -58,11 +58,12 @@ def tick_at(node: InhibitionNode, state: RobotState, tick: Any, after_ns: int = 
     return stamp
 
 
-def watching(ros: Ros, *acting: tuple[str, int, Inhibition], wait_ns: int = PATIENT_NS
-             ) -> tuple[InhibitionNode, int]:
+def watching(ros: Ros, *acting: tuple[str, int, Inhibition], wait_ns: int = PATIENT_NS,
+             lock_step: bool = False) -> tuple[InhibitionNode, int]:
     """A node that is started while the robot walks, with what others tell of the stop."""
     _, state, tick = walked(300)
-    node = InhibitionNode('inhibition', context=ros.context)
+    node = InhibitionNode('inhibition', context=ros.context, parameter_overrides=[
+        Parameter('lock_step', value=lock_step)])
     node.start()
     for who, stamp_ns, what in acting:
         node._others.hear(who, stamp_ns, what)
@@ -116,6 +117,19 @@ def test_what_restarted_oscillators_do_not_know_does_not_end_a_stop(ros: Ros) ->
     node.destroy_node()
     node, _ = watching(ros, AT_FIRST)
     assert node._state.requested and not node._state.automatic
+    node.destroy_node()
+
+
+def test_in_lock_step_the_tick_waits_until_it_is_known_what_acts(ros: Ros) -> None:
+    node, now = watching(ros, AT_FIRST, lock_step=True)  # no time but the clock's passes there
+    node._try_again()
+    assert not node._joined and node._state.time_ns < now
+    node._others.hear('kept_gains', 1_000_000_000, STOPPED)
+    node._try_again()
+    assert node._joined and node._state.time_ns == now
+    assert node._state.requested and not node._state.automatic
+    node._try_again()  # once
+    assert node._state.time_ns == now
     node.destroy_node()
 
 
