@@ -29,7 +29,6 @@ from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.studies import adversary_networks, adversary_rows
 from dmp_cpg_ros.studies.adversary_suite import (
     CONDITIONS,
-    Case,
     Oscillators,
     play,
     random_events,
@@ -37,11 +36,15 @@ from dmp_cpg_ros.studies.adversary_suite import (
     smaller,
     varied,
 )
+from dmp_cpg_ros.studies.draws import Case, smallest
 from dmp_cpg_ros.studies.workers import Workers
 from dmp_cpg_ros.suite import load_suite
 
 WEAKENED = tuple(dict.fromkeys((*adversary_networks.WEAKENED, *CONDITIONS, *adversary_rows.ROWS)))
 """Inequalities and conditions that can be left out, to see whether the search notices."""
+
+SHRINK_S = 10.0
+"""How long a network that fails is made smaller [s]."""
 
 FOLLOWING = ('rest_in_region',)
 """Rows that follow from others, as doc/certificate.md proves, so that nothing can be left out."""
@@ -121,7 +124,8 @@ def _smallest(failure: Case, weaken: str) -> Case:
     case, happened = dict(failure), adversary_networks.happened
     what = case.pop('happened')
     del case['attack']
-    case = adversary_networks.smaller(case, lambda one: happened(one, weaken)[:9] == what[:9])
+    case = smallest(case, adversary_networks.simpler,
+                    lambda one: happened(one, weaken)[:9] == what[:9], SHRINK_S)
     return {'attack': 'network', 'happened': happened(case, weaken), **case}
 
 

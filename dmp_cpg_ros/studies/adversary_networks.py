@@ -7,9 +7,8 @@ releases and accepted changes at random times and from the edges of what is cert
 from __future__ import annotations
 
 import math
-import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -29,15 +28,8 @@ from dmp_cpg_ros.core.contraction.synchronisation import (
 )
 from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.maths import Array
-from dmp_cpg_ros.studies.adversary_runs import (
-    EVENTS,
-    TICKS,
-    Case,
-    Certified,
-    Network,
-    Runs,
-    Setting,
-)
+from dmp_cpg_ros.studies.adversary_runs import EVENTS, TICKS, Certified, Network, Runs, Setting
+from dmp_cpg_ros.studies.draws import Case, both_ways, log_uniform, random_edges
 
 WEAKENED = ('synchronisation', 'contraction', 'capture', 'time_step', 'cycle_radius',
             'region_per_tick', 'places', 'holding')
@@ -176,17 +168,8 @@ def happened(case: Case, weaken: str = '') -> str:
     return '' if one is None else _run([one], weaken, Counter())[0].get(0, '')
 
 
-def smaller(case: Case, fails: Callable[[Case], bool], seconds: float = 10.0) -> Case:
-    """A case with fewer nodes, edges, settings and events and rounder numbers that still fails."""
-    end = time.monotonic() + seconds
-    simpler = _simpler(case)
-    while time.monotonic() < end and (trial := next(simpler, None)) is not None:
-        if fails(trial):
-            case, simpler = trial, _simpler(trial)
-    return case
-
-
-def _simpler(case: Case) -> Iterator[Case]:
+def simpler(case: Case) -> Iterator[Case]:
+    """Cases with fewer nodes, edges, settings and events, or rounder numbers."""
     for node in reversed(range(len(case['phases']) if len(case['phases']) > 1 else 0)):
         yield _without(case, node)
     for name in ('events', 'settings', 'edges'):
@@ -237,10 +220,8 @@ def _graph(rng: np.random.Generator, size: int) -> CouplingGraph:
     if kind in KINDS[:5]:
         edges = topology(kind, size)
     else:
-        pairs = {(i, int(rng.integers(i))) for i in range(1, size)}
-        more = rng.integers(size, size=(size, 2))
-        pairs |= {(int(i), int(j)) for i, j in more if i != j}
-        edges = tuple(sorted(pairs if kind == 'directed' else pairs | {(j, i) for i, j in pairs}))
+        edges = random_edges(size, rng)
+        edges = edges if kind == 'directed' else both_ways(edges)
     weight = {(i, j): float(np.exp(rng.uniform(-1.0, 1.0))) for i, j in edges}
     if kind != 'directed':
         slip = 0.02 if kind == 'unbalanced' else 0.0
@@ -263,7 +244,7 @@ def _draw(rng: np.random.Generator, size: int, weaken: str) -> Network | None:
     if rng.random() < 0.1:
         radii, D = list(radius * rng.uniform(0.9, 1.1, size)), radius * rng.uniform(0.9, 1.1)
     coarse = rng.random() < 0.15                             # fast cycles that hardly attract
-    rate = _spread(rng, 0.5, 4.0 if coarse else 30.0)
+    rate = log_uniform(rng, 0.5, 4.0 if coarse else 30.0)
     case = {'edges': [list(edge) for edge in graph.edges], 'gains': graph.gains.tolist(),
             'phases': graph.phases.tolist(), 'rho': rate / radius**2, 'radius': radii,
             'target_radius': D, 'tick_s': 0.0, 'settings': [], 'events': []}
@@ -279,13 +260,10 @@ def _draw(rng: np.random.Generator, size: int, weaken: str) -> Network | None:
             held.add(int(rng.integers(size)))
         entries.append({
             'coupling': k * (0.7 if weaken == 'synchronisation' else 1.0), 'held': sorted(held),
-            'inhibition': 1.0, 'omega': _spread(rng, *((15.0, 60.0) if coarse else (0.5, 30.0))),
-            'region_radius': radius * _spread(rng, 0.05, 0.3 if coarse else 1.2)})
+            'inhibition': 1.0,
+            'omega': log_uniform(rng, *((15.0, 60.0) if coarse else (0.5, 30.0))),
+            'region_radius': radius * log_uniform(rng, 0.05, 0.3 if coarse else 1.2)})
     return _just_certified(rng, case, entries, weaken)
-
-
-def _spread(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(math.log(low), math.log(high))))
 
 
 def _system(case: Case, entry: Case) -> CanonicalSystem:

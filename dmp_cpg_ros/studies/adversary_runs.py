@@ -12,7 +12,6 @@ from collections import Counter, defaultdict
 from copy import copy
 from dataclasses import dataclass
 from math import ceil, log2
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +21,7 @@ from dmp_cpg_ros.core.certificates.step import STEP_ERROR, mild_rate
 from dmp_cpg_ros.core.contraction.capture import CaptureSet
 from dmp_cpg_ros.core.contraction.hopf_bounds import growth
 from dmp_cpg_ros.core.maths import Array
+from dmp_cpg_ros.studies.draws import Case
 
 
 @dataclass(frozen=True)
@@ -184,8 +184,6 @@ anywhere, into their places, to the edge of C as inhibition sets in, and to the 
 
 ROUNDING = 1e-5
 """Share by which rounding and the step may lead out of C or of the box."""
-
-Case = dict[str, Any]
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from dmp_cpg_ros.core.certificates.step import SteppedNetwork, stepped_network
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.core.robot_model.description import RobotDescription
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
-from dmp_cpg_ros.studies.adversary_runs import Case
 from dmp_cpg_ros.studies.certificate_settings import Arguments, random_arguments
+from dmp_cpg_ros.studies.draws import Case, Judged
 
 Complex = NDArray[np.complex128]
 Analysed = tuple[Setting, NetworkAnalysis, SteppedNetwork | None]
@@ -85,7 +85,7 @@ def _drawn(case: Case) -> tuple[np.random.Generator, Setting, NetworkAnalysis,
     return (rng, s, analysis, found) if found is not None and found.proved else None
 
 
-def judge_capture(_: RobotDescription, case: Case, weaken: bool) -> tuple[str, float] | None:
+def judge_capture(_: RobotDescription, case: Case, weaken: bool) -> Judged:
     """No step leads out of the box, nor inhibited nodes farther than it says (line 8)."""
     drawn = _drawn(case)
     if drawn is None:
@@ -99,7 +99,7 @@ def judge_capture(_: RobotDescription, case: Case, weaken: bool) -> tuple[str, f
     return (f'leaves what a step keeps, to {far:.4g} of it' if far > 1.0 + 1e-9 else ''), far
 
 
-def judge_contraction(_: RobotDescription, case: Case, weaken: bool) -> tuple[str, float] | None:
+def judge_contraction(_: RobotDescription, case: Case, weaken: bool) -> Judged:
     """Steps take states of the box towards each other, in the weighted maximum norm (line 10)."""
     drawn = _drawn(case)
     if drawn is None:
@@ -122,8 +122,7 @@ def judge_contraction(_: RobotDescription, case: Case, weaken: bool) -> tuple[st
             ), left
 
 
-def judge_synchronisation(_: RobotDescription, case: Case, weaken: bool
-                          ) -> tuple[str, float] | None:
+def judge_synchronisation(_: RobotDescription, case: Case, weaken: bool) -> Judged:
     """Steps of free oscillators shrink their disagreement (line 1); of components that follow one
     another its weights are beyond rounding.
     """

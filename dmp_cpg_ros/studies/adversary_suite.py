@@ -27,6 +27,7 @@ from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.suite_parameters import SuiteParameters
 from dmp_cpg_ros.core.voting.parameters import SUM, WINNER_TAKE_ALL
 from dmp_cpg_ros.core.voting.voters import VoteSensors
+from dmp_cpg_ros.studies.draws import Case, log_uniform
 from dmp_cpg_ros.suite import load_gaits
 
 CONDITIONS = ('places', 'arming', 'acting', 'holding')
@@ -41,7 +42,6 @@ STRIDE = np.radians(200.0)
 """Turn of a leg at rest that counts as a stride [rad]: more than it may rest ahead."""
 
 GAITS = load_gaits()
-Case = dict[str, Any]
 
 
 class Oscillators(WalkingLoop):
@@ -261,7 +261,7 @@ def _change(rng: np.random.Generator, names: Sequence[str]) -> Case:
         return {name: tuple(rng.permutation(LEGS)[:count].tolist())}
     if name == 'coupling_graph':
         return {name: str(rng.choice(_GRAPHS))}
-    return {name: float(np.exp(rng.uniform(*np.log(_NUMBERS[name]))))}
+    return {name: log_uniform(rng, *_NUMBERS[name])}
 
 
 _LIMITS = {'max_lateral_speed': 0.0, 'max_turn_rate': 0.0}
@@ -281,8 +281,7 @@ def setting(rng: np.random.Generator, weaken: str = '') -> Case:
     for name in (*names, 'coupling_graph', 'inhibited_legs'):
         parameters |= _change(rng, [name])
     if guided:
-        parameters |= {name: float(np.exp(rng.uniform(*np.log(span))))
-                       for name, span in guided.items()}
+        parameters |= {name: log_uniform(rng, *span) for name, span in guided.items()}
         return {'gait': str(rng.choice(list(GAITS))), 'tick_s': 0.004, 'events': [],
                 'parameters': parameters}
     if rng.random() < 0.2:
@@ -321,8 +320,7 @@ def random_events(rng: np.random.Generator, voting: bool, weaken: str = '') -> l
             value = _votes(rng)
         elif kind == 'push':
             value = _push(rng)
-        wait = float(np.exp(rng.uniform(np.log(0.004), np.log(3.0))))
-        events.append([wait, kind, value])
+        events.append([log_uniform(rng, 0.004, 3.0), kind, value])
     return events
 
 
@@ -341,7 +339,7 @@ def _votes(rng: np.random.Generator) -> Case:
 
 def _push(rng: np.random.Generator) -> list[float]:
     """Margin [m], and how long it lasts [s]."""
-    return [float(rng.uniform(-0.05, 0.1)), float(np.exp(rng.uniform(np.log(0.004), np.log(1.0))))]
+    return [float(rng.uniform(-0.05, 0.1)), log_uniform(rng, 0.004, 1.0)]
 
 
 def _telling(rng: np.random.Generator, voting: bool, about: int | None = None
@@ -351,7 +349,7 @@ def _telling(rng: np.random.Generator, voting: bool, about: int | None = None
         return _change(rng, names)
 
     def soon() -> float:
-        return float(np.exp(rng.uniform(np.log(0.004), np.log(0.6))))
+        return log_uniform(rng, 0.004, 0.6)
 
     if voting and rng.random() < 0.7:                        # changes while votes hold the gait
         return [entry for _ in range(2) for entry in (

@@ -41,6 +41,7 @@ from dmp_cpg_ros.nodes.messages.cdr import serialized_reader
 from dmp_cpg_ros.paper import network as networks
 from dmp_cpg_ros.paper.oscillators import HopfOscillators
 from dmp_cpg_ros.robot.mujoco_robot import MujocoRobot
+from dmp_cpg_ros.studies.draws import both_ways
 from dmp_cpg_ros.studies.loop_recording import LoopRun
 from dmp_cpg_ros.studies.output import parser_of, write_results
 from dmp_cpg_ros.studies.tightness import network
@@ -289,7 +290,7 @@ def _random_edges(size: int) -> Edges:
     """Three chords from every node to random others, both ways."""
     rng = np.random.default_rng(1)
     chords = {(i, int(j)) for i in range(size) for j in rng.integers(0, size, 3) if i != j}
-    return tuple(sorted(chords | {(j, i) for i, j in chords}))
+    return both_ways(chords)
 
 
 def _classical(of: CanonicalSystem, x: Array, gains: Array) -> Array:

@@ -4,9 +4,9 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from itertools import product
 from typing import Any
 
@@ -29,6 +29,7 @@ from dmp_cpg_ros.core.reference.operating_range import operating_range
 from dmp_cpg_ros.core.robot_model.state import LEGS
 from dmp_cpg_ros.core.transformation.leg import LegParameters
 from dmp_cpg_ros.studies.adversary_runs import Setting
+from dmp_cpg_ros.studies.draws import log_uniform, random_edges
 from dmp_cpg_ros.suite import load_gaits
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring', 'directed')
@@ -54,7 +55,7 @@ class Case:
     contracts: bool
 
 
-@functools.lru_cache(maxsize=1)
+@lru_cache(maxsize=1)
 def grid() -> tuple[Case, ...]:
     """The whole grid."""
     rng = np.random.default_rng(4)
@@ -98,9 +99,7 @@ def random_arguments(rng: np.random.Generator) -> Arguments:
     """Draw a setting on any graph, with weights, one to four inhibited legs and a tick of 1 to
     10 ms, whose gains may or may not do.
     """
-    def some(low: float, high: float) -> float:
-        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
+    some = partial(log_uniform, rng)
     radius, growth = some(0.3, 1.6), some(0.5, 30.0)
     gain, graph = growth * some(1.5, 60.0), str(rng.choice([*GRAPHS, 'directed', 'cascade']))
     canonical = CanonicalParameters(
@@ -125,13 +124,6 @@ def random_arguments(rng: np.random.Generator) -> Arguments:
     leg = LegParameters(stiffness=some(400.0, 2e4), damping=some(20.0, 400.0),
                         activity_rate=some(5.0, 40.0), clearance=float(rng.uniform(0.0, 0.4)))
     return network, inhibition, reference, leg, POSTURE, float(rng.uniform(0.001, 0.01))
-
-
-def random_edges(size: int, rng: np.random.Generator) -> Edges:
-    """Directed edges among which node 0 reaches all."""
-    edges = {(i, int(rng.integers(i))) for i in range(1, size)}
-    edges |= {(int(i), int(j)) for i, j in rng.integers(size, size=(size, 2)) if i != j}
-    return tuple(sorted(edges))
 
 
 def _couple(network: GaitNetwork, graph: CouplingGraph) -> None:

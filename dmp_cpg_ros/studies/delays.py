@@ -32,6 +32,7 @@ from dmp_cpg_ros.core.contraction.delays import Capture
 from dmp_cpg_ros.core.contraction.inhibited import NONE, inhibited_contraction
 from dmp_cpg_ros.core.maths import Array
 from dmp_cpg_ros.paper.carried_slowly import slowly_carried_margin
+from dmp_cpg_ros.studies.draws import both_ways, random_edges
 from dmp_cpg_ros.studies.output import markdown_table
 
 Complex = NDArray[np.complex128]
@@ -131,9 +132,7 @@ def random_captures(rng: np.random.Generator, count: int, most: int = 8
     made = 0
     while made < count:
         size = int(rng.integers(2, most + 1))
-        pairs = {(i, int(rng.integers(i))) for i in range(1, size)}
-        pairs |= {(int(i), int(j)) for i, j in rng.integers(size, size=(size, 2)) if i != j}
-        edges = tuple(sorted(pairs | {(j, i) for i, j in pairs}))
+        edges = both_ways(random_edges(size, rng))
         weights = np.exp(rng.uniform(np.log(20.0), np.log(200.0), len(edges)))
         graph = CouplingGraph(size, edges, weights[:, None, None] * np.eye(2), np.zeros(size))
         rho, omega = np.exp(rng.uniform(np.log([0.5, 2.0]), np.log([20.0, 20.0])))

@@ -12,7 +12,8 @@ from core_examples import quadruped
 
 from dmp_cpg_ros.studies import adversary_networks, adversary_rows
 from dmp_cpg_ros.studies.adversary import FOLLOWING, WEAKENED, main, search
-from dmp_cpg_ros.studies.adversary_suite import CONDITIONS, Case, Oscillators, play, smaller
+from dmp_cpg_ros.studies.adversary_suite import CONDITIONS, Oscillators, play, smaller
+from dmp_cpg_ros.studies.draws import Case
 
 ROBOT = quadruped()
 

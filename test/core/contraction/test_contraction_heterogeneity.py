@@ -22,7 +22,7 @@ from dmp_cpg_ros.core.contraction.heterogeneity import (
 from dmp_cpg_ros.core.contraction.synchronisation import comparison_laplacian, synchronisation
 from dmp_cpg_ros.core.errors import ParameterError
 from dmp_cpg_ros.paper.transverse_metric import hopf_tube, metric_condition, tube_radius
-from dmp_cpg_ros.studies.certificate_settings import random_edges
+from dmp_cpg_ros.studies.draws import random_edges
 
 GRAPHS = ('all_to_all', 'ring', 'path', 'star', 'directed_ring')
 

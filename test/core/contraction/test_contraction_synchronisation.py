@@ -28,7 +28,7 @@ from dmp_cpg_ros.paper.matrix_measure import (
     hopf_jacobian_vertices,
     matrix_measure,
 )
-from dmp_cpg_ros.studies.certificate_settings import random_edges
+from dmp_cpg_ros.studies.draws import random_edges
 
 SEEDS = st.integers(0, 10_000)
 
