@@ -21,7 +21,7 @@ from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.nodes.framework.health import Durations
 from dmp_cpg_ros.studies import relays
 from dmp_cpg_ros.studies.process_usage import Usage, between, usage
-from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess
+from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess, ahead
 from dmp_cpg_ros.suite_table import PROCESSES, RECORDER, ROBOT
 
 SETTLE_S = 1.0
@@ -129,21 +129,15 @@ def run_suite(way: str, folder: Path, seconds: float, lock_step: bool = False,
     DmpCpgError
         If the suite does not come to walk.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    scenario, run = folder / 'scenario.yaml', Run()
-    scenario.write_text(json.dumps({  # ends by itself where nobody ends it
-        'name': 'bench', 'duration': 60.0 + 10.0 * seconds,
-        'events': [{'at': 0.5, 'command': {'v_x': 0.5}}]}))
-    begin, begin_s = time.monotonic(), time.time()
-    walk = WalkProcess([
-        str(scenario), '--no-report', '--out', str(folder / 'run'), '--namespace', namespace,
-        *FLAGS[way],
-        *['--lock-step'] * lock_step])
+    run, begin, begin_s = Run(), time.monotonic(), time.time()
+    walk = WalkProcess.of(  # ends by itself where nobody ends it
+        folder, 60.0 + 10.0 * seconds, ahead(), '--namespace', namespace, *FLAGS[way],
+        *['--lock-step'] * lock_step)
     try:
         walking_s = walk.said('walking')
         pids = {name: walk.pid_of(nodes) for name, nodes in shared(way).items()}
         if not all(pids.values()):
-            raise DmpCpgError(f'the suite does not walk: {"".join(walk.lines)}')
+            raise walk.failure()
         time.sleep(SETTLE_S)
         meet()
         run.watch(pids, seconds)

@@ -6,7 +6,6 @@ the node that judges them is without a tick meanwhile.
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -23,7 +22,7 @@ from dmp_cpg_ros.core.suite_parameters import CANONICAL
 from dmp_cpg_ros.nodes.framework.execution import make_executor
 from dmp_cpg_ros.nodes.messages.interfaces import interface
 from dmp_cpg_ros.nodes.messages.values import Array
-from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess
+from dmp_cpg_ros.studies.walk_process import WITHIN_S, WalkProcess, ahead
 
 JUDGE, OUTPUT = CANONICAL, 'canonical_state'
 
@@ -75,16 +74,9 @@ def judged_changes(way: Sequence[str], folder: Path, count: int) -> Judged:
     DmpCpgError
         If the suite does not come to walk, or does not answer.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    scenario = folder / 'scenario.yaml'
-    scenario.write_text(json.dumps({
-        'name': 'changes', 'duration': 600.0,
-        'events': [{'at': 0.5, 'command': {'v_x': 0.5}}]}))
-    walk = WalkProcess([str(scenario), '--no-report', '--out', str(folder / 'run'), *way])
-    context = Context()
+    walk, context = WalkProcess.of(folder, 600.0, ahead(), *way), Context()
     try:
-        if not walk.walks():
-            raise DmpCpgError(f'the suite does not walk: {"".join(walk.lines)}')
+        walk.must_walk()
         rclpy.init(context=context, args=[])
         return _ask(context, count)
     finally:

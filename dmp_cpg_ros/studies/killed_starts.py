@@ -11,7 +11,6 @@ such files in the end than in the beginning, of whatever process, or when a suit
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import random
 import signal
@@ -24,7 +23,8 @@ from pathlib import Path
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.studies.output import at_least_one, markdown_table, parser_of, write_results
-from dmp_cpg_ros.studies.walk_process import WalkProcess
+from dmp_cpg_ros.studies.process_usage import children
+from dmp_cpg_ros.studies.walk_process import WalkProcess, ahead
 
 FOLDER = Path('/dev/shm')
 
@@ -44,29 +44,11 @@ def files() -> dict[str, int]:
     return found
 
 
-def children(pid: int) -> list[int]:
-    """Processes that a process has started, and those that they have."""
-    found = []
-    for task in Path(f'/proc/{pid}/task').glob('*/children'):
-        with suppress(OSError):
-            for child in map(int, task.read_text().split()):
-                found += [child, *children(child)]
-    return found
-
-
-def start(folder: Path, duration_s: float) -> WalkProcess:
-    """Start a walk."""
-    scenario = folder / 'scenario.yaml'
-    scenario.write_text(json.dumps({
-        'name': 'starts', 'duration': duration_s,
-        'events': [{'at': 0.5, 'command': {'v_x': 0.5}}]}))
-    return WalkProcess([str(scenario), '--no-report', '--out', str(folder / 'run')])
-
-
 def killed(rng: random.Random) -> int:
     """Start a suite and kill it; returns how many processes that were."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        walk, deadline = start(Path(folder), 3600.0), time.monotonic() + PATIENCE_S
+        walk = WalkProcess.of(Path(folder), 3600.0, ahead())
+        deadline = time.monotonic() + PATIENCE_S
         while not children(walk.process.pid) and time.monotonic() < deadline:
             if walk.process.poll() is not None:
                 return 0
@@ -98,7 +80,7 @@ def _main(options: argparse.Namespace, ros: RosArguments) -> int:
         left.append(sum(files().values()) - sum(before.values()))
         print(f'\r{number + 1}/{options.starts} ', end='', file=sys.stderr, flush=True)
     with tempfile.TemporaryDirectory() as folder:
-        walk = start(Path(folder), 8.0)
+        walk = WalkProcess.of(Path(folder), 8.0, ahead())
         status = walk.process.wait(PATIENCE_S)
     after = files().keys() - before
     print('\n' + markdown_table(

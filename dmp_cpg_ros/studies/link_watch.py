@@ -42,6 +42,15 @@ FAR_NS = 10**18
 """Up to when the gate opens [ns]."""
 
 
+def posture(tilt: float, height: float, first_height: float) -> str:
+    """How a robot is, by its tilt [rad] and its height beside that at first: fallen, lying or
+    standing.
+    """
+    if tilt > FALLEN_TILT:
+        return 'fallen'
+    return 'lying' if height < LOW * first_height else 'standing'
+
+
 class WatchError(DmpCpgError):
     """The suite did not come up, or stands still."""
 
@@ -125,9 +134,7 @@ class LinkWatch:
     @property
     def posture(self) -> str:
         """How the robot is: fallen, lying or standing."""
-        if self.tilt > FALLEN_TILT:
-            return 'fallen'
-        return 'lying' if self._height < LOW * self._first_height else 'standing'
+        return posture(self.tilt, self._height, self._first_height)
 
     def begin(self) -> None:
         """Wait until all nodes are ready, and let the robot's time begin."""

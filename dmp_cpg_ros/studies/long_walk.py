@@ -11,7 +11,6 @@ status 1 when the robot did not walk to the end.
 from __future__ import annotations
 
 import argparse
-import json
 import subprocess
 import sys
 import tempfile
@@ -23,7 +22,6 @@ from pathlib import Path
 import numpy as np
 
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
-from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.studies.bench_runs import shared
 from dmp_cpg_ros.studies.output import (
     at_least_one,
@@ -75,8 +73,7 @@ def measure(walk: WalkProcess, every_s: float) -> dict[str, list[float]]:
     DmpCpgError
         If the suite does not come to walk.
     """
-    if not walk.walks():
-        raise DmpCpgError(f'the suite does not walk: {"".join(walk.lines)}')
+    walk.must_walk()
     pids = {name: walk.pid_of(nodes) for name, nodes in shared('each').items()}
     pids['walk'] = walk.process.pid
     read, begin = {name: list[float]() for name in pids}, time.monotonic()
@@ -109,13 +106,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _main(options: argparse.Namespace, _: RosArguments) -> int:
     with tempfile.TemporaryDirectory() as folder:
-        scenario = Path(folder) / 'scenario.yaml'
-        scenario.write_text(json.dumps({
-            'name': 'long_walk', 'duration': MINUTE * options.minutes,
-            'events': list(events(options.minutes))}))
-        walk = WalkProcess([str(scenario), '--no-report', '--rate', str(options.rate),
-                            '--out', str(Path(folder) / 'run'),
-                            *['--lock-step'] * options.lock_step])
+        walk = WalkProcess.of(
+            Path(folder), MINUTE * options.minutes, events(options.minutes), '--rate',
+            str(options.rate), *['--lock-step'] * options.lock_step)
         try:
             read = measure(walk, options.every)
         finally:

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from collections.abc import Mapping
@@ -50,6 +51,24 @@ def private_mb(pid: int) -> float:
     """Memory that a process shares with no other [MB]."""
     rollup = Path(f'/proc/{pid}/smaps_rollup').read_text()
     return sum(map(int, re.findall(r'^Private_\w+:\s*(\d+)', rollup, re.MULTILINE))) / 1024
+
+
+def resident_mb(pid: int) -> float:
+    """Memory of a process that is not swapped out [MB]; 0 of one that has ended."""
+    with suppress(OSError):
+        pages = int(Path(f'/proc/{pid}/statm').read_text().split()[1])
+        return pages * os.sysconf('SC_PAGE_SIZE') / 1e6
+    return 0.0
+
+
+def children(pid: int) -> list[int]:
+    """Processes that a process has started, and those that they have."""
+    found = []
+    for task in Path(f'/proc/{pid}/task').glob('*/children'):
+        with suppress(OSError):
+            for child in map(int, task.read_text().split()):
+                found += [child, *children(child)]
+    return found
 
 
 def between(first: Usage, last: Usage) -> Usage:

@@ -37,8 +37,9 @@ from dmp_cpg_ros.analysis.motion import tilt
 from dmp_cpg_ros.commands.ros_arguments import RosArguments, run_command
 from dmp_cpg_ros.core.canonical.phase import scalar_phase
 from dmp_cpg_ros.core.inhibition.supervisor import LOCKED_PHASE_ERROR
+from dmp_cpg_ros.studies.link_watch import FALLEN_TILT, posture
 from dmp_cpg_ros.studies.output import markdown_table, parser_of, write_results
-from dmp_cpg_ros.studies.walk_process import WalkProcess
+from dmp_cpg_ros.studies.walk_process import WalkProcess, ahead
 from dmp_cpg_ros.suite import load_gaits
 from dmp_cpg_ros.suite_table import RECORDER, ROBOT, WALKING_NODES
 
@@ -48,9 +49,6 @@ VICTIMS = tuple(node for node in WALKING_NODES if node != ROBOT)
 """Nodes without which a robot is left."""
 
 READY, FOLLOWS = 'all nodes are ready again', 'the robot follows its legs again'
-
-FALLEN_TILT, LOW = 0.9, 0.7
-"""Tilt of a robot that has fallen [rad]; share of its height at the start below which it lies."""
 
 COLUMNS = ('gait', 'time', 'respawn', 'walks', 'kills', 'fell', 'in phase again', 'cycles, median '
            '/ worst', 'seconds after the kill, median / worst', 'ended standing / lying / fallen',
@@ -126,12 +124,8 @@ class Outcome:
 def run(gait: str, speed: float, lock_step: bool, respawn: bool, nodes: Sequence[str],
         rng: random.Random, folder: Path) -> Outcome:
     """Walk, and kill some nodes one after the other."""
-    scenario = folder / 'scenario.yaml'
-    scenario.write_text(json.dumps({
-        'name': 'kills', 'duration': 3600.0, 'parameters': {'gait': gait},
-        'events': [{'at': 0.5, 'command': {'v_x': speed}}]}))
-    walk = WalkProcess([str(scenario), '--no-report', '--out', str(folder / 'run'),
-                        *['--lock-step'] * lock_step, *['--respawn'] * respawn])
+    walk = WalkProcess.of(folder, 3600.0, ahead(speed), *['--lock-step'] * lock_step,
+                          *['--respawn'] * respawn, gait=gait)
     outcome = Outcome(gait, lock_step, respawn)
     going = walk.said('walking') < inf
     for node in nodes if going else ():
@@ -185,10 +179,8 @@ def _judge(outcome: Outcome, speed: float, folder: Path) -> None:
     _judge_bags(outcome.kills if outcome.respawn else (), folder)
     odometry, canonical = recording.odometry, recording.canonical
     leaning, height = tilt(odometry.quaternion), odometry.position_in_world[:, 2]
-    low = LOW * height[0]
     outcome.fell = bool(leaning.max() > FALLEN_TILT)
-    outcome.end = 'fallen' if leaning[-1] > FALLEN_TILT else (
-        'lying' if height[-1] < low else 'standing')
+    outcome.end = posture(leaning[-1], height[-1], height[0])
     phases = load_gaits()[outcome.gait].phases
     own = np.array([[scalar_phase(*leg) for leg in x] for x in canonical.x.tolist()]) - phases
     off = np.abs(np.angle(np.exp(1j * (own - own[:, :1])))).max(axis=1)

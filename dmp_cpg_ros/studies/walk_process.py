@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import signal
@@ -11,12 +12,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from math import inf
 from pathlib import Path
+from typing import Any
 
 from dmp_cpg_ros.commands.fork_server import end_with_parent
+from dmp_cpg_ros.core.errors import DmpCpgError
 from dmp_cpg_ros.core.inhibition.supervisor import STATES
 
 WITHIN_S = 120.0
@@ -24,6 +27,14 @@ WITHIN_S = 120.0
 
 GAIT_STATE = rf'^ *[\d.]+ s  ({"|".join(STATES).replace("_", " ")})$'
 """Line that tells a new state of the gait."""
+
+
+Event = Mapping[str, Any]
+
+
+def ahead(speed: float = 0.5) -> list[Event]:
+    """Events of a scenario that walks ahead [m/s]."""
+    return [{'at': 0.5, 'command': {'v_x': speed}}]
 
 
 class WalkProcess:
@@ -51,6 +62,17 @@ class WalkProcess:
             preexec_fn=partial(end_with_parent, signal.SIGINT))
         threading.Thread(target=self._read, daemon=True).start()
 
+    @classmethod
+    def of(cls, folder: Path, duration_s: float, events: Iterable[Event], *options: str,
+           **parameters: object) -> WalkProcess:
+        """Walk a scenario, recorded into the folder ``run`` of a folder, without a report."""
+        folder.mkdir(parents=True, exist_ok=True)
+        scenario = folder / 'scenario.yaml'
+        scenario.write_text(json.dumps({
+            'name': 'study', 'duration': duration_s, 'parameters': parameters,
+            'events': list(events)}), encoding='utf-8')
+        return cls([str(scenario), '--no-report', '--out', str(folder / 'run'), *options])
+
     def _read(self) -> None:
         assert self.process.stdout is not None
         for line in self.process.stdout:
@@ -77,6 +99,15 @@ class WalkProcess:
             time.sleep(0.05)
         return False
 
+    def must_walk(self) -> None:
+        """Raise :meth:`failure` where it does not walk."""
+        if not self.walks():
+            raise self.failure()
+
+    def failure(self) -> DmpCpgError:
+        """What is raised where it does not walk, with what it says."""
+        return DmpCpgError(f'the suite does not walk: {"".join(self.lines)}')
+
     def pid_of(self, nodes: Sequence[str]) -> int:
         """Process of some nodes; 0 when there is none."""
         wanted = {f'__node:={nodes[0]}'} if len(nodes) == 1 else set(nodes)
@@ -90,13 +121,17 @@ class WalkProcess:
         return 0
 
     def end(self) -> int:
-        """Interrupt it, skip its report, and wait; returns the exit status."""
-        waiting = True
+        """Interrupt it, skip its report, and wait, or kill it when it hangs; returns the exit
+        status.
+        """
+        waiting, deadline = True, time.monotonic() + WITHIN_S
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         while self.process.poll() is None:
             if waiting and any('a second Ctrl-C skips' in line for line in self.lines):
                 waiting = False
                 self.process.send_signal(signal.SIGINT)
+            if time.monotonic() > deadline:
+                self.process.kill()
             time.sleep(0.05)
         return self.process.returncode
